@@ -1,0 +1,426 @@
+"""Deep deterministic policy gradient (Lillicrap et al., 2016) for one core, without autograd."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+from safetensors.torch import save
+
+from policy.adam import Adam
+from policy.files import read_tensors, write_whole
+from policy.mlp import MlpPolicy
+from policy.networks import Actor, Critic
+from policy.noise import OrnsteinUhlenbeck
+from policy.replay import Replay
+
+FORMAT = "simgap.ddpg.1"
+
+
+@dataclasses.dataclass(frozen=True)
+class DDPGConfig:
+    """Settings of ``DDPG``; the defaults are the paper's, TD3's additions are off.
+
+    Args:
+        hidden: Widths of the two hidden layers of the actor and of the critic.
+        actor_lr: Adam's step size for the actor.
+        critic_lr: Adam's step size for the critic.
+        critic_weight_decay: Factor of the critic's parameters added to their gradient.
+        tau: Share of the way that the target networks move in each update.
+        gamma: Discount per step.
+        batch: Transitions per update.
+        replay: Transitions remembered; the oldest are overwritten.
+        noise_sigma: Exploration noise: standard deviation of its increment per step, in units
+            of the action normalised to [-1, 1].
+        noise_theta: Exploration noise: share forgotten per step.
+        reward_scale: Factor on the rewards that the critic learns; returns are reported
+            without it.
+        warm_up: Transitions that must be in the replay before updates start; until then the
+            current policy acts, with noise.
+        updates_per_step: Updates after each step of the environment.
+        twin_critics: Learn two critics and use the smaller target value (TD3).
+        target_noise: Standard deviation of the noise on the target's action (TD3: 0.2).
+        target_noise_clip: Bound on that noise.
+        actor_delay: Critic updates per update of the actor and the targets (TD3: 2).
+
+    Raises:
+        ValueError: A value lies outside its range; the message says which.
+    """
+
+    hidden: tuple[int, int] = (400, 300)
+    actor_lr: float = 1e-4
+    critic_lr: float = 1e-3
+    critic_weight_decay: float = 0.0
+    tau: float = 1e-3
+    gamma: float = 0.99
+    batch: int = 64
+    replay: int = 300_000
+    noise_sigma: float = 0.12
+    noise_theta: float = 0.15
+    reward_scale: float = 0.1
+    warm_up: int = 1000
+    updates_per_step: int = 1
+    twin_critics: bool = False
+    target_noise: float = 0.0
+    target_noise_clip: float = 0.5
+    actor_delay: int = 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "hidden", tuple(self.hidden))
+        if len(self.hidden) != 2:
+            raise ValueError(f"hidden is {self.hidden}, expected the widths of two layers")
+        for name, low, high in (
+            ("tau", 0, 1),
+            ("gamma", 0, 1),
+            ("noise_theta", 0, 1),
+            ("actor_lr", 0, math.inf),
+            ("critic_lr", 0, math.inf),
+            ("critic_weight_decay", 0, math.inf),
+            ("noise_sigma", 0, math.inf),
+            ("target_noise", 0, math.inf),
+            ("target_noise_clip", 0, math.inf),
+            ("batch", 1, math.inf),
+            ("warm_up", 0, math.inf),
+            ("updates_per_step", 0, math.inf),
+            ("actor_delay", 1, math.inf),
+            ("replay", self.batch, math.inf),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"{name} is {value}, expected a value from {low} to {high}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Progress:
+    """Where ``DDPG.learn`` stands.
+
+    Args:
+        step: Steps taken in this call.
+        steps: Steps asked for in this call.
+        returns: Undiscounted return of each finished episode of this call, noise included.
+    """
+
+    step: int
+    steps: int
+    returns: tuple[float, ...]
+
+
+Callback = Callable[[Progress], bool | None]
+
+
+class DDPG:
+    """An agent that learns a deterministic policy in any environment with box spaces.
+
+    What it learns stays with it: a second ``learn``, in another environment with spaces of the
+    same size, continues from the current networks, optimisers and replay. Everything follows
+    from ``seed``; no global random state is read or written.
+
+    Args:
+        observation_space: One-dimensional ``Box``, n_o observations.
+        action_space: One-dimensional bounded ``Box``, n_a actions.
+        config: Settings.
+        seed: Seed of the initial weights, the noise, the batches and the environment's resets.
+
+    Attributes:
+        policy: The current deterministic policy, a live view: it changes as the agent learns.
+        replay: The transitions seen.
+        updates: Updates made so far.
+
+    Raises:
+        ValueError: A space is not a box as described.
+    """
+
+    def __init__(
+        self,
+        observation_space: gymnasium.Space[Any],
+        action_space: gymnasium.Space[Any],
+        config: DDPGConfig | None = None,
+        seed: int = 0,
+    ) -> None:
+        n_o = _box("observation_space", observation_space).shape[0]
+        box = _box("action_space", action_space)
+        if not box.is_bounded():
+            raise ValueError(f"action_space is {box}, expected finite bounds: the noise needs them")
+        n_a = box.shape[0]
+        self.config = c = config or DDPGConfig()
+        self._rng = rng = np.random.default_rng(seed)
+        sizes = (n_o, n_a, c.hidden, c.batch, rng)
+        self._actor, self._actor_target = Actor(*sizes), Actor(*sizes)
+        count = 2 if c.twin_critics else 1
+        self._critics = [Critic(*sizes) for _ in range(count)]
+        self._critic_targets = [Critic(*sizes) for _ in range(count)]
+        for network, target in self._pairs():
+            target.parameters.copy_(network.parameters)
+        self._actor_adam = Adam(self._actor.parameters, self._actor.gradient, c.actor_lr)
+        self._critic_adams = [
+            Adam(critic.parameters, critic.gradient, c.critic_lr, c.critic_weight_decay)
+            for critic in self._critics
+        ]
+        # Gradients of the batch's mean squared error and of minus its mean value, per row.
+        self._mean_square = torch.tensor(2 / c.batch)
+        self._mean_value = torch.full((c.batch, 1), -1 / c.batch)
+        self._noise = OrnsteinUhlenbeck(n_a, c.noise_sigma, c.noise_theta, rng)
+        self.replay = Replay(c.replay, n_o, n_a)
+        self.updates = 0
+        self.policy = MlpPolicy(
+            {
+                f"{kind}{k}": getattr(layer, kind).numpy()
+                for k, layer in enumerate(self._actor.layers, start=1)
+                for kind in ("weight", "bias")
+            },
+            np.asarray(box.low, np.float32),
+            np.asarray(box.high, np.float32),
+        )
+
+    @classmethod
+    def for_env(
+        cls, env: gymnasium.Env[Any, Any], config: DDPGConfig | None = None, seed: int = 0
+    ) -> DDPG:
+        """An agent for the spaces of ``env``; errors as for the class."""
+        return cls(env.observation_space, env.action_space, config, seed)
+
+    def act(self, observation: ArrayLike, noise: bool = False) -> NDArray[np.float32]:
+        """The policy's action, within the bounds.
+
+        Args:
+            observation: shape (n_o,), or (n, n_o) without noise.
+            noise: Add the next value of the exploration noise.
+
+        Returns:
+            Shape (n_a,) or (n, n_a).
+
+        Raises:
+            ValueError: The shape does not fit, or noise is asked for a batch: it has a memory
+                of one episode.
+        """
+        if not noise:
+            return self.policy.act(observation)
+        return self.policy.to_action(self._explore(observation))
+
+    def learn(
+        self,
+        env: gymnasium.Env[Any, Any],
+        steps: int,
+        callback: Callback | None = None,
+        every: int = 1000,
+        random_steps: int = 0,
+    ) -> None:
+        """Act in ``env`` for ``steps`` steps and learn from every one.
+
+        An episode starts with this call and after every end of one. A terminated episode has
+        no value beyond its end; one that was only truncated (a time-out) keeps the value of its
+        last state.
+
+        Args:
+            env: Environment with spaces of the sizes that the agent was made for.
+            steps: Steps of the environment.
+            callback: Called after each ``every`` steps and after the last; learning stops
+                if it returns True.
+            every: See ``callback``.
+            random_steps: The first steps of this call take uniformly random actions: an agent
+                that knows nothing yet sees more of the system than its own noise would show.
+
+        Raises:
+            ValueError: The spaces do not fit.
+            FloatingPointError: The environment gave an observation or a reward that is not
+                finite.
+        """
+        self._check_env(env)
+        c = self.config
+        returns: list[float] = []
+        total = 0.0
+        observation, _ = env.reset(seed=int(self._rng.integers(2**31)))
+        self._noise.reset()
+        for step in range(1, steps + 1):
+            if step <= random_steps:
+                normalised = self._rng.uniform(-1.0, 1.0, len(self.policy.low))
+            else:
+                normalised = self._explore(observation)
+            following, reward, terminated, truncated, _ = env.step(
+                self.policy.to_action(normalised)
+            )
+            if not (math.isfinite(float(reward)) and np.isfinite(following).all()):
+                raise FloatingPointError(
+                    f"step {step} gave the observation {following} and the reward {reward}: "
+                    "the environment has left its valid range"
+                )
+            self.replay.add(
+                observation, normalised, c.reward_scale * float(reward), following, terminated
+            )
+            total += float(reward)
+            observation = following
+            if len(self.replay) >= max(c.warm_up, 1):
+                for _ in range(c.updates_per_step):
+                    self.update()
+            if terminated or truncated:
+                returns.append(total)
+                total = 0.0
+                observation, _ = env.reset()
+                self._noise.reset()
+            if (
+                callback
+                and (step % every == 0 or step == steps)
+                and callback(Progress(step, steps, tuple(returns)))
+            ):
+                return
+
+    @torch.inference_mode()
+    def update(self) -> None:
+        """One update of the critic and the actor from one batch of the replay.
+
+        Both gradients are those of the networks as they are before the update, so that actor
+        and critic share the critic's pass over the observations; Algorithm 1 of Lillicrap et
+        al. (2016) takes the actor's gradient one critic step of size ``critic_lr`` later.
+        """
+        c = self.config
+        observations, actions, rewards, alive, following = self.replay.sample(c.batch, self._rng)
+        next_actions = self._actor_target.forward(following)
+        if c.target_noise:
+            smoothing = self._rng.normal(0, c.target_noise, tuple(next_actions.shape))
+            bounded = torch.from_numpy(smoothing).clamp_(-c.target_noise_clip, c.target_noise_clip)
+            next_actions.add_(bounded).clamp_(-1, 1)
+        values = [target.forward(following, next_actions) for target in self._critic_targets]
+        value = values[0] if len(values) == 1 else torch.minimum(*values)
+        goal = torch.addcmul(rewards, value, alive, value=c.gamma)
+        for critic in self._critics:
+            error = critic.forward(observations, actions).sub_(goal)
+            critic.backward(observations, actions, error.mul_(self._mean_square))
+        self.updates += 1
+        with_actor = self.updates % c.actor_delay == 0
+        if with_actor:
+            chosen = self._actor.forward(observations)
+            ascent = self._critics[0].d_action(chosen, self._mean_value)
+            self._actor.backward(observations, ascent)
+            self._actor_adam.step()
+        for adam in self._critic_adams:
+            adam.step()
+        if with_actor:
+            for network, target in self._pairs():
+                target.approach(network, c.tau)
+
+    def forget(self, replay: bool = False, optimiser: bool = False) -> None:
+        """Drop the transitions seen, or the optimisers' moments, before learning elsewhere."""
+        if replay:
+            self.replay.clear()
+        if optimiser:
+            for adam in (self._actor_adam, *self._critic_adams):
+                adam.reset()
+
+    def networks(self) -> dict[str, torch.Tensor]:
+        """A copy of all networks, targets and optimiser moments by name, for ``restore``."""
+        return {name: tensor.clone() for name, tensor in self._tensors().items()}
+
+    def restore(self, networks: dict[str, torch.Tensor]) -> None:
+        """Return to a copy from ``networks``; replay and random state stay as they are.
+
+        Raises:
+            ValueError: The copy is from an agent with other networks.
+        """
+        own = self._tensors()
+        shapes = {name: tuple(tensor.shape) for name, tensor in own.items()}
+        given = {name: tuple(tensor.shape) for name, tensor in networks.items()}
+        if shapes != given:
+            raise ValueError(
+                f"the networks have tensors {given}, expected {shapes}: "
+                "the spaces and the config must be those they were learnt with"
+            )
+        for name, tensor in own.items():
+            tensor.copy_(networks[name])
+
+    def save(self, path: str | Path, replay: bool = True) -> None:
+        """Write the whole agent to a safetensors file; learning on after ``load`` is the same.
+
+        Args:
+            path: File to write; it appears whole or not at all.
+            replay: Include the transitions. Without them a loaded agent warms up again.
+        """
+        tensors = dict(self._tensors())
+        tensors["low"] = torch.from_numpy(self.policy.low)
+        tensors["high"] = torch.from_numpy(self.policy.high)
+        if replay:
+            tensors["replay"] = self.replay.stored()
+        metadata = {
+            "format": FORMAT,
+            "config": dataclasses.asdict(self.config),
+            "observation_size": self.policy.observation_size,
+            "position": self.replay.position,
+            "updates": self.updates,
+            "random": self._rng.bit_generator.state,
+        }
+        texts = {key: json.dumps(value) for key, value in metadata.items()}
+        write_whole(path, save(tensors, texts))
+
+    @classmethod
+    def load(cls, path: str | Path) -> DDPG:
+        """Read an agent written by ``save``; nothing in the file is executed.
+
+        Raises:
+            FileNotFoundError: There is no such file.
+            ValueError: The file holds something else.
+        """
+        tensors, metadata = read_tensors(path, "pt")
+        if metadata.get("format") != FORMAT:
+            raise ValueError(
+                f"{path} has format {metadata.get('format')!r}, expected {FORMAT!r}: "
+                "a policy alone is read by MlpPolicy.load"
+            )
+        low, high = tensors.pop("low").numpy(), tensors.pop("high").numpy()
+        rows = tensors.pop("replay", None)
+        agent = cls(
+            gymnasium.spaces.Box(-np.inf, np.inf, (metadata["observation_size"],)),
+            gymnasium.spaces.Box(low, high),
+            DDPGConfig(**metadata["config"]),
+        )
+        agent.restore(tensors)
+        if rows is not None:
+            agent.replay.restore(rows, metadata["position"])
+        agent.updates = metadata["updates"]
+        agent._rng.bit_generator.state = metadata["random"]
+        return agent
+
+    def _explore(self, observation: ArrayLike) -> NDArray[np.float64]:
+        normalised = self.policy.normalised(observation)
+        if normalised.ndim != 1:
+            raise ValueError(
+                "noise is for one observation at a time: it has a memory of one episode"
+            )
+        return np.minimum(np.maximum(normalised + self._noise(), -1.0), 1.0)
+
+    def _pairs(self) -> list[tuple[Actor | Critic, Actor | Critic]]:
+        critics = zip(self._critics, self._critic_targets, strict=True)
+        return [(self._actor, self._actor_target), *critics]
+
+    def _tensors(self) -> dict[str, torch.Tensor]:
+        tensors = {}
+        names = ["actor", *(f"critic{k}" for k in range(1, len(self._critics) + 1))]
+        adams = [self._actor_adam, *self._critic_adams]
+        for name, (network, target), adam in zip(names, self._pairs(), adams, strict=True):
+            tensors[name] = network.parameters
+            tensors[f"{name}.target"] = target.parameters
+            tensors |= {f"{name}.adam.{key}": value for key, value in adam.state().items()}
+        return tensors
+
+    def _check_env(self, env: gymnasium.Env[Any, Any]) -> None:
+        for name, space, size in (
+            ("observation", env.observation_space, self.policy.observation_size),
+            ("action", env.action_space, len(self.policy.low)),
+        ):
+            if space.shape != (size,):
+                raise ValueError(
+                    f"the environment's {name} space is {space}, but the agent was made for "
+                    f"{size} {name}(s): make a new agent, or wrap the environment"
+                )
+
+
+def _box(name: str, space: gymnasium.Space[Any]) -> gymnasium.spaces.Box:
+    if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
+        raise ValueError(f"{name} is {space}, expected a one-dimensional Box")
+    return space

@@ -1,0 +1,117 @@
+"""Run a policy without learning: rollouts with everything recorded, returns, and data sets."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Protocol
+
+import gymnasium
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from policy.noise import OrnsteinUhlenbeck
+
+Array = NDArray[np.float64]
+
+
+class Policy(Protocol):
+    """Anything that maps an observation to an action of the environment."""
+
+    def act(self, observation: ArrayLike) -> NDArray[Any]:
+        """Action, shape (n_a,), for one observation, shape (n_o,)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rollout:
+    """One episode of T steps.
+
+    Args:
+        observations: shape (T + 1, n_o), the first being the start.
+        actions: As applied, noise included and clipped to the bounds, shape (T, n_a).
+        rewards: shape (T,).
+        states: The environment's ``info["state"]``, shape (T + 1, n_s), or None without it.
+        terminated: The episode ended in a terminal state and not by time.
+    """
+
+    observations: Array
+    actions: Array
+    rewards: Array
+    states: Array | None
+    terminated: bool
+
+    @property
+    def total(self) -> float:
+        """Undiscounted return."""
+        return float(self.rewards.sum())
+
+
+def rollout(
+    policy: Policy,
+    env: gymnasium.Env[Any, Any],
+    seed: int,
+    noise: OrnsteinUhlenbeck | None = None,
+    max_steps: int | None = None,
+) -> Rollout:
+    """One episode from ``env.reset(seed=seed)`` to its end.
+
+    Args:
+        policy: Chooses the actions.
+        env: Environment with a bounded box of actions if there is noise.
+        seed: Seed of the reset.
+        noise: Exploration noise in units of the action normalised to [-1, 1]; it is reset
+            at the start.
+        max_steps: Stop after so many steps.
+    """
+    box = env.action_space
+    assert isinstance(box, gymnasium.spaces.Box)
+    half = (np.asarray(box.high, float) - np.asarray(box.low, float)) / 2
+    if noise:
+        noise.reset()
+    observation, info = env.reset(seed=seed)
+    observations, infos = [observation], [info]
+    actions: list[NDArray[Any]] = []
+    rewards: list[float] = []
+    terminated = truncated = False
+    while not (terminated or truncated or len(rewards) == max_steps):
+        action = policy.act(observation)
+        if noise:
+            action = np.clip(action + half * noise(), box.low, box.high).astype(box.dtype)
+        observation, reward, terminated, truncated, info = env.step(action)
+        observations.append(observation)
+        infos.append(info)
+        actions.append(action)
+        rewards.append(float(reward))
+    states = [info["state"] for info in infos] if "state" in infos[0] else None
+    return Rollout(
+        np.array(observations, float),
+        np.array(actions, float).reshape(len(actions), -1),
+        np.array(rewards),
+        None if states is None else np.array(states, float),
+        bool(terminated),
+    )
+
+
+def evaluate(
+    policy: Policy,
+    env: gymnasium.Env[Any, Any],
+    episodes: int = 1,
+    seed: int = 0,
+    noise: OrnsteinUhlenbeck | None = None,
+) -> Array:
+    """Undiscounted returns of ``episodes`` rollouts with seeds from ``seed`` on, (episodes,)."""
+    return np.array([rollout(policy, env, seed + k, noise).total for k in range(episodes)])
+
+
+def collect(
+    policy: Policy,
+    env: gymnasium.Env[Any, Any],
+    samples: int,
+    seed: int,
+    noise: OrnsteinUhlenbeck | None = None,
+) -> list[Rollout]:
+    """Rollouts with exactly ``samples`` steps in all, the last one cut short if need be."""
+    rollouts: list[Rollout] = []
+    while samples > 0:
+        rollouts.append(rollout(policy, env, seed + len(rollouts), noise, samples))
+        samples -= len(rollouts[-1].rewards)
+    return rollouts

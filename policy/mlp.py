@@ -1,0 +1,110 @@
+"""A deterministic policy as plain numpy: small enough to save, share and run anywhere."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from safetensors.numpy import save
+
+from policy.files import read_tensors, write_whole
+
+FORMAT = "simgap.policy.1"
+
+
+@dataclasses.dataclass(frozen=True)
+class MlpPolicy:
+    """Observation -> action: two layers of rectified units, tanh, scaled to the action's bounds.
+
+    Args:
+        weights: ``weight1`` (n_1, n_o), ``bias1``, ``weight2`` (n_2, n_1), ``bias2``,
+            ``weight3`` (n_a, n_2), ``bias3``; float32.
+        low: Lowest action, shape (n_a,).
+        high: Highest action, shape (n_a,).
+    """
+
+    weights: dict[str, NDArray[np.float32]]
+    low: NDArray[np.float32]
+    high: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        # One layout, whether learnt, copied or loaded: another one would round differently.
+        for name, value in self.weights.items():
+            self.weights[name] = (np.asfortranarray if name == "weight1" else np.ascontiguousarray)(
+                value
+            )
+
+    @property
+    def observation_size(self) -> int:
+        """Number of observations n_o."""
+        return int(self.weights["weight1"].shape[1])
+
+    def act(self, observation: ArrayLike) -> NDArray[np.float32]:
+        """Action(s) within the bounds.
+
+        Args:
+            observation: One observation, shape (n_o,), or a batch, shape (n, n_o).
+
+        Returns:
+            Shape (n_a,) or (n, n_a), float32.
+
+        Raises:
+            ValueError: The observation has another number of columns.
+        """
+        return self.to_action(self.normalised(observation))
+
+    def normalised(self, observation: ArrayLike) -> NDArray[np.float32]:
+        """Action(s) in [-1, 1]; arguments and errors as in ``act``."""
+        x = np.asarray(observation, np.float32)
+        w = self.weights
+        if x.ndim not in (1, 2) or x.shape[-1] != self.observation_size:
+            raise ValueError(
+                f"observation has shape {x.shape}, expected ({self.observation_size},) "
+                f"or (n, {self.observation_size})"
+            )
+        x = x @ w["weight1"].T
+        x += w["bias1"]
+        np.maximum(x, 0, out=x)
+        x = x @ w["weight2"].T
+        x += w["bias2"]
+        np.maximum(x, 0, out=x)
+        x = x @ w["weight3"].T
+        x += w["bias3"]
+        return np.tanh(x, out=x)
+
+    def to_action(self, normalised: ArrayLike) -> NDArray[np.float32]:
+        """Map [-1, 1] onto the action's bounds; values outside are clipped to them."""
+        share = (np.asarray(normalised, np.float32) + 1) / 2
+        action = self.low + share * (self.high - self.low)
+        return np.minimum(np.maximum(action, self.low), self.high)
+
+    def copy(self) -> MlpPolicy:
+        """The same policy with weights of its own."""
+        weights = {name: value.copy(order="K") for name, value in self.weights.items()}
+        return MlpPolicy(weights, self.low.copy(), self.high.copy())
+
+    def save(self, path: str | Path) -> None:
+        """Write a safetensors file; it appears whole or not at all."""
+        tensors = {**self.weights, "low": self.low, "high": self.high}
+        contiguous = {name: np.ascontiguousarray(value) for name, value in tensors.items()}
+        write_whole(path, save(contiguous, {"format": json.dumps(FORMAT)}))
+
+    @classmethod
+    def load(cls, path: str | Path) -> MlpPolicy:
+        """Read a file written by ``save``; nothing in it is executed.
+
+        Raises:
+            FileNotFoundError: There is no such file.
+            ValueError: The file holds something else.
+        """
+        tensors, metadata = read_tensors(path, "np")
+        if metadata.get("format") != FORMAT:
+            raise ValueError(
+                f"{path} has format {metadata.get('format')!r}, expected {FORMAT!r}: "
+                "load it with the class that saved it"
+            )
+        low, high = tensors.pop("low"), tensors.pop("high")
+        return cls(tensors, low, high)

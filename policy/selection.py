@@ -1,0 +1,133 @@
+"""Which of the policies seen during learning to keep.
+
+Returns oscillate by hundreds from one evaluation to the next, so the last policy is a poor
+choice. The one with the best single rollout is also risky: on a corrected simulator it may
+live from an error of the correction. The rule here averages one rollout without noise and a
+few with exploration noise, all in the environment that the agent learns in.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+
+from policy.ddpg import DDPG, Progress
+from policy.evaluate import Policy, evaluate
+from policy.mlp import MlpPolicy
+from policy.noise import OrnsteinUhlenbeck
+
+
+@dataclasses.dataclass(frozen=True)
+class Point:
+    """One evaluation while learning.
+
+    Args:
+        step: Environment steps learnt in this call before the evaluation.
+        score: What the rule judges by: mean return of the rollouts with and without noise.
+        deterministic: Return of the rollout without noise.
+    """
+
+    step: int
+    score: float
+    deterministic: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Selection:
+    """The best policy of one call of ``learn_and_select``.
+
+    Args:
+        policy: The policy with the highest score, a copy.
+        networks: The agent's networks at that moment, for ``DDPG.restore``.
+        best: Its evaluation.
+        curve: All evaluations in order.
+    """
+
+    policy: MlpPolicy
+    networks: dict[str, torch.Tensor]
+    best: Point
+    curve: tuple[Point, ...]
+
+
+def score(
+    policy: Policy,
+    env: gymnasium.Env[Any, Any],
+    noisy: int,
+    sigma: float,
+    theta: float,
+    seed: int,
+) -> tuple[float, float]:
+    """Mean return of one rollout without noise and ``noisy`` with it, and the former's return.
+
+    Policies scored with one seed see the same start states and the same noise.
+    """
+    deterministic = evaluate(policy, env, 1, seed)
+    if not noisy:
+        return float(deterministic[0]), float(deterministic[0])
+    size = int(np.prod(env.action_space.shape or ()))
+    noise = OrnsteinUhlenbeck(size, sigma, theta, np.random.default_rng(seed))
+    disturbed = evaluate(policy, env, noisy, seed + 1, noise)
+    return float(np.concatenate([deterministic, disturbed]).mean()), float(deterministic[0])
+
+
+def learn_and_select(
+    agent: DDPG,
+    env: gymnasium.Env[Any, Any],
+    evaluation_env: gymnasium.Env[Any, Any],
+    steps: int,
+    every: int = 1000,
+    noisy: int = 3,
+    seed: int = 0,
+    callback: Callable[[Point], bool | None] | None = None,
+    random_steps: int = 0,
+) -> Selection:
+    """Learn, score the policy now and then, and keep the best.
+
+    The policy is scored at the start, so that what earlier learning brought can win, then
+    after each ``every`` steps and at the end, unless no update has changed it since. The agent
+    itself ends with the last networks; ``agent.restore(selection.networks)`` goes back.
+
+    Args:
+        agent: Learns on, from where it stands.
+        env: Where it learns.
+        evaluation_env: A second instance of the same environment, so that scoring does not
+            disturb the episode being learnt from.
+        steps: Environment steps to learn for.
+        every: Steps between evaluations.
+        noisy: Rollouts with noise per evaluation, as strong as the agent's exploration.
+        seed: Seed of the evaluations' start states and noise.
+        callback: Called with every evaluation; learning stops if it returns True.
+        random_steps: As in ``DDPG.learn``.
+    """
+    if env.unwrapped is evaluation_env.unwrapped:
+        raise ValueError("env and evaluation_env are one object: make the environment twice")
+    c = agent.config
+    curve: list[Point] = []
+    kept: list[tuple[MlpPolicy, dict[str, torch.Tensor], Point]] = []
+    scored_at = -1
+
+    def consider(step: int) -> bool:
+        nonlocal scored_at
+        if agent.updates == scored_at:
+            return False
+        scored_at = agent.updates
+        point = Point(
+            step, *score(agent.policy, evaluation_env, noisy, c.noise_sigma, c.noise_theta, seed)
+        )
+        curve.append(point)
+        if not kept or point.score > kept[0][2].score:
+            kept[:] = [(agent.policy.copy(), agent.networks(), point)]
+        return bool(callback and callback(point))
+
+    def on_progress(progress: Progress) -> bool:
+        return consider(progress.step)
+
+    if not consider(0):
+        agent.learn(env, steps, on_progress, every, random_steps)
+    policy, networks, best = kept[0]
+    return Selection(policy, networks, best, tuple(curve))

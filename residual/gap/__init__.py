@@ -1,0 +1,1 @@
+"""Find where a simulator and measured logs disagree, and name the physical effect that is missing."""

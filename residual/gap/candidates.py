@@ -1,0 +1,147 @@
+"""Candidate effects: which of their numbers are fitted, in what bounds, from which start values."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.samples import Samples
+from sims.effects.base import Effect, Quantity
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Knob:
+    """One fitted number of an effect: name of the field, unit, bounds, and a small step."""
+
+    field: str
+    unit: str
+    low: float
+    high: float
+    step: float
+    strength: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """Trial values of a candidate's knobs, one row for each signature column.
+
+    Attributes:
+        values: shape (k, number of knobs).
+        one_sided: Whether each column's coefficient may not be negative, (k,).
+    """
+
+    values: Array
+    one_sided: NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """An effect that may be missing.
+
+    Attributes:
+        effect: The effect at zero strength, numbers that are not fitted at their value.
+        knobs: The fitted numbers.
+        trials: What its signatures are computed at.
+        rough: True if its signature depends on its size (dead zone, delay ...), so that several
+            trials are worth a refit.
+    """
+
+    effect: Effect
+    knobs: tuple[Knob, ...]
+    trials: tuple[Trial, ...]
+    rough: bool
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+    @property
+    def label(self) -> str:
+        """Name and place."""
+        return str(self.effect)
+
+    @property
+    def fixed_level(self) -> bool:
+        """True if the effect vanishes at infinity (saturation), so that trials do not scale."""
+        return not any(k.strength for k in self.knobs)
+
+    @property
+    def linear(self) -> NDArray[np.bool_]:
+        """Which knobs scale with the coefficient of a signature column."""
+        return np.array([knob.strength for knob in self.knobs])
+
+    def bind(self, values: Sequence[float | Array]) -> Effect:
+        """The effect with these numbers: scalars, or arrays with one entry per row."""
+        names = [knob.field for knob in self.knobs]
+        return self.effect.with_values(**dict(zip(names, values, strict=True)))
+
+
+def candidates(
+    simulator: HostSimulator, effects: Iterable[Effect], samples: Samples
+) -> list[Candidate]:
+    """All candidates: effects on channels that were measured, whole numbers spelt out.
+
+    An effect with a whole-numbered shape (the order of cogging) becomes one candidate for each
+    of its start values.
+    """
+    measured = {simulator.state_channels[i].name for i in samples.measured}
+    inputs = [channel.name for channel in simulator.action_channels]
+    found = []
+    for effect in effects:
+        if effect.enters == "sensor" and effect.where not in measured:
+            continue
+        known = effect.quantities(simulator)
+        whole = {n: q for n, q in known.items() if q.integer and q.role == "shape"}
+        for values in itertools.product(*(q.starts for q in whole.values())):
+            fixed = effect.with_values(**dict(zip(whole, values, strict=True)))
+            reach = 0.0
+            if effect.enters == "actuator" and effect.where in inputs:
+                reach = float(np.abs(samples.actions[:, inputs.index(effect.where)]).max())
+            found.append(_candidate(fixed, known, reach))
+    return found
+
+
+def _candidate(effect: Effect, known: dict[str, Quantity], reach: float) -> Candidate:
+    free = {
+        n: q
+        for n, q in known.items()
+        if q.role == "strength" or (q.role == "shape" and not q.integer)
+    }
+    knobs = tuple(
+        Knob(
+            n, q.unit, q.low, q.high, 0.1 * q.scale,
+            q.role == "strength" and np.isfinite(q.nominal),
+        )
+        for n, q in free.items()
+    )  # fmt: skip
+    strengths = [i for i, knob in enumerate(knobs) if knob.strength]
+    shapes = [i for i, knob in enumerate(knobs) if not knob.strength]
+    quantities = list(free.values())
+    starts = [quantities[i].starts or (quantities[i].scale,) for i in shapes]
+    if not strengths and reach > 0:
+        # The level of a saturation is searched where the recorded input reaches.
+        starts = [tuple(s / quantities[i].scale * reach for s in starts[0]) for i in shapes]
+    trials = []
+    for shape in itertools.product(*starts):
+        sizes = [
+            list(quantities[i].starts) or [0.1 * quantities[i].scale] for i in strengths
+        ] or [[0.0]]
+        if len(strengths) > 1:
+            sizes = [[size[0]] for size in sizes]
+        for chosen in sizes[0] if len(strengths) <= 1 else [None]:
+            rows = np.zeros((max(len(strengths), 1), len(knobs)))
+            rows[:, shapes] = shape
+            for row, i in enumerate(strengths):
+                rows[row, i] = chosen if chosen is not None else sizes[row][0]
+            sided = [knobs[i].low == 0 for i in strengths] or [True]
+            trials.append(Trial(rows, np.array(sided)))
+    rough = len(trials) > 1
+    return Candidate(effect, knobs, tuple(trials), rough)

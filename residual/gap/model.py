@@ -1,0 +1,157 @@
+"""A simulator with chosen effects as a function of samples, states and a vector of unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.candidates import Candidate
+from residual.gap.samples import Samples
+from sims.effects.backlash import Backlash
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+
+class Model:
+    """A simulator, the effects it is given, and their numbers as one vector of unknowns.
+
+    Args:
+        simulator: Hosts the effects.
+        chosen: The candidates at work, in the order in which their numbers are listed.
+
+    Attributes:
+        knobs: One for each unknown, with its bounds and step.
+        owner: Which candidate each unknown belongs to, (p,).
+        physical: Number of physical state channels, the first columns of a state.
+        width: Number of state columns: physical, then the play of each backlash.
+        free: Columns whose start value is free in every window.
+    """
+
+    def __init__(self, simulator: HostSimulator, chosen: Sequence[Candidate] = ()) -> None:
+        self.simulator = simulator
+        self.chosen = tuple(chosen)
+        self.knobs = tuple(knob for candidate in self.chosen for knob in candidate.knobs)
+        self.owner = np.array([i for i, c in enumerate(self.chosen) for _ in c.knobs], int)
+        self.low = np.array([knob.low for knob in self.knobs])
+        self.high = np.array([knob.high for knob in self.knobs])
+        self.step = np.array([knob.step for knob in self.knobs])
+        plays = sum(isinstance(c.effect, Backlash) for c in self.chosen)
+        self.physical = len(simulator.physical_channels)
+        self.width = self.physical + plays
+        self.free = list(range(self.physical))
+        enters = [c.effect.enters for c in self.chosen]
+        self._actuator = np.array(
+            [enters[i] == "actuator" and not isinstance(self.chosen[i].effect, Backlash)
+             for i in self.owner], bool,
+        )  # fmt: skip
+        self.has_sensor = "sensor" in enters
+        # The samples are kept with their inputs, so that an identity is never reused.
+        self._drives: dict[bytes, tuple[Samples, Array]] = {}
+
+    def __len__(self) -> int:
+        return len(self.knobs)
+
+    def bind(self, theta: Array, each: int = 1) -> HostSimulator:
+        """The simulator with its effects.
+
+        Args:
+            theta: Unknowns, (p,), or (V, p) to serve a batch of V times ``each`` rows.
+            each: Rows for each vector of unknowns.
+        """
+        effects = []
+        for i, candidate in enumerate(self.chosen):
+            own = self.owner == i
+            if theta.ndim == 1:
+                effects.append(candidate.bind([float(value) for value in theta[own]]))
+            else:
+                effects.append(candidate.bind([np.repeat(v, each) for v in theta[:, own].T]))
+        return self.simulator.with_effects(effects)
+
+    def widen(self, samples: Samples, states: Array, theta: Array) -> Array:
+        """Physical states (n, n_physical) with the play of each backlash appended."""
+        if self.width == self.physical:
+            return states
+        host = self.bind(theta)
+        full = np.zeros((len(states), self.width))
+        full[:, : self.physical] = states
+        if len(host.integrated_channels) == self.width:
+            # The play lies where the input before the sample has pushed it.
+            before = np.vstack([samples.actions[:1], samples.actions[:-1]])
+            for start, _ in samples.runs:
+                before[start] = samples.actions[start]
+            full[:, self.physical :] = host.augment(states, before)[:, self.physical : self.width]
+        return full
+
+    def scales(self, physical: Array) -> Array:
+        """Typical variation of every state column, from that of the physical ones."""
+        names = [channel.name for channel in self.simulator.physical_channels]
+        joints = {joint.name: joint.position for joint in self.simulator.joints}
+        plays = [c.effect for c in self.chosen if isinstance(c.effect, Backlash)]
+        return np.append(physical, [0.1 * physical[names.index(joints[p.joint])] for p in plays])
+
+    def inputs(self, samples: Samples, theta: Array) -> Array:
+        """Effective input of every sub-step, (V, n, substeps, n_a); V = 1 if all rows agree."""
+        if not self._actuator.any():
+            theta = theta[:1]
+        key = theta[:, self._actuator].tobytes() + np.int64([id(samples), len(theta)]).tobytes()
+        if key not in self._drives:
+            if len(self._drives) > 4:
+                self._drives.clear()
+            host = self.bind(theta)
+            parts = []
+            for start, stop in samples.runs:
+                part = host.drive(
+                    samples.actions[start:stop],
+                    samples.durations[start:stop],
+                    samples.substeps,
+                    hold=samples.hold,
+                )
+                parts.append(part if part.ndim == 4 else part[None])
+            rows = max(len(part) for part in parts)
+            parts = [np.broadcast_to(p, (rows, *p.shape[1:])) for p in parts]
+            self._drives[key] = (samples, np.concatenate(parts, axis=1))
+        return self._drives[key][1]
+
+    def advance(self, samples: Samples, states: Array, theta: Array) -> Array:
+        """One sample interval from every state.
+
+        Args:
+            samples: Gives inputs and durations.
+            states: shape (V, n, n_s), a state at every sample.
+            theta: shape (V, p).
+
+        Returns:
+            States at the next sample, shape (V, n, n_s).
+        """
+        variants, n, width = states.shape
+        theta = np.asarray(theta, float)
+        distinct, which = np.unique(theta[:, self._actuator], axis=0, return_inverse=True)
+        if len(distinct) < variants:
+            first = [int(np.flatnonzero(which == i)[0]) for i in range(len(distinct))]
+            driven = self.inputs(samples, theta[first])
+            driven = driven[which] if len(driven) > 1 else np.repeat(driven, variants, axis=0)
+        else:
+            driven = np.broadcast_to(
+                self.inputs(samples, theta), (variants, n, samples.substeps, samples.actions.shape[1])
+            )
+        host = self.bind(theta, each=n)
+        own = len(host.integrated_channels)
+        after = np.array(states.reshape(variants * n, width))
+        with np.errstate(all="ignore"):
+            after[:, :own] = host.integrate(
+                after[:, :own],
+                driven.reshape(variants * n, *driven.shape[2:]),
+                np.tile(samples.durations, variants),
+            )
+        return np.nan_to_num(after, nan=1e6, posinf=1e6, neginf=-1e6).reshape(variants, n, width)
+
+    def sense(self, states: Array, theta: Array) -> Array:
+        """What the sensors show of states (V, n, n_s) under unknowns (V, p)."""
+        if not self.has_sensor:
+            return states
+        variants, n, width = states.shape
+        host = self.bind(theta, each=n)
+        return host.sense(np.array(states).reshape(variants * n, width)).reshape(states.shape)

@@ -1,0 +1,208 @@
+"""Sensor noise and the path of the states, without trusting the model's forces."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.model import Model
+from residual.gap.samples import Samples
+from residual.gap.shooting import Slope, defects, misfit, observe, slopes
+from residual.gap.windows import Windows, carry, fixed
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Floor:
+    """What a smooth missing force cannot explain.
+
+    Attributes:
+        sigma: Noise of every measured channel, (m,).
+        error: Standard error of each sigma, (m,).
+        nodes: Smoothed state at every sample, (n, n_s).
+        slope: Derivatives at the nodes.
+        force: Missing acceleration (rate of change for first-order states) at every sample,
+            (n, number of driven states).
+    """
+
+    sigma: Array
+    error: Array
+    nodes: Array
+    slope: Slope
+    force: Array
+
+
+def driven_states(model: Model) -> list[int]:
+    """Columns a missing effect would push: rates, and states of first-order systems."""
+    channels = model.simulator.physical_channels
+    return [i for i, c in enumerate(channels) if c.kind in ("rate", "other")]
+
+
+def push(model: Model, samples: Samples) -> Array:
+    """Change of the next state by a unit acceleration held over the interval, (n, n_s, driven)."""
+    channels = model.simulator.physical_channels
+    names = [c.name for c in channels]
+    columns = driven_states(model)
+    effect = np.zeros((len(samples), model.width, len(columns)))
+    for j, column in enumerate(columns):
+        effect[:, column, j] = samples.durations
+        if channels[column].kind == "rate" and channels[column].rate_of in names:
+            effect[:, names.index(channels[column].rate_of), j] = 0.5 * samples.durations**2
+    return effect
+
+
+def first_path(model: Model, samples: Samples, theta: Array) -> Array:
+    """Nodes straight from the measurement; an unmeasured rate by central differences."""
+    channels = model.simulator.physical_channels
+    names = [c.name for c in channels]
+    nodes = np.array(samples.seen[:, : len(channels)])
+    for start, stop in samples.runs:
+        rows = slice(start, stop)
+        for i, channel in enumerate(channels):
+            column = nodes[rows, i]
+            good = np.isfinite(column)
+            if not good.any() and channel.kind == "rate" and channel.rate_of in names:
+                position = nodes[rows, names.index(channel.rate_of)]
+                column[:] = np.gradient(position, samples.times[rows])
+            elif not good.any():
+                column[:] = 0.0
+            elif not good.all():
+                at = samples.times[rows]
+                column[~good] = np.interp(at[~good], at[good], column[good])
+    if model.has_sensor:
+        nodes = model.bind(theta).unsense(nodes)
+    return model.widen(samples, nodes, theta)
+
+
+def variation(samples: Samples, nodes: Array, length: int = 25) -> Array:
+    """Typical variation of each state within ``length`` samples, to scale states."""
+    spreads = []
+    for start, stop in samples.runs:
+        for a in range(start, max(stop - length, start + 1), length):
+            spreads.append(nodes[a : min(a + length, stop)].std(axis=0))
+    spread = np.median(spreads, axis=0)
+    typical = nodes.std(axis=0)
+    return np.maximum(spread, np.maximum(1e-3 * typical, 1e-9))
+
+
+def estimate(
+    model: Model,
+    samples: Samples,
+    nodes: Array,
+    theta: Array,
+    sigma: Array,
+    scale: Array,
+    length: int = 8,
+    terms: int | None = None,
+    iterations: int = 4,
+) -> Floor:
+    """Fit short windows by the model plus a smooth free force; what is left is noise.
+
+    The force is a cosine series over the window, for each driven state, so that a missing effect
+    does not count as noise however large it is.
+
+    Args:
+        sigma: First guess of the noise, (m,).
+        terms: Cosines in the series; by default 4 if some rate is measured and 3 if not.
+    """
+    measured = samples.measured
+    driven = driven_states(model)
+    free = model.free
+    if terms is None:
+        terms = 4 if set(measured) & set(driven) else 3
+    windows = fixed(samples, length, shortest=length - 1)
+    start = np.zeros((nodes.shape[1], len(free)))
+    start[free, range(len(free))] = 1.0
+    count, places = windows.index.shape
+    phase = np.pi * (np.arange(places) + 0.5) / (places - 1)
+    series = np.cos(np.outer(phase, np.arange(terms)))
+    unit = push(model, samples)[windows.index]
+    forces = np.einsum("wlsd,lt->wlsdt", unit, series).reshape(*unit.shape[:3], -1)
+    weight = np.zeros((count, forces.shape[-1]))
+    f, q = len(free), forces.shape[-1]
+    ridge = 1e-2 / scale[free]
+    error = sigma
+    for turn in range(iterations):
+        slope = slopes(model, samples, nodes, theta, model.step, scale)
+        gaps = defects(samples, slope, nodes)[windows.index]
+        added = (forces @ weight[:, None, :, None])[..., 0]
+        response = carry(
+            windows, slope.by_state, start,
+            np.concatenate([forces, (gaps + added)[..., None]], axis=3),
+        )  # fmt: skip
+        shown = observe(samples, windows, slope, response, sigma)
+        residual = (misfit(samples, windows, slope, sigma) - shown[..., -1]).reshape(count, -1)
+        columns = shown[..., :-1].reshape(count, -1, f + q)
+        pad = np.zeros((count, f, f + q))
+        pad[:, range(f), range(f)] = ridge
+        basis, triangle = np.linalg.qr(np.concatenate([columns, pad], axis=1))
+        basis_rows = basis[:, : residual.shape[1]]
+        triangle = triangle + 1e-12 * np.eye(f + q)
+        move = np.linalg.solve(triangle, basis_rows.transpose(0, 2, 1) @ residual[..., None])
+        left = residual - (columns @ move)[..., 0]
+        move = move[..., 0]
+        move[:, :f] = np.clip(move[:, :f], -3 * scale[free], 3 * scale[free])
+        shift = (response[..., :-1] @ move[:, None, :, None])[..., 0] + response[..., -1]
+        weight = weight + move[:, f:]
+        nodes = nodes.copy()
+        nodes[windows.index[windows.inside]] += shift[windows.inside]
+        if turn >= 1:
+            sigma, error = _spread(samples, windows, basis_rows, left, sigma)
+    slope = slopes(model, samples, nodes, theta, model.step, scale)
+    force = np.zeros((len(samples), len(driven)))
+    local = np.einsum("wdt,lt->wld", weight.reshape(count, len(driven), terms), series)
+    force[windows.index[windows.inside]] = local[windows.inside]
+    return Floor(sigma, error, nodes, slope, force)
+
+
+def _spread(
+    samples: Samples, windows: Windows, basis: Array, left: Array, sigma: Array
+) -> tuple[Array, Array]:
+    """Noise of every channel from residual and leverage, windows that did not settle left out."""
+    measured = samples.measured
+    count, places = windows.index.shape
+    valid = np.isfinite(samples.seen[:, measured])[windows.index] & windows.inside[..., None]
+    leverage = (basis**2).sum(axis=2).reshape(count, places, -1)
+    square = (left**2).reshape(count, places, -1)
+    total = square.sum(axis=(1, 2))
+    settled = total < 12 * np.median(total) + 1e-300
+    freedom = np.where(valid, 1 - leverage, 0.0)[settled].sum(axis=(0, 1))
+    variance = np.where(valid, square, 0.0)[settled].sum(axis=(0, 1)) / np.maximum(freedom, 1e-9)
+    fresh = sigma * np.sqrt(np.maximum(variance, 1e-12))
+    return fresh, fresh / np.sqrt(2 * np.maximum(freedom, 1.0))
+
+
+def local_noise(samples: Samples, length: int = 9) -> Array:
+    """First guess of every measured channel's noise: what a local cubic leaves, (m,)."""
+    guesses = []
+    for column in samples.measured:
+        squares: list[float] = []
+        for start, stop in samples.runs:
+            for a in range(start, stop - length + 1, length):
+                t = samples.times[a : a + length]
+                y = samples.seen[a : a + length, column]
+                if np.isfinite(y).all():
+                    basis = np.vander((t - t.mean()) / max(np.ptp(t), 1e-12), 4)
+                    rest = y - basis @ np.linalg.lstsq(basis, y, rcond=None)[0]
+                    squares.append(float(rest @ rest) / (length - 4))
+        spread = np.nanstd(samples.seen[:, column])
+        guess = np.sqrt(np.median(squares)) if squares else 1e-3 * spread
+        guesses.append(max(guess, quantum(samples.seen[:, column]) / np.sqrt(12), 1e-9 * spread, 1e-12))
+    return np.array(guesses)
+
+
+def quantum(column: Array) -> float:
+    """Quantisation step of a channel, 0 if its values do not repeat."""
+    values = np.unique(column[np.isfinite(column)])
+    if len(values) < 2:
+        return 0.0
+    gaps = np.diff(values)
+    gaps = gaps[gaps > 1e-9 * np.abs(values).max()]
+    if len(gaps) == 0:
+        return 0.0
+    step = float(np.quantile(gaps, 0.05))
+    off = np.abs(gaps / step - np.round(gaps / step))
+    return step if (off < 0.05).mean() > 0.95 else 0.0

@@ -1,0 +1,224 @@
+"""Signatures: how each candidate effect would move the predicted windows, and what it would gain.
+
+A candidate is tried for one sample interval from every node; the change it makes is then carried
+linearly along the window, and whatever free start states and effects already chosen can imitate is
+projected out. One batch of the simulator serves all windows, and no trial can run away.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.candidates import Candidate, Trial
+from residual.gap.model import Model
+from residual.gap.samples import Samples
+from residual.gap.shooting import Fit, observe
+from residual.gap.windows import Windows, carry
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Variant:
+    """One candidate at trial values.
+
+    Attributes:
+        candidate: Its number in the list of candidates.
+        trial: Values of its knobs that make the columns.
+        columns: Which columns of the signature matrix belong to it.
+        linear: Which knobs scale with the coefficient; the others keep their trial value.
+    """
+
+    candidate: int
+    trial: Trial
+    columns: tuple[int, ...]
+    linear: NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True)
+class Signatures:
+    """Signature columns around a fit.
+
+    Attributes:
+        variants: One or more for each candidate.
+        matrix: Columns, start states and chosen effects projected out, (rows, c).
+        residual: The residual, projected likewise, (rows,).
+        chosen: Derivative by the unknowns of the chosen effects, start states projected out.
+        plain: ``matrix`` before the chosen effects were projected out.
+        plain_residual: ``residual`` likewise.
+    """
+
+    variants: tuple[Variant, ...]
+    matrix: Array
+    residual: Array
+    chosen: Array
+    plain: Array
+    plain_residual: Array
+
+    @property
+    def strengths(self) -> Array:
+        """Squared norm of every column."""
+        return np.einsum("rc,rc->c", self.matrix, self.matrix)
+
+
+def flatten(values: Array, weights: Array) -> Array:
+    """(W, R, c) or (W, R) with the root of the window weights -> (W R, c) or (W R,)."""
+    shaped = values * np.sqrt(weights).reshape(-1, *([1] * (values.ndim - 1)))
+    return shaped.reshape(values.shape[0] * values.shape[1], *values.shape[2:])
+
+
+def project_out(basis: Array, columns: Array) -> Array:
+    """``columns`` less what the columns of ``basis`` can imitate."""
+    if basis.shape[1] == 0:
+        return columns
+    size = np.sqrt(np.maximum((basis**2).sum(axis=0), 1e-300))
+    q, _ = np.linalg.qr(basis / size)
+    return columns - q @ (q.T @ columns)
+
+
+def signatures(
+    fit: Fit,
+    samples: Samples,
+    windows: Windows,
+    sigma: Array,
+    candidates: Sequence[Candidate],
+) -> Signatures:
+    """Signatures of all candidates around a fitted model."""
+    model = fit.model
+    n, width = fit.nodes.shape
+    moved: list[Array] = []
+    shown: list[Array] = []
+    variants: list[Variant] = []
+    total = 0
+    base = fit.slope.after
+    for number, candidate in enumerate(candidates):
+        joint = Model(model.simulator, (*model.chosen, candidate))
+        rows = np.vstack([trial.values for trial in candidate.trials])
+        theta = np.hstack([np.repeat(fit.theta[None], len(rows), axis=0), rows])
+        states = np.broadcast_to(fit.nodes, (len(rows), n, width))
+        if joint.width > width:
+            play = [joint.widen(samples, fit.nodes[:, : joint.physical], t) for t in theta]
+            states = np.concatenate([states, np.stack(play)[:, :, width:]], axis=2)
+        if candidate.effect.enters == "sensor":
+            seen = joint.sense(states, theta) - fit.slope.shown
+            shown.append(seen.transpose(1, 2, 0))
+            moved.append(np.zeros((n, width, len(rows))))
+        else:
+            after = joint.advance(samples, states, theta)[..., :width] - base
+            moved.append(after.transpose(1, 2, 0))
+            shown.append(np.zeros((n, width, len(rows))))
+        for trial in candidate.trials:
+            columns = tuple(range(total, total + len(trial.values)))
+            variants.append(Variant(number, trial, columns, candidate.linear))
+            total += len(columns)
+    start = np.zeros((width, 0))
+    response = carry(windows, fit.slope.by_state, start, np.concatenate(moved, axis=2))
+    columns = observe(samples, windows, fit.slope, response, sigma)
+    measured = samples.measured
+    valid = np.isfinite(samples.seen[:, measured])[windows.index] & windows.inside[..., None]
+    direct = np.concatenate(shown, axis=2)[:, measured][windows.index] / sigma[:, None]
+    columns = columns + direct * valid[..., None]
+    columns = columns.reshape(len(windows), -1, total)
+    columns = columns - fit.basis @ (fit.basis.transpose(0, 2, 1) @ columns)
+    weights = fit.weights
+    plain = flatten(columns, weights)
+    chosen = flatten(fit.by_knob, weights)
+    residual = flatten(fit.projected, weights)
+    return Signatures(
+        tuple(variants),
+        project_out(chosen, plain),
+        project_out(chosen, residual[:, None])[:, 0],
+        chosen,
+        plain,
+        residual,
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Gain:
+    """What adding one or two variants would take off the cost, in the linear picture.
+
+    Attributes:
+        variants: Numbers of the variants.
+        value: Fall of the cost.
+        values: Start value of every knob of each variant's candidate.
+    """
+
+    variants: tuple[int, ...]
+    value: float
+    values: tuple[Array, ...]
+
+
+def gains(
+    found: Signatures, residual: Array | None = None, matrix: Array | None = None
+) -> list[Gain]:
+    """Linear gain of every variant alone, best first."""
+    residual = found.residual if residual is None else residual
+    matrix = found.matrix if matrix is None else matrix
+    out = []
+    for number, variant in enumerate(found.variants):
+        value, coefficients = constrained(
+            matrix[:, variant.columns], residual, variant.trial.one_sided
+        )
+        out.append(Gain((number,), value, (variant_start(variant, coefficients),)))
+    return sorted(out, key=lambda g: -g.value)
+
+
+def variant_start(variant: Variant, coefficients: Array) -> Array:
+    """Start value of the knobs from linear coefficients of the variant's columns."""
+    start = variant.trial.values[0].copy()
+    # A secant far from one times itself says little about the true size.
+    trusted = np.clip(coefficients, -3, 3) if len(coefficients) == 1 else coefficients
+    start[variant.linear] = trusted @ variant.trial.values[:, variant.linear]
+    return start
+
+
+def constrained(columns: Array, residual: Array, one_sided: NDArray[np.bool_]) -> tuple[float, Array]:
+    """Least squares with some coefficients not negative; fall of the cost and coefficients."""
+    gram, right = columns.T @ columns, columns.T @ residual
+    return constrained_gram(gram, right, one_sided)
+
+
+def constrained_gram(
+    gram: Array, right: Array, one_sided: NDArray[np.bool_]
+) -> tuple[float, Array]:
+    """The same from the normal equations."""
+    k = len(right)
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    alive = np.diag(gram) > 1e-12
+    best = np.zeros(k)
+    for _ in range(k + 1):
+        best[:] = 0.0
+        if not alive.any():
+            return 0.0, best
+        scaled = gram[np.ix_(alive, alive)] / np.outer(size[alive], size[alive])
+        scaled = scaled + 1e-9 * np.eye(int(alive.sum()))
+        best[alive] = np.linalg.solve(scaled, right[alive] / size[alive]) / size[alive]
+        wrong = alive & one_sided & (best < 0)
+        if not wrong.any():
+            break
+        alive = alive & ~wrong
+    return float(max(2 * best @ right - best @ gram @ best, 0.0)), best
+
+
+def pair_gains(found: Signatures, top: int = 40) -> list[Gain]:
+    """Linear gain of every pair of variants of different candidates, best first."""
+    gram = found.matrix.T @ found.matrix
+    right = found.matrix.T @ found.residual
+    out = []
+    for i, first in enumerate(found.variants):
+        for j in range(i + 1, len(found.variants)):
+            second = found.variants[j]
+            if first.candidate == second.candidate:
+                continue
+            columns = list(first.columns + second.columns)
+            sides = np.append(first.trial.one_sided, second.trial.one_sided)
+            value, c = constrained_gram(gram[np.ix_(columns, columns)], right[columns], sides)
+            k = len(first.columns)
+            starts = (variant_start(first, c[:k]), variant_start(second, c[k:]))
+            out.append(Gain((i, j), value, starts))
+    return sorted(out, key=lambda g: -g.value)[:top]

@@ -1,0 +1,124 @@
+"""Windows of consecutive samples: cut by local instability, and carried linearly along."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.samples import Samples
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Windows:
+    """Non-overlapping stretches of consecutive samples, padded to one length.
+
+    Attributes:
+        index: Row of every sample of every window, shape (W, L); padding repeats the last row.
+        inside: False where padded, shape (W, L).
+        run: Which run each window belongs to, shape (W,).
+    """
+
+    index: NDArray[np.int64]
+    inside: NDArray[np.bool_]
+    run: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    @classmethod
+    def cut(cls, pieces: list[tuple[int, int, int]]) -> Windows:
+        """Windows from (run, first row, one past last row)."""
+        longest = max(stop - start for _, start, stop in pieces)
+        index = np.array([np.minimum(np.arange(a, a + longest), b - 1) for _, a, b in pieces])
+        lengths = np.array([b - a for _, a, b in pieces])
+        inside = np.arange(longest) < lengths[:, None]
+        return cls(index, inside, np.array([run for run, _, _ in pieces]))
+
+    @property
+    def pieces(self) -> list[tuple[int, int, int]]:
+        """(run, first row, one past last row) of every window."""
+        lengths = self.inside.sum(axis=1)
+        return [
+            (int(r), int(i[0]), int(i[0] + n))
+            for r, i, n in zip(self.run, self.index, lengths, strict=True)
+        ]
+
+
+def fixed(samples: Samples, length: int, shortest: int = 4) -> Windows:
+    """Windows of ``length`` samples; what is left at a run's end is a window if long enough."""
+    pieces = []
+    for run, (start, stop) in enumerate(samples.runs):
+        for a in range(start, stop, length):
+            if min(a + length, stop) - a >= shortest:
+                pieces.append((run, a, min(a + length, stop)))
+    return Windows.cut(pieces)
+
+
+def by_growth(
+    samples: Samples,
+    jacobians: Array,
+    scale: Array,
+    longest: int,
+    shortest: int = 5,
+    growth: float = 40.0,
+) -> Windows:
+    """Windows that end where an error of the start state would have grown ``growth``-fold.
+
+    Near an unstable equilibrium a long window outlives what its start state can tell, and its
+    residual measures chaos instead of the model.
+
+    Args:
+        samples: The table.
+        jacobians: Derivative of every next state by its state, shape (n, n_s, n_s).
+        scale: Typical variation of each state, to make states of different units comparable.
+        longest, shortest: Bounds of the length in samples.
+        growth: Largest allowed norm of the product of the scaled Jacobians.
+    """
+    scaled = jacobians * scale[None, None, :] / scale[None, :, None]
+    pieces = []
+    for run, (start, stop) in enumerate(samples.runs):
+        a = start
+        while stop - a >= shortest:
+            product, length = np.eye(len(scale)), 1
+            while a + length < stop and length < longest:
+                product = scaled[a + length - 1] @ product
+                if length >= shortest and np.linalg.norm(product, 2) > growth:
+                    break
+                length += 1
+            if 0 < stop - a - length < shortest:
+                length = stop - a if stop - a <= longest else length
+            pieces.append((run, a, a + length))
+            a += length
+    return Windows.cut(pieces)
+
+
+def carry(windows: Windows, jacobians: Array, start: Array, injected: Array) -> Array:
+    """Linear response of the states inside every window.
+
+    ``G[k + 1] = A[k] G[k] + injected[k]``, with ``G[0]`` = ``start`` for the first columns.
+
+    Args:
+        windows: W windows of up to L samples.
+        jacobians: A, shape (n, n_s, n_s), one for every row of the table.
+        start: Columns that start as perturbations of the first state, shape (n_s, f).
+        injected: Columns that act at every step: (n, n_s, q) for every row of the table, or
+            (W, L, n_s, q) for every place in a window.
+
+    Returns:
+        shape (W, L, n_s, f + q).
+    """
+    count, length = windows.index.shape
+    width, f = start.shape
+    q = injected.shape[-1]
+    response = np.zeros((count, length, width, f + q))
+    response[:, 0, :, :f] = start
+    local = injected if injected.ndim == 4 else injected[windows.index]
+    steps = jacobians[windows.index]
+    for k in range(length - 1):
+        response[:, k + 1] = steps[:, k] @ response[:, k]
+        response[:, k + 1, :, f:] += local[:, k]
+    return response

@@ -1,0 +1,312 @@
+"""GaussianProcess: exact up to a number of rows, by inducing points beyond."""
+
+from __future__ import annotations
+
+import warnings
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cholesky, solve_triangular
+from scipy.optimize import minimize
+from sklearn.utils import check_random_state
+
+from residual.estimator import Array, Estimator, spread
+
+_KERNELS = ("rbf", "matern")
+_CHUNK = 2048
+_KEPT_BYTES = 2**29
+# In units of the standardised data. The floor of the noise variance bounds the condition of the
+# kernel matrix where a simulated system is observed without noise.
+_BOUNDS = {"lengthscale": (1e-2, 1e3), "outputscale": (1e-4, 1e4), "noise": (1e-9, 1e1)}
+
+
+class GaussianProcess(Estimator):
+    """One Gaussian process per output, with a length scale per input.
+
+    Fit in two steps. The length scales, signal variance and noise variance of each output
+    maximise the marginal likelihood (gpytorch, L-BFGS) of at most ``hyper_points`` random rows.
+    The process is then conditioned, in double precision, on
+
+    * all n rows exactly if n <= ``max_points`` (cost n^3 / 3 per output), else
+    * ``inducing`` of the rows that summarise all of them (Titsias, Variational learning of
+      inducing variables in sparse Gaussian processes, AISTATS 2009; cost n * inducing^2 per
+      output), with the noise variance that maximises his bound, so that what the summary
+      loses is counted as noise.
+
+    The default crossover of 4000 rows is where the exact factor of one output takes about a
+    second and 128 MB. Factors are needed for the standard deviation only; they are kept while
+    they take less than 512 MB together and recomputed on each call beyond.
+
+    Args:
+        kernel: ``"rbf"`` or ``"matern"`` (smoothness 5/2).
+        max_points: Most rows to be conditioned on exactly.
+        inducing: Number of inducing points beyond.
+        hyper_points: Rows to learn length scales and variances from.
+        max_iter: Most iterations of L-BFGS per output.
+        random_state: Seed of the choice of rows.
+
+    Attributes:
+        lengthscale_: shape (n_out, n_in), in units of the spread of each input.
+        outputscale_: Signal variance, shape (n_out,), in units of each target's variance.
+        noise_: Noise variance, shape (n_out,), in the same unit.
+        points_: The rows or inducing points conditioned on, standardised, shape (m, n_in).
+        exact_: Whether they are all rows.
+    """
+
+    _learned: ClassVar[tuple[str, ...]] = (
+        "center_", "column_scale_", "lengthscale_", "outputscale_", "noise_", "points_",
+        "weights_", "exact_", "factors_",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        kernel: Literal["rbf", "matern"] = "rbf",
+        max_points: int = 4000,
+        inducing: int = 600,
+        hyper_points: int = 600,
+        max_iter: int = 60,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> None:
+        self.kernel = kernel
+        self.max_points = max_points
+        self.inducing = inducing
+        self.hyper_points = hyper_points
+        self.max_iter = max_iter
+        self.random_state = random_state
+
+    def _fit(self, X: Array, y: Array) -> None:
+        if self.kernel not in _KERNELS:
+            raise ValueError(f"kernel={self.kernel!r}: choose one of {', '.join(_KERNELS)}")
+        for name in ("max_points", "inducing", "hyper_points", "max_iter"):
+            if not getattr(self, name) >= 1:
+                raise ValueError(f"{name}={getattr(self, name)!r}: give a whole number from 1")
+        random = check_random_state(self.random_state)
+        self.center_, self.column_scale_ = X.mean(axis=0), spread(X)
+        X = (X - self.center_) / self.column_scale_
+        some = random.permutation(len(X))[: self.hyper_points]
+        found = [
+            maximise_likelihood(X[some], column, self.kernel, self.max_iter) for column in y[some].T
+        ]
+        self.lengthscale_ = np.array([part[0] for part in found])
+        self.outputscale_ = np.array([part[1] for part in found])
+        self.noise_ = np.array([part[2] for part in found])
+        self.exact_ = len(X) <= self.max_points
+        if self.exact_:
+            self.points_ = X
+            self.factors_ = np.zeros((0, 0, 0))
+            self._condition(y)
+        else:
+            self.points_ = X[self._choose(X, random)]
+            self._summarise(X, y)
+
+    def _condition(self, y: Array) -> None:
+        self._kept: dict[int, Array] = {}
+        self.weights_ = np.empty((y.shape[1], len(y)))
+        for k in range(y.shape[1]):
+            factor = self._factor(k)
+            half = solve_triangular(factor, y[:, k], lower=True, check_finite=False)
+            self.weights_[k] = solve_triangular(
+                factor, half, lower=True, trans="T", check_finite=False
+            )
+
+    def _factor(self, k: int) -> Array:
+        """Lower Cholesky factor of output k's kernel matrix of the points (exact: plus noise)."""
+        if k in self._kept:
+            return self._kept[k]
+        matrix = self._kernel(self.points_, self.points_, k)
+        # Inducing points lie closer together than their summary needs: a nugget of its own.
+        nugget = self.noise_[k] if self.exact_ else 1e-8 * self.outputscale_[k]
+        while True:
+            try:
+                np.fill_diagonal(matrix, self.outputscale_[k] + nugget)
+                factor = cholesky(matrix, lower=True, check_finite=False)
+                break
+            except LinAlgError:
+                nugget *= 10
+        if (len(self._kept) + 1) * factor.nbytes <= _KEPT_BYTES:
+            self._kept[k] = factor
+        return factor
+
+    def _choose(self, X: Array, random: np.random.RandomState) -> NDArray[np.intp]:
+        return random.permutation(len(X))[: self.inducing]
+
+    def _summarise(self, X: Array, y: Array) -> None:
+        self._kept = {}
+        outputs, m = y.shape[1], len(self.points_)
+        self.weights_ = np.empty((outputs, m))
+        self.factors_ = np.empty((outputs, m, m))
+        for k in range(outputs):
+            factor = self._factor(k)
+            gram, moment = np.zeros((m, m)), np.zeros(m)
+            for start in range(0, len(X), _CHUNK):
+                rows = slice(start, start + _CHUNK)
+                cross = self._kernel(self.points_, X[rows], k)
+                cross = solve_triangular(factor, cross, lower=True, check_finite=False)
+                gram += cross @ cross.T
+                moment += cross @ y[rows, k]
+            lost = max(len(X) * self.outputscale_[k] - np.trace(gram), 0.0)
+            self.noise_[k] = _best_noise(gram, moment, y[:, k] @ y[:, k], lost, len(X))
+            gram[np.diag_indices(m)] += self.noise_[k]
+            inner = cholesky(gram, lower=True, check_finite=False)
+            half = solve_triangular(inner, moment, lower=True, check_finite=False)
+            half = solve_triangular(inner, half, lower=True, trans="T", check_finite=False)
+            self.weights_[k] = solve_triangular(
+                factor, half, lower=True, trans="T", check_finite=False
+            )
+            self.factors_[k] = inner
+
+    def _kernel(self, a: Array, b: Array, k: int) -> Array:
+        """Covariances of output k between rows a and rows b, shape (len(a), len(b))."""
+        a, b = a / self.lengthscale_[k], b / self.lengthscale_[k]
+        matrix = a @ b.T
+        matrix *= -2
+        matrix += np.sum(a**2, axis=1)[:, None]
+        matrix += np.sum(b**2, axis=1)
+        return self.outputscale_[k] * self._shape(matrix)
+
+    def _shape(self, squared: Array) -> Array:
+        """Correlation at a squared scaled distance, in place."""
+        if self.kernel == "rbf":
+            squared *= -0.5
+            return np.exp(np.minimum(squared, 0, out=squared), out=squared)
+        squared *= 5
+        root = np.sqrt(np.maximum(squared, 0, out=squared))
+        return (1 + root + squared / 3) * np.exp(-root)
+
+    def _prepare(self) -> None:
+        if "_kept" not in self.__dict__:
+            self._kept = {}
+        inverse = 1 / self.lengthscale_**2
+        # |x - p|^2 = x.x + p.p - 2 x.p for the points p of all outputs in one product.
+        self._doubled = -2 * (self.points_[None] * inverse[:, None]).reshape(-1, len(self.center_))
+        self._squares = np.sum(self.points_**2 * inverse[:, None], axis=2)
+        self._inverse = inverse
+        self._scaled_weights = self.weights_ * self.outputscale_[:, None]
+
+    def _predict(self, X: Array, return_std: bool) -> tuple[Array, Array | None]:
+        X = (X - self.center_) / self.column_scale_
+        mean = np.empty((len(X), len(self.outputscale_)))
+        # Row by row: it stays in the cache, and no row depends on which others are in the batch.
+        for k, row in enumerate(X):
+            squared = (self._doubled @ row).reshape(self._squares.shape)
+            squared += self._squares
+            squared += (self._inverse @ (row * row))[:, None]
+            mean[k] = np.einsum("ij,ij->i", self._shape(squared), self._scaled_weights)
+        return mean, self._std(X) if return_std else None
+
+    def _std(self, X: Array) -> Array:
+        variance = np.empty((len(X), len(self.outputscale_)))
+        for k in range(variance.shape[1]):
+            factor = self._factor(k)
+            for start in range(0, len(X), _CHUNK):
+                rows = slice(start, start + _CHUNK)
+                cross = self._kernel(self.points_, X[rows], k)
+                cross = solve_triangular(factor, cross, lower=True, check_finite=False)
+                variance[rows, k] = self.outputscale_[k] - np.sum(cross**2, axis=0)
+                if not self.exact_:
+                    inner = solve_triangular(
+                        self.factors_[k], cross, lower=True, check_finite=False
+                    )
+                    variance[rows, k] += self.noise_[k] * np.sum(inner**2, axis=0)
+        return np.sqrt(np.maximum(variance, 0) + self.noise_)
+
+
+def maximise_likelihood(
+    X: Array, y: Array, kernel: str, max_iter: int
+) -> tuple[Array, float, float]:
+    """Length scales, signal variance and noise variance of largest marginal likelihood.
+
+    Args:
+        X: standardised inputs, shape (n, n_in).
+        y: one standardised target, shape (n,).
+        kernel: ``"rbf"`` or ``"matern"``.
+        max_iter: Most iterations of L-BFGS.
+    """
+    import gpytorch
+    import torch
+
+    def positive() -> gpytorch.constraints.Positive:
+        return gpytorch.constraints.Positive(transform=torch.exp, inv_transform=torch.log)
+
+    class Process(gpytorch.models.ExactGP):
+        def __init__(self) -> None:
+            likelihood = gpytorch.likelihoods.GaussianLikelihood(noise_constraint=positive())
+            super().__init__(inputs, targets, likelihood)
+            width = X.shape[1]
+            base = (
+                gpytorch.kernels.RBFKernel(ard_num_dims=width, lengthscale_constraint=positive())
+                if kernel == "rbf"
+                else gpytorch.kernels.MaternKernel(
+                    nu=2.5, ard_num_dims=width, lengthscale_constraint=positive()
+                )
+            )
+            self.kernel = gpytorch.kernels.ScaleKernel(base, outputscale_constraint=positive())
+            self.mean = gpytorch.means.ZeroMean()
+
+        def forward(self, x: torch.Tensor) -> gpytorch.distributions.MultivariateNormal:
+            return gpytorch.distributions.MultivariateNormal(self.mean(x), self.kernel(x))
+
+    inputs, targets = torch.from_numpy(X.copy()), torch.from_numpy(y.copy())
+    process = Process().double()
+    process.kernel.base_kernel.lengthscale = X.shape[1] ** 0.5
+    process.kernel.outputscale = 1.0
+    process.likelihood.noise = 1e-2
+    process.train()
+    marginal = gpytorch.mlls.ExactMarginalLogLikelihood(process.likelihood, process)
+    parameters = dict(process.named_parameters())
+    sizes = [parameter.numel() for parameter in parameters.values()]
+    bounds = [
+        tuple(np.log(_BOUNDS[name.rsplit("raw_", 1)[1]]))
+        for name, size in zip(parameters, sizes, strict=True)
+        for _ in range(size)
+    ]
+
+    def loss(values: Array) -> tuple[float, Array]:
+        pieces = torch.from_numpy(values.copy()).split(sizes)
+        with torch.no_grad():
+            for parameter, piece in zip(parameters.values(), pieces, strict=True):
+                parameter.copy_(piece.view_as(parameter))
+        process.zero_grad()
+        value = -marginal(process(inputs), targets)
+        value.backward()
+        return value.item(), torch.cat([p.grad.ravel() for p in parameters.values()]).numpy()
+
+    start = torch.cat([p.detach().ravel() for p in parameters.values()]).numpy()
+    with (
+        gpytorch.settings.fast_computations(False, False, False),
+        gpytorch.settings.max_cholesky_size(len(X) + 1),
+        warnings.catch_warnings(),
+    ):
+        # gpytorch warns when it adds jitter on the way; the optimum is judged by its value.
+        warnings.simplefilter("ignore")
+        found = minimize(
+            loss, start, jac=True, bounds=bounds, method="L-BFGS-B", options={"maxiter": max_iter}
+        )
+        loss(found.x)
+    base = process.kernel.base_kernel
+    return (
+        base.lengthscale.detach().numpy().ravel().copy(),
+        float(process.kernel.outputscale.item()),
+        float(process.likelihood.noise.item()),
+    )
+
+
+def _best_noise(gram: Array, moment: Array, energy: float, lost: float, rows: int) -> float:
+    """Noise variance that maximises Titsias' bound, by a fine logarithmic grid.
+
+    Args:
+        gram: A A^T with A = L^-1 K(points, rows), K(points) = L L^T, shape (m, m).
+        moment: A y, shape (m,).
+        energy: y^T y.
+        lost: trace of what the points do not explain of K(rows).
+        rows: Number of rows.
+    """
+    eigenvalues, vectors = np.linalg.eigh(gram)
+    eigenvalues = np.maximum(eigenvalues, 0)
+    projected = vectors.T @ moment
+    grid = 10.0 ** np.linspace(*np.log10(_BOUNDS["noise"]), 201)
+    inverse = 1 / (eigenvalues + grid[:, None])
+    misfit = np.maximum(energy - inverse @ projected**2, 1e-14 * energy)
+    volume = np.sum(np.log1p(eigenvalues / grid[:, None]), axis=1) + rows * np.log(grid)
+    return float(grid[np.argmin(volume + (misfit + lost) / grid)])

@@ -1,0 +1,219 @@
+"""Do the numbers of a log fit together? Units and signs, checked before any physics."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.units import UNITS, find_unit
+from sims.simulator import Channel, wrap
+
+Array = NDArray[np.float64]
+
+# Speed that no joint of an unstated unit is believed to reach, in rad/s (570 rpm), and the
+# multiple of its channel's declared scale: slow motion in deg/s is already beyond both.
+_FASTEST, _TIMES_SCALE = 60.0, 10.0
+
+# Spans over which positions are compared, in samples: long ones beat noise, short ones turns.
+_SPANS = (1, 2, 4, 8, 16, 32)
+
+
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """Something to know about the data that does not stop the work.
+
+    Attributes:
+        kind: What it is about, in one word: ``"gap"``, ``"sampling"``, ``"missing"``, ...
+        where: File, run or channel it concerns.
+        says: One plain sentence.
+        numbers: The figures behind it, by name and unit.
+    """
+
+    kind: str
+    where: str
+    says: str
+    numbers: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+
+class Signal(NamedTuple):
+    """One channel of all runs, before angles are unwrapped.
+
+    Attributes:
+        channel: What was measured.
+        column: Where it stands in the files.
+        unit: As stated in the config; empty if not stated.
+        runs: Times (n,) and values (n,) of every run.
+    """
+
+    channel: Channel
+    column: str | int
+    unit: str
+    runs: Sequence[tuple[Array, Array]]
+
+
+def check_rate(position: Signal, rate: Signal) -> list[Finding]:
+    """Compare the change of a position with the integral of its rate.
+
+    Returns:
+        A finding if they differ by a factor that no unit explains, or are unrelated.
+
+    Raises:
+        ValueError: They differ by the factor of a unit, or in sign; the message says which
+            column to give which unit.
+    """
+    spans = [_changes(position, rate, span) for span in _SPANS]
+    spans = [(moved, integral) for moved, integral in spans if moved.size >= 10]
+    turning = position.channel.angle
+    if not spans:
+        return []
+    as_is = min(_misfit(moved, integral, turning) for moved, integral in spans)
+    if as_is > 0.3:
+        for signal, fix, (on_position, on_rate) in _repairs(position, rate):
+            mended = min(_misfit(on_position * m, on_rate * i, turning) for m, i in spans)
+            if mended < min(0.3, as_is / 3):
+                raise ValueError(
+                    f"column {signal.column!r}: {signal.channel.name!r} {_looks(fix)}: set {fix} "
+                    f"(the change of {position.channel.name!r} is not the integral of "
+                    f"{rate.channel.name!r}, and would be then)"
+                )
+    if not math.isfinite(as_is):
+        return []
+    scaled = [(_scale(m, i, turning), m, i) for m, i in spans]
+    misfit, scale = min((_misfit(m, scale * i, turning), scale) for scale, m, i in scaled)
+    pair = f"{rate.channel.name} and {position.channel.name}"
+    if misfit > 0.3:
+        says = (
+            f"The change of {position.channel.name} does not follow the integral of "
+            f"{rate.channel.name} (median misfit {100 * as_is:.0f} %): noise, sampling slower "
+            "than the motion, or the wrong columns."
+        )
+        return [Finding("kinematics", pair, says, {"misfit": as_is})]
+    if abs(scale - 1) < 0.05:
+        return []
+    says = (
+        f"{position.channel.name} changes by {scale:.3f} times the integral of "
+        f"{rate.channel.name}: one of the two sensors is off by that factor (set scale for its "
+        "column)."
+    )
+    return [Finding("kinematics", pair, says, {"scale": scale})]
+
+
+def check_plausible(signal: Signal, rate_scale: float | None) -> None:
+    """Look for degrees in an angle, or its rate, whose unit the config does not state.
+
+    Args:
+        signal: An angle in rad or a rate in rad/s.
+        rate_scale: Typical rate in rad/s, if the simulator declares one.
+
+    Raises:
+        ValueError: The values look like degrees.
+    """
+    unit = signal.channel.unit
+    if signal.unit or unit not in ("rad", "rad/s") or not signal.runs:
+        return
+    degrees = "deg" if unit == "rad" else "deg/s"
+    advice = f"looks like degrees: set unit: {degrees} (or unit: {unit} if that is right)"
+    name = f"column {signal.column!r}: the channel {signal.channel.name!r}"
+    if unit == "rad" and _jumps_by_360(signal):
+        raise ValueError(f"{name} jumps by about 360, as a compass does; {advice}")
+    speeds = [
+        np.abs(values) if unit == "rad/s" else _speeds(times, values)
+        for times, values in signal.runs
+    ]
+    speed = np.concatenate(speeds)
+    speed = speed[np.isfinite(speed)]
+    limit = _TIMES_SCALE * rate_scale if rate_scale else _FASTEST
+    fast = float(np.quantile(speed, 0.95)) if speed.size else 0.0
+    if fast > limit:
+        raise ValueError(
+            f"{name} reaches {fast:.3g} rad/s, expected at most about {limit:.3g}; {advice}"
+        )
+
+
+_WORDS = {
+    "deg": "degrees",
+    "deg/s": "degrees per second",
+    "rad": "radians",
+    "rad/s": "radians per second",
+}
+
+
+def _looks(fix: str) -> str:
+    unit = fix.removeprefix("unit: ")
+    return "has the wrong sign" if unit == fix else f"looks like {_WORDS.get(unit, unit)}"
+
+
+def _repairs(position: Signal, rate: Signal) -> list[tuple[Signal, str, tuple[float, float]]]:
+    """What may be wrong: the signal, the fix, and its factors on position and rate."""
+    repairs = []
+    for signal in (position, rate):
+        target = signal.channel.unit
+        stated = find_unit(signal.unit, target).factor
+        for name, unit in UNITS.items():
+            factor = unit.factor / stated
+            if unit.base == target and not math.isclose(factor, 1):
+                factors = (factor, 1.0) if signal is position else (1.0, factor)
+                repairs.append((signal, f"unit: {name}", factors))
+    # The commonest mistake first, since a flipped sign or another unit may come close.
+    repairs.sort(key=lambda repair: not repair[1].startswith(("unit: deg", "unit: rad")))
+    return [*repairs, (rate, "scale: -1", (1.0, -1.0))]
+
+
+def _changes(position: Signal, rate: Signal, span: int) -> tuple[Array, Array]:
+    """Change of position over ``span`` samples, and the rate's integral (trapezoids)."""
+    moved, integrals = [np.zeros(0)], [np.zeros(0)]
+    for (times, x), (_, v) in zip(position.runs, rate.runs, strict=True):
+        if len(times) > span:
+            steps = np.diff(times) * (v[1:] + v[:-1]) / 2
+            total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
+            gaps = np.concatenate([[0], np.cumsum(~np.isfinite(steps))])
+            change, integral = x[span:] - x[:-span], total[span:] - total[:-span]
+            good = np.isfinite(change) & (gaps[span:] == gaps[:-span])
+            moved.append(change[good])
+            integrals.append(integral[good])
+    return np.concatenate(moved), np.concatenate(integrals)
+
+
+def _misfit(moved: Array, integral: Array, turning: bool) -> float:
+    """Median of |change - integral| relative to the integral, where there is motion; 0 is best."""
+    moved, integral = _moving(moved, integral, turning)
+    if moved.size < 5:
+        return math.inf
+    error = wrap(moved - integral) if turning else moved - integral
+    size = float(np.median(np.abs(integral)))
+    return float(np.median(np.abs(error))) / size if size > 0 else math.inf
+
+
+def _scale(moved: Array, integral: Array, turning: bool) -> float:
+    moved, integral = _moving(moved, integral, turning)
+    ratios = (wrap(moved) if turning else moved) / integral
+    return float(np.median(ratios)) if ratios.size else math.nan
+
+
+def _moving(moved: Array, integral: Array, turning: bool) -> tuple[Array, Array]:
+    """Only the fast two fifths; of an angle, only what is well below half a turn."""
+    size = np.abs(integral)
+    chosen = (size < 2.0) if turning else np.isfinite(size)
+    if chosen.any():
+        chosen &= (size >= np.quantile(size[chosen], 0.6)) & (size > 0)
+    return moved[chosen], integral[chosen]
+
+
+def _jumps_by_360(signal: Signal) -> bool:
+    steps = np.concatenate([np.diff(values) for _, values in signal.runs])
+    steps = np.abs(steps[np.isfinite(steps)])
+    jumps = (steps > 300) & (steps < 361)
+    return int(jumps.sum()) >= 2 and float(np.quantile(steps[~jumps], 0.95)) < 100
+
+
+def _speeds(times: Array, values: Array, span: int = 3) -> Array:
+    """Mean speeds over ``span`` samples: noise counts less, and a fast swing still shows."""
+    good = np.isfinite(values)
+    times, values = times[good], values[good]
+    span = min(span, max(1, len(times) // 4))
+    return np.abs(values[span:] - values[:-span]) / (times[span:] - times[:-span])

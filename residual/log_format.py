@@ -1,0 +1,125 @@
+"""How log files are laid out: which column holds which channel, in which unit."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Sequence
+
+import numpy as np
+
+from residual.log_tables import LogError
+from sims.simulator import Channel
+
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """Where a channel stands in a log, and how it becomes SI: ``scale * si(value) + offset``.
+
+    Args:
+        column: Name in the header, or position (1 is the first); empty means the channel's name.
+        unit: Of the values in the file (``deg``, ``rpm``, ``mV``, ...); empty means the channel's
+            own SI unit.
+        scale: Applied after the unit; -1 turns the sign.
+        offset: Added last, in SI (``3.14159`` if the log counts from hanging, the model from
+            upright).
+        value: For an action that was not logged: its constant value in SI, in place of a column.
+    """
+
+    column: str | int = ""
+    unit: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+    value: float | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class LogFormat:
+    """How the log files are laid out; what is not said follows the simulator's channels.
+
+    Args:
+        time: Column of the sample times, by default in s.
+        states: Column by state channel; a channel that is left out was not measured. Empty: the
+            columns that are named like channels.
+        actions: Column by action channel. Empty: the columns that are named like the actions.
+        trajectory: Columns whose values tell the trajectories of a file apart.
+        split_at_time_resets: Begin a new trajectory where the time goes backwards.
+        only: Use only rows in which a column holds one of the values listed, as text.
+        start: Use samples from this time on, in s on the log's clock.
+        stop: Use samples up to this time, in s on the log's clock.
+        header: Whether the first row of a text file names the columns; without it, columns are
+            given by position.
+        delimiter: Of a text file: a character or ``comma``, ``semicolon``, ``tab``, ``blank``;
+            ``auto`` looks at the first row.
+        comment: Lines of a text file that begin with it are left out.
+        decimal: Decimal sign of a text file.
+        gap: A trajectory is cut where samples are further apart than this many median periods.
+        minimum_samples: A trajectory with fewer is an error; a piece with fewer is left out.
+        allow_constant_action: Accept logs in which an action never changes, such as free decays.
+    """
+
+    time: str | int | Column = "time"
+    states: dict[str, str | int | Column] = dataclasses.field(default_factory=dict)
+    actions: dict[str, str | int | Column] = dataclasses.field(default_factory=dict)
+    trajectory: list[str | int] = dataclasses.field(default_factory=list)
+    split_at_time_resets: bool = False
+    only: dict[str, list[str]] = dataclasses.field(default_factory=dict)
+    start: float | None = None
+    stop: float | None = None
+    header: bool = True
+    delimiter: str = "auto"
+    comment: str = "#"
+    decimal: str = "."
+    gap: float = 5.0
+    minimum_samples: int = 5
+    allow_constant_action: bool = False
+
+
+def check_layout(columns: LogFormat, states: Sequence[Channel], actions: Sequence[Channel]) -> None:
+    """Refuse settings that no file could satisfy.
+
+    Args:
+        columns: The settings.
+        states: State channels that a log can hold.
+        actions: Action channels.
+
+    Raises:
+        LogError: A channel is unknown, or a setting is not usable.
+    """
+    for kind, given, channels in (
+        ("state", columns.states, states),
+        ("action", columns.actions, actions),
+    ):
+        names = [channel.name for channel in channels]
+        for name, column in given.items():
+            if name not in names:
+                near = difflib.get_close_matches(name, names, 1)
+                hint = f"; did you mean {near[0]!r}?" if near else ""
+                raise LogError(
+                    f"the simulator has no {kind} channel {name!r}, it has "
+                    f"{', '.join(map(repr, names)) or 'none'}{hint}"
+                )
+            value = column.value if isinstance(column, Column) else None
+            if value is not None and (kind == "state" or not np.isfinite(value)):
+                raise LogError(
+                    f"{kind} {name!r} has value {value!r}: only an action can have a constant "
+                    "value in place of a column, and it must be finite"
+                )
+    named = [named_column(c, "") for c in (*columns.states.values(), *columns.actions.values())]
+    named = [named_column(columns.time, ""), *(c for c in named if c.value is None)]
+    if not columns.header and any(isinstance(column.column, str) for column in named):
+        raise LogError(
+            "header: false leaves columns without names: give time, states and actions by "
+            "position (1 is the first)"
+        )
+    if columns.decimal not in (".", ",") or not columns.gap > 1 or columns.minimum_samples < 3:
+        raise LogError(
+            f"decimal {columns.decimal!r}, gap {columns.gap!r}, minimum_samples "
+            f"{columns.minimum_samples!r}: expected '.' or ',', more than 1, at least 3"
+        )
+
+
+def named_column(given: str | int | Column, name: str) -> Column:
+    """The long form of what a config says; an empty column is named like its channel."""
+    column = given if isinstance(given, Column) else Column(given)
+    return dataclasses.replace(column, column=name) if column.column == "" else column

@@ -1,0 +1,338 @@
+"""Log files as tables of named columns that remember which row of the file each value is from."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import difflib
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+TEXT, PARQUET, NPZ = (".csv", ".txt", ".tsv", ".dat", ".log"), (".parquet", ".pq"), (".npz",)
+
+_DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "blank": " "}
+_MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
+
+
+class LogError(ValueError):
+    """A log cannot be used; the one-line message names file, row, column and the fix."""
+
+    def __init__(
+        self,
+        says: str,
+        path: str | Path = "",
+        row: int | None = None,
+        column: str | int | None = None,
+    ) -> None:
+        place = [str(path)] if str(path) else []
+        if row is not None:
+            place.append(f"row {row}")
+        if column is not None:
+            place.append(f"column {column!r}")
+        message = f"{', '.join(place)}: {says}" if place else says
+        super().__init__("".join(c if c.isprintable() else " " for c in message))
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """The columns of one file.
+
+    Attributes:
+        path: The file.
+        columns: Values by name: numbers as an array, text as a list of strings. Columns of a
+            file without header are named by their position, ``1`` being the first.
+        names: Column names in the order of the file; those that occur twice also twice.
+        rows: Row of the file that each value stands in, as an editor counts: from 1.
+        cut_off: True if the file ends in the middle of a row, which was left out.
+    """
+
+    path: Path
+    columns: Mapping[str | int, Sequence[str] | NDArray[Any]]
+    names: tuple[str | int, ...]
+    rows: NDArray[np.int64]
+    cut_off: bool = False
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def values(self, column: str | int) -> Sequence[str] | NDArray[Any]:
+        """One column as it stands in the file.
+
+        Args:
+            column: Name, or position from 1.
+
+        Raises:
+            LogError: It is not there, or there twice.
+        """
+        if isinstance(column, int) and 1 <= column <= len(self.names):
+            column = self.names[column - 1]
+        if column not in self.columns:
+            near = difflib.get_close_matches(str(column), [str(n) for n in self.names], 1, 0.5)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise LogError(
+                f"no column {column!r}, the file has {_listed(self.names)}{hint}", self.path
+            )
+        if self.names.count(column) > 1:
+            raise LogError(
+                f"{self.names.count(column)} columns have this name, expected one: "
+                "rename them, or give the position of the right one (1 is the first)",
+                self.path,
+                column=column,
+            )
+        return self.columns[column]
+
+    def numbers(self, column: str | int, decimal: str = ".") -> Array:
+        """One column as numbers; a missing value is NaN.
+
+        Args:
+            column: Name, or position from 1.
+            decimal: The decimal sign, if the file is text.
+
+        Raises:
+            LogError: The column is not there, holds text or something infinite.
+        """
+        values = self.values(column)
+        if isinstance(values, np.ndarray):
+            numbers = self._from_array(values, column)
+        else:
+            numbers = self._from_text(values, column, decimal)
+        infinite = np.flatnonzero(np.isinf(numbers))
+        if infinite.size:
+            raise LogError(
+                "found an infinite value, expected a number; delete the row or leave the value "
+                "empty",
+                self.path,
+                int(self.rows[infinite[0]]),
+                column,
+            )
+        return numbers
+
+    def _from_array(self, values: NDArray[Any], column: str | int) -> Array:
+        if values.dtype.kind == "M":
+            seconds = values.astype("datetime64[ns]").astype(np.int64) * 1e-9
+            return np.where(np.isnat(values), np.nan, seconds)
+        if values.dtype.kind == "m":
+            seconds = values.astype("timedelta64[ns]").astype(np.int64) * 1e-9
+            return np.where(np.isnat(values), np.nan, seconds)
+        if values.dtype.kind in "biuf":
+            return values.astype(float)
+        raise LogError(
+            f"holds {values.dtype.name} values, expected numbers", self.path, column=column
+        )
+
+    def _from_text(self, texts: Sequence[str], column: str | int, decimal: str) -> Array:
+        numbers = np.empty(len(texts))
+        for index, text in enumerate(texts):
+            try:
+                # Python's own extras, such as 1_000, are no numbers in a log.
+                if "_" in text:
+                    raise ValueError
+                numbers[index] = float(text if decimal == "." else text.replace(decimal, "."))
+            except ValueError:
+                if text.lower() not in _MISSING:
+                    comma = "," in text and decimal == "."
+                    fix = "set decimal: ','" if comma else "correct the value or leave it empty"
+                    raise LogError(
+                        f"found {shortened(text)}, expected a number; {fix}",
+                        self.path,
+                        int(self.rows[index]),
+                        column,
+                    ) from None
+                numbers[index] = np.nan
+        return numbers
+
+
+def read_table(
+    path: Path, delimiter: str = "auto", header: bool = True, comment: str = ""
+) -> Table:
+    """Read a file by its extension: text (CSV and the like), Parquet, or NPZ.
+
+    Args:
+        path: The file.
+        delimiter: Of text: a character, ``"comma"``, ``"semicolon"``, ``"tab"``, ``"blank"`` (any
+            number of blanks), or ``"auto"``.
+        header: Whether the first row of text that is no comment names the columns.
+        comment: Lines of text that begin with it are left out.
+
+    Raises:
+        LogError: The file cannot be read, or does not look like a table.
+    """
+    if not path.exists():
+        raise LogError("there is no such file", path)
+    if not path.is_file():
+        raise LogError("this is not a file; give the log files themselves", path)
+    suffix = path.suffix.lower()
+    if suffix not in TEXT + PARQUET + NPZ:
+        raise LogError(
+            f"unknown kind of file {path.suffix!r}, expected one of "
+            f"{', '.join(TEXT + PARQUET + NPZ)}",
+            path,
+        )
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise LogError(f"cannot be read ({error.strerror})", path) from error
+    if not data:
+        raise LogError("the file is empty, expected a table with one row per sample", path)
+    if suffix in TEXT:
+        return _read_text(path, data, delimiter, header, comment)
+    return _read_arrays(path, data, suffix)
+
+
+def _read_text(path: Path, data: bytes, delimiter: str, header: bool, comment: str) -> Table:
+    lines = [
+        (number, line)
+        for number, line in enumerate(_decoded(path, data).splitlines(), start=1)
+        if line.strip() and not (comment and line.lstrip().startswith(comment))
+    ]
+    if not lines:
+        raise LogError("no row holds data, expected a table with one row per sample", path)
+    rows = _split(path, lines, delimiter)
+    first, names_row = rows[0]
+    names: tuple[str | int, ...] = tuple(range(1, len(names_row) + 1))
+    if header:
+        if all(_is_number(field) for field in names_row):
+            raise LogError(
+                f"holds only numbers ({shortened(', '.join(names_row))}), expected the names of "
+                "the columns; if the file has none, set header: false and give columns by "
+                "position (1 is the first)",
+                path,
+                first,
+            )
+        names, rows = tuple(names_row), rows[1:]
+    if not rows:
+        raise LogError("only the header is there, expected one row per sample below it", path)
+    cut_off = len(rows) > 1 and len(rows[-1][1]) < len(names)
+    for number, fields in rows[: len(rows) - cut_off]:
+        if len(fields) > len(names) and not any(fields[len(names) :]):
+            del fields[len(names) :]
+        if len(fields) != len(names):
+            raise LogError(
+                f"{len(fields)} fields, expected {len(names)} as in row {first}; correct or "
+                "delete the row, or set delimiter",
+                path,
+                number,
+            )
+    rows = rows[: len(rows) - cut_off]
+    columns: dict[str | int, list[str]] = {}
+    for name, *fields in zip(names, *(fields for _, fields in rows), strict=True):
+        columns.setdefault(name, fields)
+    return Table(path, columns, names, np.array([number for number, _ in rows]), cut_off)
+
+
+def _decoded(path: Path, data: bytes) -> str:
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise LogError(
+            f"byte 0x{data[error.start]:02x} is not UTF-8 text; save the file as UTF-8",
+            path,
+            data[: error.start].count(b"\n") + 1,
+        ) from None
+    if "\0" in text:
+        raise LogError(
+            "holds zero bytes: it is not a text file, or was not written to its end",
+            path,
+            text[: text.index("\0")].count("\n") + 1,
+        )
+    # Only what an editor takes for the end of a line may end one here.
+    return text.replace("\r\n", "\n").replace("\r", "\n").translate(_ODD_LINE_ENDS)
+
+
+_ODD_LINE_ENDS = {ord(c): " " for c in "\v\f\x1c\x1d\x1e\x85\u2028\u2029"}
+
+
+def _split(
+    path: Path, lines: Sequence[tuple[int, str]], delimiter: str
+) -> list[tuple[int, list[str]]]:
+    delimiter = _DELIMITERS.get(delimiter, delimiter)
+    if delimiter == "auto":
+        # A blank delimits only if nothing else does: names may hold blanks.
+        delimiter = max(",;\t", key=lines[0][1].count)
+        delimiter = delimiter if delimiter in lines[0][1] else " "
+    if len(delimiter) != 1 or delimiter in '"\r\n':
+        raise LogError(
+            f"delimiter {delimiter!r} is not usable, expected one character or one of auto, "
+            f"{', '.join(_DELIMITERS)}"
+        )
+    if delimiter == " ":
+        return [(number, line.split()) for number, line in lines]
+    rows = []
+    for number, line in lines:
+        try:
+            (fields,) = csv.reader([line], delimiter=delimiter, strict=True)
+        except (csv.Error, ValueError) as error:
+            raise LogError(
+                f"cannot be split into fields ({error or 'unusable'}); look for a lone quote",
+                path,
+                number,
+            ) from None
+        rows.append((number, [field.strip() for field in fields]))
+    return rows
+
+
+def _read_arrays(path: Path, data: bytes, suffix: str) -> Table:
+    # On broken bytes these libraries raise nearly anything, which means the same to the user.
+    try:
+        arrays = _parquet(data) if suffix in PARQUET else _npz(data)
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        kind = "Parquet" if suffix in PARQUET else "NPZ"
+        raise LogError(
+            f"cannot be read as {kind} ({shortened(reason)}); write the file again", path
+        ) from error
+    lengths = {len(array) for _, array in arrays}
+    if not arrays or lengths == {0}:
+        raise LogError("holds no rows, expected one row per sample", path)
+    if len(lengths) > 1:
+        found = ", ".join(f"{name}: {len(array)}" for name, array in arrays)
+        raise LogError(f"columns of different length ({found}), expected one length", path)
+    names = tuple(name for name, _ in arrays)
+    return Table(path, dict(arrays), names, np.arange(1, lengths.pop() + 1))
+
+
+def _parquet(data: bytes) -> list[tuple[str | int, NDArray[Any]]]:
+    table = pyarrow.parquet.ParquetFile(io.BytesIO(data)).read()
+    return [
+        (name, column.to_numpy())
+        for name, column in zip(table.column_names, table.columns, strict=True)
+    ]
+
+
+def _npz(data: bytes) -> list[tuple[str | int, NDArray[Any]]]:
+    """Arrays of shape (n,) as columns; those of shape (n, k) as ``name.0``, ``name.1``, ..."""
+    arrays: list[tuple[str | int, NDArray[Any]]] = []
+    with np.load(io.BytesIO(data), allow_pickle=False) as file:
+        for name in file.files:
+            array = file[name]
+            if array.ndim == 1:
+                arrays.append((name, array))
+            elif array.ndim == 2:
+                arrays += [(f"{name}.{k}", array[:, k]) for k in range(array.shape[1])]
+    return arrays
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def shortened(text: str, length: int = 40) -> str:
+    """Text in quotes, cut to a length that fits into a message."""
+    return repr(text if len(text) <= length else f"{text[: length - 3]}...")
+
+
+def _listed(names: Sequence[str | int], most: int = 12) -> str:
+    listed = ", ".join(repr(name) for name in names[:most])
+    return listed + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -1,0 +1,193 @@
+"""Saving and loading estimators and difference models without pickle.
+
+A file is one safetensors file: arrays by name, and one JSON document as metadata that holds the
+format's version, the class (one of a fixed set) and its constructor arguments. Loading reads
+numbers and text; nothing in the file is executed or imported.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import importlib
+import json
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save as to_bytes
+
+from residual.difference import DifferenceModel
+from residual.estimator import Estimator
+from sims.simulator import Channel, Simulator
+
+VERSION = 1
+_CLASSES = {
+    "DropoutNet": "residual.dropout_net",
+    "GaussianProcess": "residual.gaussian_process",
+    "Linear": "residual.linear",
+}
+_KEY = "simgap"
+
+
+def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
+    """Write a fitted estimator of ours, or a fitted difference model of one, to a file.
+
+    The file appears complete or not at all.
+
+    Args:
+        model: A ``DropoutNet``, ``GaussianProcess`` or ``Linear``, or a ``DifferenceModel`` of
+            one.
+        path: The file; by convention it ends in ``.safetensors``.
+
+    Raises:
+        TypeError: An estimator of another class, or an argument of it that is not a number, a
+            text, None or a sequence of those.
+        sklearn.exceptions.NotFittedError: The estimator is not fitted.
+    """
+    header: dict[str, Any] = {"version": VERSION}
+    estimator: Any = model
+    if isinstance(model, DifferenceModel):
+        estimator = model.fitted()
+        header["difference"] = {
+            "dt": model.dt,
+            "state_channels": [dataclasses.asdict(channel) for channel in model.state_channels],
+            "action_channels": [dataclasses.asdict(channel) for channel in model.action_channels],
+            "mean": model.mean_.tolist(),
+            "scale": model.scale_.tolist(),
+        }
+    name = type(estimator).__name__
+    if type(estimator).__module__ != _CLASSES.get(name):
+        raise TypeError(
+            f"cannot save a {type(estimator).__module__}.{name}: only {', '.join(_CLASSES)} and "
+            "difference models of those can be saved; any other estimator must be fitted again "
+            "from its data"
+        )
+    header["class"] = name
+    header["params"] = {
+        key: _plain(f"{name}.{key}", value) for key, value in estimator.get_params().items()
+    }
+    names = getattr(estimator, "feature_names_in_", None)
+    header["feature_names"] = None if names is None else [str(name) for name in names]
+    arrays = {key: np.array(value, order="C") for key, value in estimator.state_arrays().items()}
+    content = to_bytes(arrays, metadata={_KEY: json.dumps(header)})
+    _write(Path(path), content)
+
+
+def load(path: str | Path, simulator: Simulator | None = None) -> Any:
+    """Read what ``save`` wrote; no code is run from the file.
+
+    Args:
+        path: The file.
+        simulator: For a difference model, the simulator to fit on again and to check against;
+            without it the model predicts but cannot be fitted.
+
+    Returns:
+        The fitted ``DifferenceModel`` or estimator.
+
+    Raises:
+        FileNotFoundError: There is no such file.
+        ValueError: The file is damaged or not one that ``save`` wrote, or the difference model
+            in it was fitted for another control period or other channels than ``simulator``.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"there is no file {path}")
+    try:
+        header, arrays = _read(path)
+        model = _restore(header, arrays)
+    except _Unusable as error:
+        raise ValueError(f"{path}: {error}") from None
+    except (SafetensorError, OSError, ArithmeticError, AttributeError, LookupError, TypeError,
+            ValueError, RecursionError, MemoryError) as error:  # fmt: skip
+        raise ValueError(
+            f"{path} is damaged or was not written by residual.save "
+            f"({type(error).__name__}: {error}): save the model again"
+        ) from error
+    if simulator is not None and isinstance(model, DifferenceModel):
+        model.check_fits(simulator)
+        model.simulator = simulator
+    return model
+
+
+class _Unusable(ValueError):
+    """A file that is whole, but not for this version."""
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    with safe_open(path, framework="numpy") as file:
+        metadata = file.metadata() or {}
+        if _KEY not in metadata:
+            raise _Unusable("a safetensors file, but not of this project: give one of residual.save")
+        arrays = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+    header = json.loads(metadata[_KEY])
+    if header["version"] != VERSION:
+        raise _Unusable(
+            f"format version {header['version']!r}, this release reads {VERSION}: save the model "
+            "again with this release"
+        )
+    return header, arrays
+
+
+def _restore(header: dict[str, Any], arrays: dict[str, NDArray]) -> DifferenceModel | Estimator:
+    name = header["class"]
+    if name not in _CLASSES:
+        raise _Unusable(f"holds a {name!r}; only {', '.join(_CLASSES)} can be loaded")
+    if not all(np.isfinite(array).all() for array in arrays.values()):
+        raise ValueError("an array holds values that are not finite")
+    params = {key: _tuples(value) for key, value in header["params"].items()}
+    kind: type[Estimator] = getattr(importlib.import_module(_CLASSES[name]), name)
+    estimator = kind.from_state(params, arrays)
+    names = header["feature_names"]
+    # Arrays that do not fit together show here, not in the middle of a study.
+    mean, std = estimator.predict(np.zeros((1, estimator.n_features_in_)), return_std=True)
+    if not (np.isfinite(mean).all() and np.isfinite(std).all()):
+        raise ValueError("a prediction is not finite")
+    if names is not None:
+        estimator.feature_names_in_ = np.array([str(name) for name in names], dtype=object)
+    if "difference" not in header:
+        return estimator
+    fields = header["difference"]
+    model = DifferenceModel.from_state(
+        estimator,
+        float(fields["dt"]),
+        tuple(Channel(**channel) for channel in fields["state_channels"]),
+        tuple(Channel(**channel) for channel in fields["action_channels"]),
+        np.array(fields["mean"], float),
+        np.array(fields["scale"], float),
+    )
+    model.predict(np.zeros((1, len(model.state_channels))), np.zeros((1, len(model.action_channels))))
+    return model
+
+
+def _plain(name: str, value: Any) -> Any:
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(name, item) for item in value]
+    raise TypeError(
+        f"{name} is a {type(value).__name__}, which a file cannot hold: "
+        "use a number, a text, None or a sequence of those"
+    )
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+def _write(path: Path, content: bytes) -> None:
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.replace(name, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(name)
+        raise

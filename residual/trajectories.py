@@ -1,0 +1,82 @@
+"""What was observed of a system: transitions for learning, trajectories for diagnosis."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Transitions:
+    """Observed steps (s, a, s') of one control period each.
+
+    Attributes:
+        states: s, shape (n, n_s), in the units of the simulator's state channels.
+        actions: a, shape (n, n_a).
+        next_states: s', shape (n, n_s); angles continue those of ``states`` unwrapped.
+        episodes: Which episode each row belongs to, shape (n,), integers.
+    """
+
+    states: Array
+    actions: Array
+    next_states: Array
+    episodes: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    @classmethod
+    def join(cls, parts: Sequence[Transitions]) -> Transitions:
+        """All parts in order; episodes are renumbered so that they stay distinct."""
+        episodes, first = [], 0
+        for part in parts:
+            episodes.append(part.episodes + first)
+            first = int(episodes[-1].max()) + 1
+        return cls(
+            np.concatenate([part.states for part in parts]),
+            np.concatenate([part.actions for part in parts]),
+            np.concatenate([part.next_states for part in parts]),
+            np.concatenate(episodes),
+        )
+
+    def save(self, path: Path) -> None:
+        """Write all columns to one ``.npz`` file."""
+        np.savez_compressed(path, **dataclasses.asdict(self))
+
+    @classmethod
+    def load(cls, path: Path) -> Transitions:
+        """Read what ``save`` wrote; no code is run from the file."""
+        with np.load(path, allow_pickle=False) as data:
+            return cls(**{field.name: data[field.name] for field in dataclasses.fields(cls)})
+
+
+@dataclasses.dataclass(frozen=True)
+class Trajectory:
+    """One recorded run: samples in time order, and the action held after each sample.
+
+    Attributes:
+        name: Where it comes from (file and run), for messages.
+        times: Sample times in s, strictly increasing, shape (T + 1,).
+        states: Measured state channels, shape (T + 1, n_s); angles unwrapped; a channel
+            that was not measured is NaN throughout, a missing sample is NaN in its row.
+        actions: Action from sample k to sample k + 1, shape (T, n_a).
+    """
+
+    name: str
+    times: Array
+    states: Array
+    actions: Array
+
+    @property
+    def durations(self) -> Array:
+        """Time from each sample to the next, in s, shape (T,)."""
+        return np.diff(self.times)
+
+    def __len__(self) -> int:
+        return len(self.actions)

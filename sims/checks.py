@@ -1,0 +1,249 @@
+"""Is a simulator what everything above relies on? ``check_simulator`` tells in plain words."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sims.effects.base import Effect
+from sims.effects.library import library, typical
+from sims.host import HostSimulator
+from sims.simulator import Array, Channel, Simulator
+
+
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """The outcome of one check.
+
+    Args:
+        check: What was checked.
+        ok: Whether it holds.
+        says: In words, with an example row if it does not hold.
+    """
+
+    check: str
+    ok: bool
+    says: str
+
+    def __str__(self) -> str:
+        return f"{'ok  ' if self.ok else 'FAIL'}  {self.check}: {self.says}"
+
+
+def check_simulator(
+    simulator: Simulator,
+    states: ArrayLike | None = None,
+    actions: ArrayLike | None = None,
+    rng: np.random.Generator | None = None,
+) -> list[Finding]:
+    """Test the contract of a simulator on some rows.
+
+    Args:
+        simulator: Any simulator; one that hosts effects is tested with each of them too.
+        states: shape (n, n_s), where to test; random within the channels' scales if None.
+        actions: shape (n, n_a), likewise.
+        rng: Source of random rows; a fixed seed by default.
+
+    Returns:
+        One finding per check. ``print(*findings, sep="\\n")`` is the report; the simulator
+        keeps the contract if ``all(finding.ok for finding in findings)``.
+    """
+    rng = rng or np.random.default_rng(0)
+    if states is None or actions is None:
+        size = 24 if states is None and actions is None else len(np.asarray(states or actions))
+        drawn = _draw(simulator, size, rng)
+        states = drawn[0] if states is None else states
+        actions = drawn[1] if actions is None else actions
+    states, actions = simulator.check_rows(states, actions)
+    findings = list(_contract(simulator, states, actions, rng))
+    if all(finding.ok for finding in findings):
+        findings += _parameters(simulator, states, actions)
+        if isinstance(simulator, HostSimulator):
+            findings += _effects(simulator, rng)
+    return findings
+
+
+def _contract(
+    simulator: Simulator, states: Array, actions: Array, rng: np.random.Generator
+) -> Iterator[Finding]:
+    given = states.copy(), actions.copy()
+    following = np.asarray(simulator.step(states, actions))
+    if following.shape != states.shape:
+        says = f"step returned {following.shape} for states of shape {states.shape}"
+        yield Finding("shape", False, says)
+        return
+    yield Finding("shape", True, f"(n, {states.shape[1]}) in and out")
+    kept = np.array_equal(given[0], states) and np.array_equal(given[1], actions)
+    says = "the arguments are left as they were" if kept else "step overwrites its arguments"
+    yield Finding("arguments", kept, says)
+    states, actions = given
+    bad = np.flatnonzero(~np.isfinite(following).all(axis=1))
+    yield Finding(
+        "finite",
+        not bad.size,
+        _row("step gives", bad, states, actions, following, following)
+        if bad.size
+        else f"all {len(states)} rows stay finite",
+    )
+
+    def same(check: str, again: Array, good: str, wrong: str) -> Finding:
+        rows = np.flatnonzero((again != following).any(axis=1) & np.isfinite(following).all(axis=1))
+        says = _row(wrong, rows, states, actions, following, again) if rows.size else good
+        return Finding(check, not rows.size, says)
+
+    again = simulator.step(states, actions)
+    yield same(
+        "repeatable",
+        again,
+        "the same rows give the same bits",
+        "the same rows stepped twice differ; no random numbers and no memory may be left",
+    )
+    simulator.step(states[::-1] * 0.5, actions[::-1])
+    again = simulator.step(states, actions)
+    yield same(
+        "pure",
+        again,
+        "what was stepped before does not matter",
+        "the result depends on what was stepped before; reset every hidden state in step",
+    )
+    alone = np.concatenate(
+        [simulator.step(states[i : i + 1], actions[i : i + 1]) for i in range(len(states))]
+    )
+    yield same(
+        "batch",
+        alone,
+        "a row alone gives the same bits as in a batch",
+        "a row alone differs from the same row in a batch; use elementwise operations only",
+    )
+    order = rng.permutation(len(states))
+    shuffled = np.empty_like(following)
+    shuffled[order] = simulator.step(states[order], actions[order])
+    yield same(
+        "order",
+        shuffled,
+        "the order of the rows does not matter",
+        "rows in another order differ",
+    )
+    yield from _turns(simulator, states, actions, following)
+    beyond = [
+        channel.high + 1.0 if np.isfinite(channel.high) else column
+        for channel, column in zip(simulator.action_channels, actions[0], strict=True)
+    ]
+    edge = [
+        channel.high if np.isfinite(channel.high) else column
+        for channel, column in zip(simulator.action_channels, actions[0], strict=True)
+    ]
+    clipped = np.array_equal(
+        simulator.step(states[:1], [beyond]), simulator.step(states[:1], [edge])
+    )
+    says = (
+        "actions are clipped to their bounds"
+        if clipped
+        else (f"the action {beyond} does not act like its bound {edge}; use check_rows in step")
+    )
+    yield Finding("bounds", clipped, says)
+
+
+def _turns(
+    simulator: Simulator, states: Array, actions: Array, following: Array
+) -> Iterator[Finding]:
+    """An angle must not be wrapped: a start one turn further ends one turn further."""
+    for column, channel in enumerate(simulator.state_channels):
+        if not channel.angle:
+            continue
+        moved = states.copy()
+        moved[:, column] += 4 * np.pi
+        further = simulator.step(moved, actions)[:, column] - following[:, column]
+        # Other forces than those of whole turns may move it a little differently.
+        ok = bool(np.all(np.abs(further - 4 * np.pi) < np.pi))
+        says = (
+            "is not wrapped"
+            if ok
+            else "two turns further on, the next angle is not two turns further on; do not wrap it"
+        )
+        yield Finding(f"angle {channel.name}", ok, says)
+
+
+def _parameters(simulator: Simulator, states: Array, actions: Array) -> Iterator[Finding]:
+    before = simulator.step(states, actions)
+    for name, parameter in (getattr(simulator, "parameters", None) or {}).items():
+        size = np.max(np.abs(parameter.value)) or 1.0
+        value = parameter.value + 0.05 * size
+        if np.any(value > parameter.high):
+            value = parameter.value - 0.05 * size
+        try:
+            after = simulator.with_parameters(**{name: value}).step(states, actions)
+        except NotImplementedError:
+            return
+        yield _reaches(f"parameter {name}", before, after, f"from {parameter.value} to {value}")
+
+
+def _effects(simulator: HostSimulator, rng: np.random.Generator) -> Iterator[Finding]:
+    plain = simulator.with_effects(())
+    states, actions = _draw(plain, 24, rng)
+    before = plain.step(states, actions)
+    for effect in library(plain):
+        check = f"effect {effect}"
+        absent = plain.with_effects([effect]).step(states, actions)
+        if not np.array_equal(absent, before):
+            yield Finding(check, False, "at zero strength it changes the result")
+            continue
+        some = typical(effect, plain)
+        host = plain.with_effects([some])
+        # A command that has just changed its sign shows what delays, lags and plays do.
+        after = host.step(host.augment(states, -actions), actions)[:, : states.shape[1]]
+        finding = _reaches(check, before, after, f"to {_strength(some)}")
+        by_row = host.take(slice(None)).with_effects([_per_row(some, len(states))])
+        rows = by_row.step(by_row.augment(states, -actions), actions)[:, : states.shape[1]]
+        if finding.ok and not np.array_equal(rows, after):
+            finding = Finding(check, False, "one value per row differs from the same scalar")
+        yield finding
+
+
+def _per_row(effect: Effect, n: int) -> Effect:
+    return effect.with_values(
+        **{name: np.full(n, getattr(effect, name)) for name in effect.strengths()}
+    )
+
+
+def _strength(effect: Effect) -> str:
+    return ", ".join(f"{name} {getattr(effect, name):.3g}" for name in effect.strengths())
+
+
+def _reaches(check: str, before: Array, after: Array, change: str) -> Finding:
+    if not np.isfinite(after).all():
+        return Finding(check, False, f"changed {change} it gives values that are not finite")
+    ok = bool(np.any(after != before))
+    moved = np.abs(after - before).max(axis=0)
+    amounts = ", ".join(f"{amount:.2g}" for amount in moved)
+    says = f"changed {change} it moves the channels by up to {amounts}"
+    return Finding(check, ok, says if ok else f"changed {change} it does not reach the output")
+
+
+def _row(
+    what: str, rows: NDArray[np.intp], states: Array, actions: Array, first: Array, second: Array
+) -> str:
+    i = int(rows[0])
+    says = f"{what}; {len(rows)} of {len(states)} rows, for example state {states[i].tolist()}"
+    says += f", action {actions[i].tolist()} -> {first[i].tolist()}"
+    return says if first is second else f"{says} and then {second[i].tolist()}"
+
+
+def _draw(simulator: Simulator, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Random rows within the scales of the channels; memory as it would be after rest."""
+
+    def column(channel: Channel) -> Array:
+        size = np.pi if channel.angle else channel.scale
+        return rng.uniform(max(channel.low, -size), min(channel.high, size), n)
+
+    actions = np.stack([column(channel) for channel in simulator.action_channels], axis=1)
+    states = [
+        np.zeros(n) if channel.kind == "memory" else column(channel)
+        for channel in simulator.state_channels
+    ]
+    found = np.stack(states, axis=1)
+    if isinstance(simulator, HostSimulator):
+        found = simulator.augment(found[:, : len(simulator.physical_channels)], actions)
+    return found, actions

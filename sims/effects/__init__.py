@@ -1,0 +1,32 @@
+"""The named physical effects that a simulator can host, by where they enter."""
+
+from sims.effects.actuator import ActuatorBias as ActuatorBias
+from sims.effects.actuator import ActuatorEffect as ActuatorEffect
+from sims.effects.actuator import ActuatorGain as ActuatorGain
+from sims.effects.actuator import ActuatorLag as ActuatorLag
+from sims.effects.actuator import DeadZone as DeadZone
+from sims.effects.actuator import Delay as Delay
+from sims.effects.actuator import Saturation as Saturation
+from sims.effects.actuator import StaticActuatorEffect as StaticActuatorEffect
+from sims.effects.backlash import Backlash as Backlash
+from sims.effects.base import Effect as Effect
+from sims.effects.base import Quantity as Quantity
+from sims.effects.base import number as number
+from sims.effects.friction import CoulombFriction as CoulombFriction
+from sims.effects.friction import DryFriction as DryFriction
+from sims.effects.friction import StribeckFriction as StribeckFriction
+from sims.effects.joint import Cogging as Cogging
+from sims.effects.joint import ConstantLoad as ConstantLoad
+from sims.effects.joint import CubicSpring as CubicSpring
+from sims.effects.joint import JointEffect as JointEffect
+from sims.effects.joint import LinearSpring as LinearSpring
+from sims.effects.joint import QuadraticDrag as QuadraticDrag
+from sims.effects.joint import ViscousFriction as ViscousFriction
+from sims.effects.library import Alias as Alias
+from sims.effects.library import exact_aliases as exact_aliases
+from sims.effects.library import library as library
+from sims.effects.library import typical as typical
+from sims.effects.parameter import ParameterChange as ParameterChange
+from sims.effects.sensor import SensorEffect as SensorEffect
+from sims.effects.sensor import SensorOffset as SensorOffset
+from sims.effects.sensor import SensorScale as SensorScale

@@ -1,0 +1,138 @@
+"""Effects between a command and what the actuator receives."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from sims.effects.base import Effect, number, place
+from sims.effects.joint import Value
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
+
+
+@dataclasses.dataclass(frozen=True)
+class ActuatorEffect(Effect):
+    """A change of one input on its way to the actuator.
+
+    Whatever their order in a list, effects act in the order of the classes below: gain,
+    bias, dead zone, saturation (an amplifier and its output stage), then delay, then lag.
+
+    Attributes:
+        stage: Rank in that order.
+    """
+
+    actuator: str
+
+    enters: ClassVar = "actuator"
+    stage: ClassVar[int]
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """Unit and typical size of the input, and the control period."""
+        inputs = {channel.name: channel for channel in simulator.action_channels}
+        channel = place("actuator", self.actuator, inputs)
+        return {"input": (channel.unit, channel.scale), "time": ("s", simulator.dt)}
+
+
+class StaticActuatorEffect(ActuatorEffect):
+    """An actuator effect without memory: output from present input."""
+
+    @abc.abstractmethod
+    def shape(self, u: Value) -> Value:
+        """What the actuator receives for the command ``u``, by row."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ActuatorGain(StaticActuatorEffect):
+    """The actuator receives ``(1 + gain) u``."""
+
+    gain: Value = number(low=-0.99, share=1.0, input=0)
+
+    name: ClassVar[str] = "actuator_gain"
+    sentence: ClassVar[str] = "The actuator is stronger or weaker than commanded, by a share."
+    needs: ClassVar[str] = "a varied input"
+    stage: ClassVar[int] = 0
+
+    def shape(self, u: Value) -> Value:
+        """Scaled command."""
+        return (1.0 + self.gain) * u
+
+
+@dataclasses.dataclass(frozen=True)
+class ActuatorBias(StaticActuatorEffect):
+    """The actuator receives ``u + bias``."""
+
+    bias: Value = number(input=1, share=0.1)
+
+    name: ClassVar[str] = "actuator_bias"
+    sentence: ClassVar[str] = "The actuator adds a constant to every command."
+    needs: ClassVar[str] = "motion in both directions"
+    stage: ClassVar[int] = 1
+
+    def shape(self, u: Value) -> Value:
+        """Shifted command."""
+        return u + self.bias
+
+
+@dataclasses.dataclass(frozen=True)
+class DeadZone(StaticActuatorEffect):
+    """Commands within ``+-width`` do nothing, and larger ones lose ``width``."""
+
+    width: Value = number(low=0.0, input=1, share=0.1, starts=(0.007, 0.027, 0.1, 0.27))
+
+    name: ClassVar[str] = "dead_zone"
+    sentence: ClassVar[str] = "Small commands do nothing, larger ones lose the same amount."
+    needs: ClassVar[str] = "small and large inputs"
+    stage: ClassVar[int] = 2
+
+    def shape(self, u: Value) -> Value:
+        """What is left of the command."""
+        return u - np.clip(u, -self.width, self.width)
+
+
+@dataclasses.dataclass(frozen=True)
+class Saturation(StaticActuatorEffect):
+    """Commands are cut at ``+-level``; an infinite level is no saturation."""
+
+    level: Value = number(
+        math.inf, low=1e-6, nominal=math.inf, input=1, starts=(0.97, 0.85, 0.65, 0.4)
+    )
+
+    name: ClassVar[str] = "saturation"
+    sentence: ClassVar[str] = "Commands beyond a level have no further effect."
+    needs: ClassVar[str] = "inputs beyond the level"
+    stage: ClassVar[int] = 3
+
+    def shape(self, u: Value) -> Value:
+        """The command, cut."""
+        return np.clip(u, -self.level, self.level)
+
+
+@dataclasses.dataclass(frozen=True)
+class Delay(ActuatorEffect):
+    """The actuator receives the command of ``time`` seconds ago."""
+
+    time: Value = number(low=0.0, time=1, share=0.1, starts=(0.02, 0.1, 0.4, 1.0, 1.6))
+
+    name: ClassVar[str] = "delay"
+    sentence: ClassVar[str] = "Commands arrive late by a fixed time."
+    needs: ClassVar[str] = "sudden changes of the input"
+    stage: ClassVar[int] = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class ActuatorLag(ActuatorEffect):
+    """The actuator follows the command as a first-order filter: ``T y' = u - y``."""
+
+    time_constant: Value = number(low=0.0, time=1, share=0.1, starts=(0.04, 0.2, 0.8, 2.4))
+
+    name: ClassVar[str] = "actuator_lag"
+    sentence: ClassVar[str] = "The actuator follows its command gradually, not at once."
+    needs: ClassVar[str] = "sudden changes of the input, then rest"
+    stage: ClassVar[int] = 5

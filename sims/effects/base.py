@@ -1,0 +1,216 @@
+"""What every named physical effect has: numbers with units, a place, a plain sentence."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
+
+Role = Literal["strength", "shape", "fixed"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """What is known about one number of an effect once it sits in a simulator.
+
+    Args:
+        unit: SI unit.
+        scale: Size at which the effect is comparable to what the simulator does already;
+            finite differences take a small share of it.
+        low, high: Bounds; what dissipates or stores energy is not negative.
+        role: ``"strength"`` (at ``nominal`` the effect is absent), ``"shape"`` (fitted too,
+            meaningless without strength), or ``"fixed"`` (given by the user).
+        nominal: Value at which the effect is absent; zero but for the level of a saturation.
+        starts: Values that a search should begin from, empty if any small one will do.
+        integer: True if only whole numbers make sense.
+    """
+
+    unit: str
+    scale: float
+    low: float
+    high: float
+    role: Role
+    nominal: float
+    starts: tuple[float, ...]
+    integer: bool
+
+
+def number(
+    default: float = 0.0,
+    *,
+    role: Role = "strength",
+    low: float = -math.inf,
+    high: float = math.inf,
+    nominal: float = 0.0,
+    share: float = 1.0,
+    starts: tuple[float, ...] = (),
+    integer: bool = False,
+    **dimension: int,
+) -> Any:
+    """A numeric field of an effect.
+
+    Args:
+        default: Value when none is given.
+        role, low, high, nominal, integer: See ``Quantity``.
+        share: The scale, as a share of the typical size of the dimension.
+        starts: Values worth starting a search from, as multiples of the same typical size.
+        dimension: Exponents of what the host names: ``force``, ``position``, ``rate`` (of the
+            joint), ``input``, ``time``, ``channel`` or ``parameter``; viscous friction has
+            ``force=1, rate=-1``.
+    """
+    known = {
+        "role": role,
+        "low": low,
+        "high": high,
+        "nominal": nominal,
+        "share": share,
+        "starts": starts,
+        "integer": integer,
+        "dimension": dimension,
+    }
+    return dataclasses.field(default=default, metadata=known)
+
+
+@dataclasses.dataclass(frozen=True)
+class Effect(abc.ABC):
+    """One named piece of physics; subclasses are frozen dataclasses.
+
+    The first field says where it acts (``joint``, ``actuator``, ``channel`` or ``parameter``),
+    the fields made by ``number`` say how much: scalars or, one per row of a batch, arrays.
+
+    Attributes:
+        name: Its name in the field, ``"viscous_friction"``.
+        sentence: What it is, in one plain sentence.
+        enters: ``"joint"``, ``"actuator"``, ``"sensor"`` or ``"parameter"``.
+        needs: What data must contain to show it.
+    """
+
+    name: ClassVar[str]
+    sentence: ClassVar[str]
+    enters: ClassVar[Literal["joint", "actuator", "sensor", "parameter"]]
+    needs: ClassVar[str]
+
+    @property
+    def where(self) -> str:
+        """The joint, actuator, channel or parameter that it acts on."""
+        return getattr(self, dataclasses.fields(self)[0].name)
+
+    @classmethod
+    def numbers(cls) -> tuple[str, ...]:
+        """Names of the numeric fields."""
+        return tuple(f.name for f in dataclasses.fields(cls) if "dimension" in f.metadata)
+
+    @classmethod
+    def strengths(cls) -> tuple[str, ...]:
+        """Names of the fields that make the effect vanish at their nominal value."""
+        return tuple(
+            f.name for f in dataclasses.fields(cls) if f.metadata.get("role") == "strength"
+        )
+
+    def present(self) -> Any:
+        """Whether it does anything: a bool, or per row an array of them."""
+        nominal = {f.name: f.metadata.get("nominal") for f in dataclasses.fields(self)}
+        there: Any = False
+        for name in self.strengths():
+            there = there | (np.asarray(getattr(self, name)) != nominal[name])
+        return there
+
+    @property
+    def absent(self) -> bool:
+        """True at zero strength (in every row)."""
+        return not np.any(self.present())
+
+    @property
+    def rows(self) -> int | None:
+        """Number of rows if some value is an array with one entry per row."""
+        sizes = {
+            np.size(getattr(self, name)) for name in self.numbers() if np.ndim(getattr(self, name))
+        }
+        if len(sizes) > 1:
+            raise ValueError(f"{self.name}: values for {sorted(sizes)} rows, expected one number")
+        return sizes.pop() if sizes else None
+
+    def take(self, index: Any) -> Self:
+        """The effect for some rows of a batch: values given per row are indexed."""
+        values = {name: getattr(self, name) for name in self.numbers()}
+        arrays = {name: value[index] for name, value in values.items() if np.ndim(value)}
+        return dataclasses.replace(self, **arrays) if arrays else self
+
+    def with_values(self, **values: ArrayLike) -> Self:
+        """A copy with other numbers; arrays hold one entry per row."""
+        return dataclasses.replace(
+            self, **{k: np.asarray(v, float) if np.ndim(v) else v for k, v in values.items()}
+        )
+
+    def quantities(self, simulator: HostSimulator) -> dict[str, Quantity]:
+        """Unit, scale, bounds and role of every numeric field in this simulator."""
+        measures = self.measures(simulator)
+        found = {}
+        for field in dataclasses.fields(self):
+            known = field.metadata
+            if "dimension" not in known:
+                continue
+            typical = math.prod(
+                measures[kind][1] ** power for kind, power in known["dimension"].items()
+            )
+            found[field.name] = Quantity(
+                unit=_unit(known["dimension"], measures),
+                scale=_tidy(known["share"] * typical),
+                low=known["low"],
+                high=known["high"],
+                role=known["role"],
+                nominal=known["nominal"],
+                starts=tuple(_tidy(start * typical) for start in known["starts"]),
+                integer=known["integer"],
+            )
+        return found
+
+    @abc.abstractmethod
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """Unit and typical size of each dimension where the effect acts.
+
+        Raises:
+            ValueError: The simulator has no such place; the message lists those it has.
+        """
+
+    def __str__(self) -> str:
+        return f"{self.name}@{self.where}"
+
+
+def _tidy(value: float) -> float:
+    """Without the dust of a product of decimal fractions: 0.1 x 3 is 0.3."""
+    return float(f"{value:.12g}")
+
+
+def _unit(dimension: Mapping[str, int], measures: Mapping[str, tuple[str, float]]) -> str:
+    """Unit of a product of powers: ``force=1, rate=-1`` is ``"N m s/rad"``."""
+    powers: dict[str, int] = {}
+    for kind, power in dimension.items():
+        unit = measures[kind][0]
+        parts = [unit] if kind != "rate" else unit.split("/")
+        powers[parts[0]] = powers.get(parts[0], 0) + power
+        if len(parts) > 1:
+            powers[parts[1]] = powers.get(parts[1], 0) - power
+    above = [_power(unit, power) for unit, power in powers.items() if power > 0]
+    below = [_power(unit, -power) for unit, power in powers.items() if power < 0]
+    return (" ".join(above) or "1") + ("/" + " ".join(below) if below else "")
+
+
+def _power(unit: str, power: int) -> str:
+    return unit if power == 1 else f"{unit}^{power}"
+
+
+def place(kind: str, name: str, known: Mapping[str, Any]) -> Any:
+    """``known[name]``, or a ValueError that lists what there is."""
+    if name not in known:
+        there = ", ".join(known) or "none"
+        raise ValueError(f"there is no {kind} {name!r} in this simulator; it has: {there}")
+    return known[name]

@@ -1,0 +1,164 @@
+"""Generalized forces that depend smoothly on the position and rate of one joint."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from sims.effects.base import Effect, number, place
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
+
+Value = Any  # float, or an array with one entry per row
+
+
+@dataclasses.dataclass(frozen=True)
+class JointEffect(Effect):
+    """A generalized force on one joint, applied inside every sub-step.
+
+    Attributes:
+        mechanical: False if the law makes sense without a rate, so that a first-order
+            system can host it as a constant rate of change.
+        follows_rate: True if the force depends on the rate.
+    """
+
+    joint: str
+
+    enters: ClassVar = "joint"
+    mechanical: ClassVar[bool] = True
+    follows_rate: ClassVar[bool] = True
+
+    @abc.abstractmethod
+    def force(self, q: Value, v: Value) -> Value:
+        """Force on the joint, in its unit, at position ``q`` and rate ``v``, by row."""
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """Unit and typical size of force, position and rate at the joint."""
+        joint = place("joint", self.joint, {joint.name: joint for joint in simulator.joints})
+        if joint.rate is None and self.mechanical:
+            raise ValueError(
+                f"{self.name} needs a joint with a rate; {joint.name!r} is the state of a "
+                "first-order system, which hosts a constant_load only"
+            )
+        channels = {channel.name: channel for channel in simulator.state_channels}
+        found = {"force": (joint.unit, simulator.force_scale(joint))}
+        for kind, name in (("position", joint.position), ("rate", joint.rate)):
+            if name is not None:
+                found[kind] = (channels[name].unit, channels[name].scale)
+        return found
+
+
+@dataclasses.dataclass(frozen=True)
+class ViscousFriction(JointEffect):
+    """Friction that grows in proportion to the rate: ``-coefficient v``."""
+
+    coefficient: Value = number(low=0.0, force=1, rate=-1)
+
+    name: ClassVar[str] = "viscous_friction"
+    sentence: ClassVar[str] = "Friction that grows in proportion to speed."
+    needs: ClassVar[str] = "motion at several speeds"
+
+    def force(self, q: Value, v: Value) -> Value:
+        """Force opposing the rate."""
+        return -self.coefficient * v
+
+
+@dataclasses.dataclass(frozen=True)
+class QuadraticDrag(JointEffect):
+    """Drag of a body in a fluid: ``-coefficient v |v|``."""
+
+    coefficient: Value = number(low=0.0, force=1, rate=-2)
+
+    name: ClassVar[str] = "quadratic_drag"
+    sentence: ClassVar[str] = "Drag that grows with the square of speed, as in air or water."
+    needs: ClassVar[str] = "fast motion and slow motion"
+
+    def force(self, q: Value, v: Value) -> Value:
+        """Force opposing the rate."""
+        return -self.coefficient * v * abs(v)
+
+
+@dataclasses.dataclass(frozen=True)
+class LinearSpring(JointEffect):
+    """A spring: ``-stiffness (q - rest)``; an angle is not wrapped."""
+
+    stiffness: Value = number(low=0.0, force=1, position=-1)
+    rest: Value = number(role="fixed", position=1)
+
+    name: ClassVar[str] = "linear_spring"
+    sentence: ClassVar[str] = "A spring that pulls back in proportion to the distance."
+    needs: ClassVar[str] = "a wide range of positions"
+    follows_rate: ClassVar[bool] = False
+
+    def force(self, q: Value, v: Value) -> Value:
+        """Force towards the rest position."""
+        return -self.stiffness * (q - self.rest)
+
+
+@dataclasses.dataclass(frozen=True)
+class CubicSpring(JointEffect):
+    """A spring that stiffens: ``-stiffness (q - rest)^3``; an angle is not wrapped."""
+
+    stiffness: Value = number(low=0.0, force=1, position=-3)
+    rest: Value = number(role="fixed", position=1)
+
+    name: ClassVar[str] = "cubic_spring"
+    sentence: ClassVar[str] = "A spring that is soft near its rest and stiffens far from it."
+    needs: ClassVar[str] = "small and large displacements"
+    follows_rate: ClassVar[bool] = False
+
+    def force(self, q: Value, v: Value) -> Value:
+        """Force towards the rest position."""
+        away = q - self.rest
+        return -self.stiffness * (away * away * away)
+
+
+@dataclasses.dataclass(frozen=True)
+class ConstantLoad(JointEffect):
+    """A force that never changes; on a first-order system, a constant rate of change."""
+
+    load: Value = number(force=1)
+
+    name: ClassVar[str] = "constant_load"
+    sentence: ClassVar[str] = "A force that pulls with constant strength in one direction."
+    needs: ClassVar[str] = "motion in both directions"
+    mechanical: ClassVar[bool] = False
+    follows_rate: ClassVar[bool] = False
+
+    def force(self, q: Value, v: Value) -> Value:
+        """The load, whatever the state."""
+        return self.load + 0.0 * q
+
+
+@dataclasses.dataclass(frozen=True)
+class Cogging(JointEffect):
+    """Torque of a motor's magnets: ``sine sin(order q) + cosine cos(order q)``."""
+
+    sine: Value = number(force=1, share=0.1)
+    cosine: Value = number(force=1, share=0.1)
+    order: Value = number(
+        6.0, role="shape", low=1.0, starts=tuple(range(2, 13)), integer=True, turn=1
+    )
+
+    name: ClassVar[str] = "cogging"
+    sentence: ClassVar[str] = "A torque that repeats a whole number of times per turn."
+    needs: ClassVar[str] = "slow motion over a good part of a turn"
+    follows_rate: ClassVar[bool] = False
+
+    def force(self, q: Value, v: Value) -> Value:
+        """Torque at angle ``q``."""
+        return self.sine * np.sin(self.order * q) + self.cosine * np.cos(self.order * q)
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """As for every joint effect; the joint has to turn."""
+        found = {**super().measures(simulator), "turn": ("1", 1.0)}
+        joint = next(joint for joint in simulator.joints if joint.name == self.joint)
+        angles = [channel.name for channel in simulator.state_channels if channel.angle]
+        if joint.position not in angles:
+            raise ValueError(f"cogging needs a joint that turns; {self.joint!r} slides")
+        return found

@@ -1,0 +1,182 @@
+"""Which effects a simulator can host, and which of them no data could ever tell apart."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sims.effects.actuator import (
+    ActuatorBias,
+    ActuatorGain,
+    ActuatorLag,
+    DeadZone,
+    Delay,
+    Saturation,
+)
+from sims.effects.backlash import Backlash
+from sims.effects.base import Effect
+from sims.effects.friction import CoulombFriction, DryFriction, StribeckFriction
+from sims.effects.joint import (
+    Cogging,
+    ConstantLoad,
+    CubicSpring,
+    JointEffect,
+    LinearSpring,
+    QuadraticDrag,
+    ViscousFriction,
+)
+from sims.effects.parameter import ParameterChange
+from sims.effects.sensor import SensorOffset, SensorScale
+from sims.simulator import Array, Channel
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
+
+JOINT_EFFECTS: tuple[type[Effect], ...] = (
+    ViscousFriction,
+    CoulombFriction,
+    StribeckFriction,
+    QuadraticDrag,
+    LinearSpring,
+    CubicSpring,
+    ConstantLoad,
+    Cogging,
+    Backlash,
+)
+ACTUATOR_EFFECTS = (ActuatorGain, ActuatorBias, DeadZone, Saturation, Delay, ActuatorLag)
+SENSOR_EFFECTS = (SensorOffset, SensorScale)
+
+
+def library(simulator: HostSimulator) -> tuple[Effect, ...]:
+    """Every effect that the simulator can host, at zero strength and with typical shapes."""
+    places: list[tuple[type[Effect], str]] = []
+    for joint in simulator.joints:
+        places += [(effect, joint.name) for effect in JOINT_EFFECTS]
+    for channel in simulator.action_channels:
+        places += [(effect, channel.name) for effect in ACTUATOR_EFFECTS]
+    for channel in simulator.physical_channels:
+        places += [(effect, channel.name) for effect in SENSOR_EFFECTS]
+    places += [(ParameterChange, name) for name in simulator.parameters]
+    found = []
+    for kind, where in places:
+        effect = kind(where)  # type: ignore[call-arg]
+        try:
+            known = effect.quantities(simulator)
+        except ValueError:
+            continue
+        typical = {
+            name: quantity.starts[len(quantity.starts) // 2]
+            for name, quantity in known.items()
+            if quantity.role == "shape" and quantity.starts
+        }
+        found.append(effect.with_values(**typical))
+    return tuple(found)
+
+
+def typical(effect: Effect, simulator: HostSimulator, share: float = 1.0) -> Effect:
+    """The effect at a strength comparable to what the simulator does already.
+
+    A saturation, which is absent at an infinite level, gets a level that cuts half.
+    """
+    values = {}
+    for name, quantity in effect.quantities(simulator).items():
+        if quantity.role == "strength":
+            usual = share * quantity.scale
+            values[name] = usual if np.isfinite(quantity.nominal) else 0.5 * quantity.scale
+    return effect.with_values(**values)
+
+
+@dataclasses.dataclass(frozen=True)
+class Alias:
+    """Effects of which each can be replaced by the others, in any data.
+
+    Args:
+        effects: Two that have the same consequence, or three or four of which any one
+            equals a combination of the rest; written ``name@where``.
+        says: The same in words.
+    """
+
+    effects: tuple[str, ...]
+    says: str
+
+
+def exact_aliases(
+    simulator: HostSimulator, rng: np.random.Generator | None = None, most: int = 4
+) -> tuple[Alias, ...]:
+    """Sets of effects that are exactly dependent in the simulator's own equations.
+
+    Found by probing: the change of the motion per strength is compared over random states and
+    inputs. It covers changes of parameters, gains, biases and the forces that are linear in
+    one strength; pairs first, then one representative of each pair in larger sets.
+
+    Args:
+        simulator: A host, with or without effects.
+        rng: Source of the random states; a fixed seed by default.
+        most: Largest set that is looked for.
+    """
+    rng = rng or np.random.default_rng(0)
+    plain = simulator.with_effects(())
+    states, inputs = _random_rows(plain, 96, rng)
+    columns: dict[str, Array] = {}
+    for effect in library(plain):
+        linear = isinstance(effect, JointEffect) and not isinstance(effect, DryFriction)
+        if linear or isinstance(effect, ParameterChange | ActuatorGain | ActuatorBias):
+            if len(effect.strengths()) != 1:
+                continue
+            column = _response(plain, effect, states, inputs)
+            if np.linalg.norm(column) > 0:
+                columns[str(effect)] = column / np.linalg.norm(column)
+    found: list[Alias] = []
+    alike: dict[str, list[str]] = {}
+    for name, column in columns.items():
+        twin = next((n for n in alike if _dependent([columns[n], column])), None)
+        alike.setdefault(twin or name, []).append(name)
+    for twins in alike.values():
+        if len(twins) > 1:
+            says = f"{', '.join(twins)}: the same motion, no data tells which"
+            found.append(Alias(tuple(twins), says))
+    sets: list[set[str]] = []
+    for size in range(3, most + 1):
+        for names in itertools.combinations(alike, size):
+            if any(known <= set(names) for known in sets):
+                continue
+            if _dependent([columns[name] for name in names]):
+                sets.append(set(names))
+                rest = ", ".join(names)
+                found.append(Alias(names, f"{rest}: any one is a combination of the others"))
+    return tuple(found)
+
+
+def _dependent(columns: list[Array]) -> bool:
+    return bool(np.linalg.svd(np.stack(columns), compute_uv=False)[-1] < 1e-6)
+
+
+def _random_rows(simulator: HostSimulator, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
+    def draw(channel: Channel) -> Array:
+        size = np.pi if channel.angle else channel.scale
+        low, high = max(channel.low, -size), min(channel.high, size)
+        return rng.uniform(low, high, n)
+
+    states = np.stack([draw(channel) for channel in simulator.physical_channels], axis=1)
+    inputs = np.stack([draw(channel) for channel in simulator.action_channels], axis=1)
+    return states, inputs
+
+
+def _response(simulator: HostSimulator, effect: Effect, states: Array, inputs: Array) -> Array:
+    """Change of the motion over a tenth of a control period per strength, flattened."""
+    (name,) = effect.strengths()
+    change = 1e-4 * effect.quantities(simulator)[name].scale
+    ends = []
+    for value in (change, -change):
+        changed = simulator.with_effects([effect.with_values(**{name: value})])
+        # The actuator path is applied to the input here, where it has no memory.
+        commands = np.stack(
+            [changed.drive(row[None], np.array([1.0]), 2, "zero")[0] for row in inputs]
+        )
+        durations = np.full(len(states), 0.1 * simulator.dt)
+        ends.append(changed.integrate(states, commands, durations))
+    scale = np.array([channel.scale for channel in simulator.physical_channels])
+    return ((ends[0] - ends[1]) / (scale * change)).ravel()

@@ -1,0 +1,84 @@
+"""Effects of a sensor: what is read differs from what is there."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+from sims.effects.base import Effect, number, place
+from sims.effects.joint import Value
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
+
+
+@dataclasses.dataclass(frozen=True)
+class SensorEffect(Effect):
+    """A change of one state channel on its way to the log.
+
+    Scales act before offsets, whatever their order in a list.
+
+    Attributes:
+        stage: Rank in that order.
+    """
+
+    channel: str
+
+    enters: ClassVar = "sensor"
+    stage: ClassVar[int]
+
+    @abc.abstractmethod
+    def read(self, x: Value) -> Value:
+        """What the sensor reads where ``x`` is true, by row."""
+
+    @abc.abstractmethod
+    def undo(self, x: Value) -> Value:
+        """What is true where the sensor reads ``x``: the inverse of ``read``."""
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """Unit and typical size of the channel."""
+        channels = {c.name: c for c in simulator.state_channels if c.kind != "memory"}
+        channel = place("state channel", self.channel, channels)
+        return {"channel": (channel.unit, channel.scale)}
+
+
+@dataclasses.dataclass(frozen=True)
+class SensorOffset(SensorEffect):
+    """The sensor reads too much by a constant ``offset``."""
+
+    offset: Value = number(share=0.1, channel=1)
+
+    name: ClassVar[str] = "sensor_offset"
+    sentence: ClassVar[str] = "The sensor's zero is wrong: it reads too much by a constant."
+    needs: ClassVar[str] = "a force that depends on the true position, such as gravity"
+    stage: ClassVar[int] = 1
+
+    def read(self, x: Value) -> Value:
+        """Reading."""
+        return x + self.offset
+
+    def undo(self, x: Value) -> Value:
+        """Truth."""
+        return x - self.offset
+
+
+@dataclasses.dataclass(frozen=True)
+class SensorScale(SensorEffect):
+    """The sensor reads ``1 + scale`` times what is there; an angle is not wrapped."""
+
+    scale: Value = number(share=0.1, low=-0.99, channel=0)
+
+    name: ClassVar[str] = "sensor_scale"
+    sentence: ClassVar[str] = "The sensor's scale is wrong: it reads a fixed share too much."
+    needs: ClassVar[str] = "a wide range of positions"
+    stage: ClassVar[int] = 0
+
+    def read(self, x: Value) -> Value:
+        """Reading."""
+        return (1.0 + self.scale) * x
+
+    def undo(self, x: Value) -> Value:
+        """Truth."""
+        return x / (1.0 + self.scale)

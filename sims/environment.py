@@ -1,0 +1,108 @@
+"""Any simulator with a task as a Gymnasium environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from sims.render import Renderer, renderer_for
+from sims.simulator import Array, Simulator
+from sims.tasks import Task
+
+# A state can leave any bound that is written down for it, and Gymnasium insists on a box.
+_UNBOUNDED = np.inf
+
+
+class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
+    """A Gymnasium environment around a simulator and a task.
+
+    Observation: for every state channel in order, an angle as its cosine and sine, anything
+    else divided by the channel's scale; memory channels are hidden. Action: in the units of
+    the action channels. ``info["state"]`` holds the simulator's state, shape (n_s,).
+
+    Args:
+        simulator: Nominal, true or corrected.
+        task: Reward, termination and start states.
+        render_mode: ``"rgb_array"`` or None.
+
+    Raises:
+        ValueError: The simulator cannot be rendered but ``render_mode`` is given.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
+
+    def __init__(
+        self, simulator: Simulator, task: Task, render_mode: str | None = None
+    ) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode {render_mode!r} is not supported; use 'rgb_array'")
+        self.simulator = simulator
+        self.task = task
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": round(1 / simulator.dt)}
+        self._renderer: Renderer | None = renderer_for(simulator) if render_mode else None
+        low = np.array([channel.low for channel in simulator.action_channels])
+        high = np.array([channel.high for channel in simulator.action_channels])
+        self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
+        bounds = np.concatenate(
+            [
+                np.ones(2) if channel.angle else [_UNBOUNDED]
+                for channel in simulator.state_channels
+                if channel.kind != "memory"
+            ]
+        )
+        self.observation_space = gymnasium.spaces.Box(-bounds, bounds, dtype=np.float64)
+        self._state: Array = np.zeros(len(simulator.state_channels))
+        self._steps = 0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin an episode at a start state of the task, or at ``options["state"]``."""
+        super().reset(seed=seed)
+        start = self.task.start(self.np_random)
+        if options and "state" in options:
+            start = options["state"]
+        # Effects with memory append channels that start at rest.
+        self._state = np.zeros(len(self.simulator.state_channels))
+        self._state[: len(start)] = start
+        self._steps = 0
+        return self._observe(), {"state": self._state.copy()}
+
+    def step(
+        self, action: np.ndarray
+    ) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Hold ``action`` for one control period; a time-out is ``truncated``."""
+        states = self._state[None]
+        actions = np.clip(
+            np.asarray(action, float)[None], self.action_space.low, self.action_space.high
+        )
+        next_states = self.simulator.step(states, actions)
+        reward = float(self.task.reward(states, actions, next_states)[0])
+        terminated = bool(self.task.terminal(next_states)[0])
+        self._state = next_states[0]
+        self._steps += 1
+        truncated = self._steps >= self.task.horizon
+        return self._observe(), reward, terminated, truncated, {"state": self._state.copy()}
+
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        """The present state as an RGB picture, shape (height, width, 3), or None."""
+        return self._renderer.frame(self._state) if self._renderer else None
+
+    def _observe(self) -> np.ndarray:
+        return observe(self.simulator, self._state[None])[0]
+
+
+def observe(simulator: Simulator, states: Array) -> Array:
+    """What the policy sees of each state: shape (n, n_s) in, (n, n_observed) out."""
+    columns = []
+    for channel, column in zip(simulator.state_channels, states.T, strict=True):
+        if channel.kind == "memory":
+            continue
+        if channel.angle:
+            columns += [np.cos(column), np.sin(column)]
+        else:
+            columns.append(column / channel.scale)
+    return np.stack(columns, axis=1)

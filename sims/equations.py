@@ -1,0 +1,229 @@
+"""Bring your own system: a simulator from its equation of motion, in about ten lines."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from sims.effects.base import Effect
+from sims.effects.friction import DryFriction
+from sims.host import HostSimulator, Joint
+from sims.simulator import Array, Channel, Parameter
+from sims.sliding import Motion, State, advance, advance_smoothly
+
+# Rows advanced together: many enough to hide Python, few enough to stay in the cache.
+BLOCK = 2048
+
+
+class EquationOfMotion(HostSimulator):
+    """A mechanical system q'' = f(q, v, u, force); it hosts every effect.
+
+    A subclass gives ``state_channels`` (each position and its rate, in any order),
+    ``action_channels``, ``dt``, ``parameters`` and ``acceleration``; ``joints`` only if the
+    forces are not called after the positions or not in N m (angles) and N (the rest).
+
+    Runge-Kutta 4 over ``substeps`` equal sub-steps advances all rows at once. With dry
+    friction a rate that reaches zero is located in the sub-step and held exactly.
+
+    Args:
+        dt: Control period in seconds, if not the class's own.
+        substeps: Sub-steps per control period, if not the class's own.
+        effects: What acts beside the equation.
+    """
+
+    dt = 0.02
+    substeps = 10
+    parameters: Mapping[str, Parameter] = {}
+
+    def __init__(
+        self,
+        dt: float | None = None,
+        substeps: int | None = None,
+        effects: Sequence[Effect] = (),
+    ) -> None:
+        cls = type(self)
+        self.name = getattr(cls, "name", cls.__name__)
+        self.dt = cls.dt if dt is None else dt
+        self.substeps = cls.substeps if substeps is None else substeps
+        self.has_drive_force = cls.drive_force is not EquationOfMotion.drive_force
+        if not hasattr(cls, "joints"):
+            self.joints = tuple(
+                _joint(c, self.state_channels) for c in self.state_channels if c.kind == "rate"
+            )
+        names = [channel.name for channel in self.state_channels]
+        self._positions = [names.index(str(joint.position)) for joint in self.joints]
+        self._rates = [names.index(str(joint.rate)) for joint in self.joints]
+        if len(names) != 2 * len(self.joints):
+            raise ValueError(
+                f"{self.name} has {len(self.joints)} joints and state channels "
+                f"{', '.join(names)}; an equation of motion has one position and one rate for "
+                "each joint (for anything else use FirstOrderSystem)"
+            )
+        self.effects = ()
+        if effects:
+            hosted = self.with_effects(effects)
+            self.effects, self.state_channels = hosted.effects, hosted.state_channels
+
+    @abc.abstractmethod
+    def acceleration(self, q: Array, v: Array, u: Array, force: Array, p: Any) -> Array:
+        """Accelerations of the joints, by row, from elementwise NumPy operations.
+
+        Args:
+            q, v: positions and rates, shape (n, n_joints), in the order of ``joints``.
+            u: inputs, shape (n, n_a).
+            force: further generalized force on each joint, shape (n, n_joints); the
+                acceleration has to be linear in it.
+            p: parameters as attributes, ``p.mass``; scalars or shape (n,).
+
+        Returns:
+            shape (n, n_joints).
+        """
+
+    def drive_force(self, q: Array, v: Array, u: Array, p: Any) -> Array:
+        """Force of the actuators on the joints, part of ``acceleration``; for backlash only."""
+        raise NotImplementedError(f"{type(self).__name__} does not tell its drive force")
+
+    def drive_forces(self, states: Array, inputs: Array) -> Array:
+        """See ``HostSimulator.drive_forces``."""
+        q, v = states[:, self._positions], states[:, self._rates]
+        return self.drive_force(q, v, inputs, SimpleNamespace(**self.parameter_values()))
+
+    def force_scale(self, joint: Joint) -> float:
+        """The joint's own scale, or the force that sets up a typical rate in ten periods."""
+        if joint.scale is not None:
+            return joint.scale
+        j = [other.name for other in self.joints].index(joint.name)
+        joints = len(self.joints)
+        force = np.zeros((2, joints))
+        force[1, j] = 1.0
+        rest, u = np.zeros((2, joints)), np.zeros((2, len(self.action_channels)))
+        values = {name: np.mean(p.value) for name, p in self.parameters.items()}
+        a = self.acceleration(rest, rest, u, force, SimpleNamespace(**values))[:, j]
+        return float(
+            abs(self.state_channels[self._rates[j]].scale / (10 * self.dt * (a[1] - a[0])))
+        )
+
+    def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
+        """See ``HostSimulator.integrate``."""
+        states, inputs = np.asarray(states, float), np.asarray(inputs, float)
+        if len(states) > BLOCK:
+            blocks = [slice(i, i + BLOCK) for i in range(0, len(states), BLOCK)]
+            return np.concatenate(
+                [self.take(b).integrate(states[b], inputs[b], durations[b]) for b in blocks]
+            )
+        motion = self._motion()
+        state = State(
+            np.ascontiguousarray(states[:, self._positions].T),
+            np.ascontiguousarray(states[:, self._rates].T),
+            np.ascontiguousarray(states[:, 2 * len(self.joints) :].T),
+        )
+        for i, (_, play) in enumerate(motion.plays):
+            edge = 0.5 * np.asarray(play.width)
+            state.x[i] = np.clip(state.x[i], -edge, edge)
+        u = np.ascontiguousarray(inputs.transpose(1, 2, 0))
+        h = np.asarray(durations, float) / len(u)
+        move = advance if motion.dry or motion.plays else advance_smoothly
+        for held in u:
+            state = move(motion, state, held, h)
+        after = np.empty_like(states)
+        after[:, self._positions] = state.q.T
+        after[:, self._rates] = state.v.T
+        after[:, 2 * len(self.joints) :] = state.x.T
+        return after
+
+    def _motion(self) -> Motion:
+        names = [joint.name for joint in self.joints]
+        forces = [(names.index(e.joint), e) for e in self.joint_effects()]
+
+        # The system's author sees rows first.
+        def acceleration(q: Array, v: Array, u: Array, f: Array, p: dict[str, Any]) -> Array:
+            found = self.acceleration(q.T, v.T, u.T, f.T, SimpleNamespace(**p))
+            return np.ascontiguousarray(np.asarray(found, float).T)
+
+        def drive_force(q: Array, v: Array, u: Array, p: dict[str, Any]) -> Array:
+            found = self.drive_force(q.T, v.T, u.T, SimpleNamespace(**p))
+            return np.ascontiguousarray(np.asarray(found, float).T)
+
+        return Motion(
+            acceleration,
+            drive_force,
+            self.parameter_values(),
+            smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
+            dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
+            plays=tuple((names.index(e.joint), e) for e in self.plays()),
+        )
+
+
+class FirstOrderSystem(HostSimulator):
+    """A system x' = f(x, u) without joints, such as a heater or a tank.
+
+    It hosts changes of parameters, actuator and sensor effects, and on each state a constant
+    load, which is a constant rate of change. A subclass gives ``state_channels`` (of kind
+    ``"other"``), ``action_channels``, ``dt``, ``parameters`` and ``derivative``.
+
+    Args:
+        dt, substeps, effects: As for ``EquationOfMotion``.
+    """
+
+    dt = 1.0
+    substeps = 5
+    parameters: Mapping[str, Parameter] = {}
+
+    def __init__(
+        self,
+        dt: float | None = None,
+        substeps: int | None = None,
+        effects: Sequence[Effect] = (),
+    ) -> None:
+        cls = type(self)
+        self.name = getattr(cls, "name", cls.__name__)
+        self.dt = cls.dt if dt is None else dt
+        self.substeps = cls.substeps if substeps is None else substeps
+        if not hasattr(cls, "joints"):
+            self.joints = tuple(
+                Joint(c.name, c.name, None, f"{c.unit}/s", c.scale / (10 * self.dt))
+                for c in self.state_channels
+            )
+        self.effects = ()
+        if effects:
+            hosted = self.with_effects(effects)
+            self.effects, self.state_channels = hosted.effects, hosted.state_channels
+
+    @abc.abstractmethod
+    def derivative(self, x: Array, u: Array, p: Any) -> Array:
+        """Rates of change, by row: (n, n_s), (n, n_a) and parameters -> (n, n_s)."""
+
+    def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
+        """See ``HostSimulator.integrate``."""
+        names = [channel.name for channel in self.physical_channels]
+        loads = [(names.index(e.joint), e) for e in self.joint_effects()]
+        p = SimpleNamespace(**self.parameter_values())
+        x = np.ascontiguousarray(np.asarray(states, float).T)
+        inputs = np.ascontiguousarray(np.asarray(inputs, float).transpose(1, 2, 0))
+        h = np.asarray(durations, float) / len(inputs)
+
+        def change(x: Array, u: Array) -> Array:
+            rates = np.array(self.derivative(x.T, u.T, p), float).T
+            for j, load in loads:
+                rates[j] += load.force(x[j], np.zeros_like(x[j]))
+            return rates
+
+        for u in inputs:
+            k1 = change(x, u)
+            k2 = change(x + 0.5 * h * k1, u)
+            k3 = change(x + 0.5 * h * k2, u)
+            k4 = change(x + h * k3, u)
+            x = x + h / 6 * (k1 + 2 * (k2 + k3) + k4)
+        return x.T.copy()
+
+
+def _joint(rate: Channel, channels: Sequence[Channel]) -> Joint:
+    """The joint of a rate channel, called after its position."""
+    position = next((c for c in channels if c.name == rate.rate_of), None)
+    if position is None:
+        raise ValueError(f"channel {rate.name!r} needs rate_of=, the name of its position")
+    return Joint(position.name, position.name, rate.name, "N m" if position.angle else "N")

@@ -1,0 +1,153 @@
+"""The simulator contract: a pure, batched map from state and action to the next state."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Channel:
+    """One named, unit-carrying column of a state or an action.
+
+    Args:
+        name: Identifier, unique within the simulator.
+        unit: SI unit, for example ``"rad"``, ``"rad/s"``, ``"V"``.
+        kind: ``"position"``, ``"rate"`` (time derivative of ``rate_of``), ``"input"``
+            (an action), ``"other"`` (a state of a first-order system), or ``"memory"``
+            (hidden state of an effect, such as the previous input of a delay).
+        angle: True if the channel is an angle, known only up to whole turns.
+        rate_of: For ``kind="rate"``, the name of the position it is the rate of.
+        scale: A typical magnitude in ``unit``; networks and kernels see the channel
+            divided by it (an angle is seen as cosine and sine instead).
+        low, high: Bounds; only inputs are clipped to them.
+    """
+
+    name: str
+    unit: str
+    kind: Literal["position", "rate", "input", "other", "memory"]
+    angle: bool = False
+    rate_of: str | None = None
+    scale: float = 1.0
+    low: float = -math.inf
+    high: float = math.inf
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """A physical parameter that a simulator declares: value, unit, meaning and bounds.
+
+    ``value`` may be an array with one entry per row of a batch.
+    """
+
+    value: float | Array
+    unit: str
+    meaning: str
+    low: float = -math.inf
+    high: float = math.inf
+
+
+class Simulator(abc.ABC):
+    """A system advanced by one control period: ``step(states, actions) -> next states``.
+
+    Contract (``sims.checks.check_simulator`` tests it): ``step`` is a pure function of its
+    rows. The same row gives bit-identical output whatever was stepped before, in any order,
+    alone or in a batch. Angles are not wrapped: a state at 7 rad steps to a state near 7 rad.
+
+    Attributes:
+        name: What it is, for reports.
+        dt: Control period in seconds; the action is held constant over it.
+        state_channels: One per column of a state, n_s of them.
+        action_channels: One per column of an action, n_a of them.
+        parameters: The physical parameters by name.
+    """
+
+    name: str
+    dt: float
+    state_channels: tuple[Channel, ...]
+    action_channels: tuple[Channel, ...]
+    parameters: Mapping[str, Parameter]
+
+    @abc.abstractmethod
+    def step(self, states: ArrayLike, actions: ArrayLike) -> Array:
+        """Advance every row by one control period ``dt``.
+
+        Args:
+            states: shape (n, n_s).
+            actions: shape (n, n_a); clipped to the bounds of ``action_channels``.
+
+        Returns:
+            Next states, shape (n, n_s), angles not wrapped.
+
+        Raises:
+            ValueError: The shapes do not fit the channels.
+        """
+
+    def with_parameters(self, **values: float | Array) -> Self:
+        """A copy with some parameters changed; ``KeyError`` names an unknown one."""
+        raise NotImplementedError(f"{type(self).__name__} has no parameters to change")
+
+    def rollout(self, start: ArrayLike, actions: ArrayLike) -> Array:
+        """Step through a sequence of actions, open loop.
+
+        Args:
+            start: shape (n_s,) or, for n rollouts at once, (n, n_s).
+            actions: shape (T, n_a) or (n, T, n_a).
+
+        Returns:
+            States including the start, shape (T + 1, n_s) or (n, T + 1, n_s).
+        """
+        start, actions = np.asarray(start, float), np.asarray(actions, float)
+        single = start.ndim == 1
+        if single:
+            start, actions = start[None], actions[None]
+        states = np.empty((len(start), actions.shape[1] + 1, start.shape[1]))
+        states[:, 0] = start
+        for k in range(actions.shape[1]):
+            states[:, k + 1] = self.step(states[:, k], actions[:, k])
+        return states[0] if single else states
+
+    def check_rows(self, states: ArrayLike, actions: ArrayLike) -> tuple[Array, Array]:
+        """Both as float arrays of shape (n, n_s) and (n, n_a), actions clipped to their bounds.
+
+        Raises:
+            ValueError: A shape does not fit; the message names the channels expected.
+        """
+        states, actions = np.asarray(states, float), np.asarray(actions, float)
+        for what, rows, channels in (
+            ("states", states, self.state_channels),
+            ("actions", actions, self.action_channels),
+        ):
+            if rows.ndim != 2 or rows.shape[1] != len(channels):
+                names = ", ".join(channel.name for channel in channels)
+                raise ValueError(
+                    f"{what} has shape {rows.shape}, expected (n, {len(channels)}): "
+                    f"one column for each of {names}"
+                )
+        if len(states) != len(actions):
+            raise ValueError(f"{len(states)} states but {len(actions)} actions")
+        low = [channel.low for channel in self.action_channels]
+        high = [channel.high for channel in self.action_channels]
+        return states, np.clip(actions, low, high)
+
+
+def wrap(angle: ArrayLike) -> Array:
+    """Angle folded into [-pi, pi), in radians."""
+    return (np.asarray(angle, float) + np.pi) % (2 * np.pi) - np.pi
+
+
+def state_difference(channels: tuple[Channel, ...], a: ArrayLike, b: ArrayLike) -> Array:
+    """``a - b`` channel by channel, angle differences wrapped; shapes broadcast to (..., n_s)."""
+    difference = np.asarray(a, float) - np.asarray(b, float)
+    for column, channel in enumerate(channels):
+        if channel.angle:
+            difference[..., column] = wrap(difference[..., column])
+    return difference

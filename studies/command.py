@@ -1,0 +1,78 @@
+"""What every study's command line shares: typed settings, grids of trials, one-line errors."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import platform
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from typing import Any, NoReturn
+
+import jsonargparse
+
+_PACKAGES = ("torch", "scikit-learn", "gpytorch", "pymunk", "numpy", "scipy", "gymnasium")
+
+
+class Parser(jsonargparse.ArgumentParser):
+    """An argument parser whose errors are one line on stderr, with exit code 2."""
+
+    def error(self, message: str, ex: Exception | None = None) -> NoReturn:
+        """Say what is wrong and how to learn more, in one line."""
+        reason = re.sub(r"\s*\n\s*-?\s*", " ", str(message).strip())
+        sys.stderr.write(f"error: {reason} (see --help)\n")
+        raise SystemExit(2)
+
+
+def fail(message: str) -> NoReturn:
+    """End the command with one line on stderr and exit code 2: the user can mend it."""
+    sys.stderr.write(f"error: {' '.join(message.split())}\n")
+    raise SystemExit(2)
+
+
+def expand_grid(
+    config: Mapping[str, Any], grid: Sequence[Mapping[str, Sequence[Any]]]
+) -> list[dict[str, Any]]:
+    """The configurations of a grid: the product within each block, one block after another.
+
+    Args:
+        config: Settings that all trials share, nested as in the YAML file.
+        grid: Blocks; each maps a setting (dots reach into groups) to the values it takes.
+
+    Returns:
+        One configuration per trial; duplicates are kept once.
+
+    Raises:
+        ValueError: A setting does not exist or a value is not a list; the message names it.
+    """
+    trials: list[dict[str, Any]] = []
+    for number, block in enumerate(grid, start=1):
+        for key, values in block.items():
+            if not isinstance(values, list):
+                raise ValueError(
+                    f"grid block {number}: {key!r} needs a list of values, got {values!r}"
+                )
+        for values in itertools.product(*block.values()):
+            trial = copy.deepcopy(dict(config))
+            for key, value in zip(block, values, strict=True):
+                _assign(trial, key, value, number)
+            if trial not in trials:
+                trials.append(trial)
+    return trials
+
+
+def _assign(config: dict[str, Any], key: str, value: Any, block: int) -> None:
+    *groups, last = key.split(".")
+    for group in groups:
+        config = config.get(group, {})
+    if not isinstance(config, dict) or last not in config:
+        raise ValueError(f"grid block {block}: there is no setting {key!r}; see --help")
+    config[last] = copy.deepcopy(value)
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, of this package and of what the numbers depend on."""
+    found = {"python": platform.python_version(), "simgap": metadata.version("simgap")}
+    return found | {package: metadata.version(package) for package in _PACKAGES}

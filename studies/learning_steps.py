@@ -1,0 +1,302 @@
+"""The steps of difference learning; each writes what it computed into the folder it is given.
+
+Folders of policies hold ``agent.safetensors``, ``curve.json``, ``summary.json`` and
+``rollout.npz`` (one episode on the true system). Folders of models hold ``fit.json`` and, for
+the estimators of this package, ``difference.safetensors``; any other estimator is refitted
+from the samples when it is needed, because its only file format would be a pickle.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import time
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sklearn.base import BaseEstimator, clone
+
+from policy.ddpg import DDPG, DDPGConfig
+from policy.evaluate import Rollout, collect, rollout
+from policy.noise import OrnsteinUhlenbeck
+from policy.selection import Point, learn_and_select
+from residual.accuracy import accuracy, uniform_rollouts
+from residual.corrected import CorrectedSimulator
+from residual.difference import DifferenceModel
+from residual.persistence import load, save
+from residual.trajectories import Transitions
+from sims.environment import SimulatorEnv
+from sims.simulator import Array, Simulator
+from sims.tasks import Task
+from studies.files import atomic_write_json, read_json
+from studies.progress import Progress
+
+# Tests of the policy while it learns. On a simulator they are free, on the true system they
+# are measurement and not counted, as in the paper.
+EVALUATE_EVERY = 500
+EVALUATE_TRUE_EVERY = 250
+# Accuracy is measured over the first seconds of fresh rollouts: after that a good policy
+# balances, where there is next to nothing to predict.
+VISITED_SECONDS = 2.0
+VISITED_ROLLOUTS = 5
+# Policies learnt from nothing explore more (paper, section IV-C: "slightly higher"; 0.20 in the
+# authors' scripts) and begin with random actions; the same for the baselines.
+COLD_SIGMA = 0.20
+RANDOM_STEPS = 1000
+
+
+@dataclasses.dataclass(frozen=True)
+class Problem:
+    """A system to control and the simulator at hand.
+
+    Attributes:
+        description: What identifies both: plain values only.
+        idealised: The simulator that one has.
+        true: The system that one wants to control; it is only ever sampled.
+        task: Reward, start states, horizon.
+    """
+
+    description: Mapping[str, Any]
+    idealised: Simulator
+    true: Simulator
+    task: Task
+
+    def environment(self, simulator: Simulator) -> SimulatorEnv:
+        """The task on ``simulator``."""
+        return SimulatorEnv(simulator, self.task)
+
+
+@dataclasses.dataclass(frozen=True)
+class LearningSteps:
+    """The steps for one problem, estimator and seed."""
+
+    problem: Problem
+    estimator: BaseEstimator
+    ddpg: DDPGConfig
+    seed: int
+    progress: Progress
+
+    def train_idealised(self, folder: Path, steps: int) -> None:
+        """The policy that one gets from the idealised simulator alone."""
+        agent = self._agent(COLD_SIGMA)
+        title = "train on the idealised model"
+        self._train(folder, agent, self.problem.idealised, steps, title, RANDOM_STEPS)
+
+    def collect(self, folder: Path, policy: Path, samples: int, iteration: int) -> None:
+        """True transitions under a policy with exploration noise."""
+        seed = derived_seed(self.seed, "collect", str(iteration))
+        rollouts = collect(
+            DDPG.load(policy / "agent.safetensors").policy,
+            self.problem.environment(self.problem.true),
+            samples,
+            seed,
+            self._noise(seed),
+        )
+        transitions(rollouts).save(folder / "transitions.npz")
+
+    def fit(self, folder: Path, samples: Sequence[Path]) -> None:
+        """The difference model on all transitions so far."""
+        data = Transitions.join([Transitions.load(part / "transitions.npz") for part in samples])
+        data.save(folder / "transitions.npz")
+        with self.progress.task(f"fit {type(self.estimator).__name__} to {len(data)}", 1) as tell:
+            begin = time.perf_counter()
+            model = DifferenceModel(self.estimator, self.problem.idealised).fit(data)
+            seconds = time.perf_counter() - begin
+            tell(1, "")
+        # Other libraries' estimators have no file format but pickle: they are fitted again.
+        with contextlib.suppress(TypeError):
+            save(model, folder / "difference.safetensors")
+        atomic_write_json(folder / "fit.json", {"fit_seconds": seconds})
+
+    def train_corrected(
+        self, folder: Path, model: Path, policy: Path, first: Path | None, steps: int
+    ) -> None:
+        """DDPG on the corrected simulator, from the last policy's networks.
+
+        From the second update on, the replay begins with the first update's transitions
+        (paper, section III-C).
+        """
+        agent = DDPG.load(first / "agent.safetensors") if first else self._agent()
+        agent.restore(DDPG.load(policy / "agent.safetensors").networks())
+        corrected = self.corrected(model)
+        self._train(folder, agent, corrected, steps, "train on the corrected model")
+
+    def train_on_true(self, folder: Path, start: Path | None, steps: int) -> None:
+        """A baseline: DDPG on the true system, from nothing or from a policy's networks."""
+        if start is None:
+            agent, title, random_steps = self._agent(COLD_SIGMA), "cold start", RANDOM_STEPS
+        else:
+            agent, title, random_steps = self._agent(), "warm start", 0
+            agent.restore(DDPG.load(start / "agent.safetensors").networks())
+        title += " on the true system"
+        self._train(folder, agent, self.problem.true, steps, title, random_steps)
+
+    def measure(self, folder: Path, model: Path, policy: Path) -> None:
+        """Accuracy of the model along fresh true rollouts of the policy trained on it."""
+        seed = derived_seed(self.seed, "measure")
+        corrected = self.corrected(model)
+        learnt = DDPG.load(policy / "agent.safetensors").policy
+        env = self.problem.environment(self.problem.true)
+        steps = round(VISITED_SECONDS / corrected.dt)
+        runs = [rollout(learnt, env, seed, max_steps=steps)]
+        runs += [
+            rollout(learnt, env, seed + k, self._noise(seed + k), steps)
+            for k in range(1, VISITED_ROLLOUTS)
+        ]
+        # A run that fell ends early; all are cut to the shortest so that they stack.
+        shortest = min(len(run.rewards) for run in runs)
+        states = np.stack([visited(run)[: shortest + 1] for run in runs])
+        actions = np.stack([run.actions[:shortest] for run in runs])
+        uniform = uniform_rollouts(self.problem.true, np.random.default_rng(seed))
+        atomic_write_json(
+            folder / "accuracy.json",
+            {
+                "visited": accuracy(corrected, states, actions),
+                "uniform": accuracy(corrected, *uniform),
+            },
+        )
+
+    def corrected(self, model: Path) -> CorrectedSimulator:
+        """The idealised simulator with the difference model of a folder."""
+        simulator = self.problem.idealised
+        saved = model / "difference.safetensors"
+        if saved.exists():
+            return CorrectedSimulator(simulator, load(saved, simulator))
+        data = Transitions.load(model / "transitions.npz")
+        return CorrectedSimulator(simulator, DifferenceModel(self.estimator, simulator).fit(data))
+
+    def record(self, folder: Path, name: str, within: int | None = None) -> dict[str, Any]:
+        """The record of a policy for ``results.json``.
+
+        Args:
+            folder: Of the policy.
+            name: ``"idealised"``, ``"difference"``, ``"true"``, ``"cold"`` or ``"warm"``.
+            within: For policies learnt on the true system: read the experiment as if it had
+                ended after so many true samples.
+        """
+        summary = read_json(folder / "summary.json")
+        if within is None:
+            return {"name": name, "iteration": 0, "true_samples": 0, **summary}
+        curve = [point for point in read_json(folder / "curve.json") if point["step"] <= within]
+        best = max(curve, key=lambda point: point["score"])["deterministic"]
+        share = within / summary["simulated_steps"]
+        return {
+            "name": name,
+            "iteration": 0,
+            "true_samples": within,
+            "simulated_steps": 0,
+            "return_true": best,
+            "return_model": best,
+            "seconds": summary["seconds"] * share,
+            "curve": [[point["step"], point["deterministic"]] for point in curve],
+        }
+
+    def _train(
+        self,
+        folder: Path,
+        agent: DDPG,
+        simulator: Simulator,
+        steps: int,
+        title: str,
+        random_steps: int = 0,
+    ) -> None:
+        on_true = simulator is self.problem.true
+        begin = time.perf_counter()
+        with self.progress.task(title, steps) as tell:
+
+            def report(point: Point) -> None:
+                tell(point.step, f"return {point.deterministic:.0f}")
+
+            selection = learn_and_select(
+                agent,
+                self.problem.environment(simulator),
+                self.problem.environment(simulator),
+                steps,
+                every=EVALUATE_TRUE_EVERY if on_true else EVALUATE_EVERY,
+                # On the true system the test is the measure itself; on a model, rollouts with
+                # noise keep a policy from being chosen for one lucky path through its errors.
+                noisy=0 if on_true else 3,
+                seed=derived_seed(self.seed, "select"),
+                callback=report,
+                random_steps=random_steps,
+            )
+        seconds = time.perf_counter() - begin
+        agent.restore(selection.networks)
+        true = rollout(
+            selection.policy, self.problem.environment(self.problem.true), self.seed
+        )
+        agent.save(folder / "agent.safetensors")
+        np.savez_compressed(
+            folder / "rollout.npz", states=visited(true), actions=true.actions, rewards=true.rewards
+        )
+        atomic_write_json(
+            folder / "curve.json", [dataclasses.asdict(point) for point in selection.curve]
+        )
+        atomic_write_json(
+            folder / "summary.json",
+            {
+                "simulated_steps": steps,
+                "return_true": true.total,
+                "return_model": selection.best.deterministic,
+                "seconds": seconds,
+            },
+        )
+
+    def _agent(self, sigma: float | None = None) -> DDPG:
+        env = self.problem.environment(self.problem.idealised)
+        config = dataclasses.replace(self.ddpg, noise_sigma=sigma) if sigma else self.ddpg
+        return DDPG.for_env(env, config, self.seed)
+
+    def _noise(self, seed: int) -> OrnsteinUhlenbeck:
+        size = len(self.problem.true.action_channels)
+        c = self.ddpg
+        return OrnsteinUhlenbeck(
+            size, c.noise_sigma, c.noise_theta, np.random.default_rng(seed)
+        )
+
+
+def transitions(rollouts: Sequence[Rollout]) -> Transitions:
+    """The steps of rollouts, each its own episode."""
+    parts = [
+        Transitions(
+            visited(run)[:-1],
+            run.actions,
+            visited(run)[1:],
+            np.zeros(len(run.rewards), dtype=np.int64),
+        )
+        for run in rollouts
+    ]
+    return Transitions.join(parts)
+
+
+def visited(run: Rollout) -> Array:
+    """The simulator's states along a rollout, shape (T + 1, n_s)."""
+    if run.states is None:
+        raise ValueError("the environment does not report info['state'], the simulator's state")
+    return run.states
+
+
+def derived_seed(seed: int, *purpose: str) -> int:
+    """A seed of its own for each purpose, the same on every machine."""
+    return zlib.crc32("/".join([str(seed), *purpose]).encode())
+
+
+def describe(estimator: BaseEstimator) -> dict[str, Any]:
+    """The class and the settings of an estimator, in plain values."""
+    kind = type(estimator)
+    parameters = {name: repr(value) for name, value in estimator.get_params().items()}
+    return {"class_path": f"{kind.__module__}.{kind.__qualname__}", "parameters": parameters}
+
+
+def seeded(estimator: BaseEstimator, seed: int) -> BaseEstimator:
+    """A clone with every unset ``random_state`` set."""
+    copy = clone(estimator)
+    unset = [
+        name
+        for name, value in copy.get_params().items()
+        if name.split("__")[-1] == "random_state" and value is None
+    ]
+    return copy.set_params(**dict.fromkeys(unset, derived_seed(seed, "estimator") % 2**31))

@@ -1,0 +1,204 @@
+"""The building blocks of a report: frozen dataclasses, each with the template of its name."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import ClassVar, Literal
+
+from matplotlib.figure import Figure as MatplotlibFigure
+
+from studies.reporting.media import Media, load_media, narrowed, still
+from studies.reporting.render import render
+
+Source = MatplotlibFigure | Media | bytes | str | Path
+Cell = str | float | int | bool | None
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Section:
+    """What every section has: an optional heading, and a template that turns it into HTML.
+
+    A section of your own is a subclass that overrides ``html``; escape what you put in it.
+    """
+
+    heading: str = ""
+    template: ClassVar[str]
+
+    def html(self) -> str:
+        """The section's body, without its heading."""
+        return render(self.template, section=self)
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict(Section):
+    """The answer, in a banner.
+
+    Args:
+        headline: One sentence a busy reader can act on.
+        text: What it rests on; markup as in ``Prose``.
+        tone: Colour of the banner; the words in ``label`` say the same.
+        label: A word or two above the headline, such as ``"confirmed"``.
+    """
+
+    template: ClassVar[str] = "verdict.html"
+    headline: str
+    text: str = ""
+    tone: Literal["good", "warning", "bad", "neutral"] = "neutral"
+    label: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Prose(Section):
+    """Text: blank lines part paragraphs, ``- `` starts a list item.
+
+    Inside a line: ``**strong**``, ```` `code` ```` and ``[words](address)``. All else is shown
+    as it stands.
+    """
+
+    template: ClassVar[str] = "prose.html"
+    text: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Figure(Section):
+    """One picture.
+
+    Args:
+        source: A matplotlib figure, or the bytes or path of a PNG, SVG or JPEG.
+        alt: What it shows, for those who cannot see it: the finding, not "a plot".
+        caption: Text under it; markup as in ``Prose``.
+        narrow: Shown instead on screens up to 640 px wide, where the text of a wide figure becomes
+            too small; a matplotlib figure of one column is laid out anew by itself.
+    """
+
+    template: ClassVar[str] = "figure.html"
+    source: Source
+    alt: str
+    caption: str = ""
+    narrow: Source | None = None
+
+    @property
+    def picture(self) -> Media:
+        """``source``, ready to be put into the page."""
+        return load_media(self.source)
+
+    @property
+    def narrow_picture(self) -> Media | None:
+        """``narrow``, or the figure laid out anew, ready to be put into the page."""
+        return narrowed(self.source) if self.narrow is None else load_media(self.narrow)
+
+    def small(self) -> Figure:
+        """The same with its narrow picture at any width."""
+        picture = self.narrow_picture or self.picture
+        return dataclasses.replace(self, source=picture, narrow=None)
+
+
+@dataclasses.dataclass(frozen=True)
+class Gallery(Section):
+    """Small pictures side by side, as many in a row as fit."""
+
+    template: ClassVar[str] = "gallery.html"
+    figures: Sequence[Figure | Animation]
+    caption: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Animation(Section):
+    """A moving picture; readers who ask their system for less motion see one still of it.
+
+    Args:
+        source: Bytes or path of a GIF, MP4 or WebM; see ``media.encode_gif``.
+        alt: What happens in it.
+        caption: Text under it; markup as in ``Prose``.
+    """
+
+    template: ClassVar[str] = "animation.html"
+    source: bytes | str | Path
+    alt: str
+    caption: str = ""
+
+    @property
+    def picture(self) -> Media:
+        """``source``, ready to be put into the page."""
+        return load_media(self.source)
+
+    @property
+    def still(self) -> Media | None:
+        """The middle frame of a GIF; None for a video, which waits for the reader anyway."""
+        return still(self.picture)
+
+    def small(self) -> Animation:
+        """Itself: an animation has one size."""
+        return self
+
+
+@dataclasses.dataclass(frozen=True)
+class Table(Section):
+    """A table; on a phone each row of a wide one becomes a small card.
+
+    Args:
+        columns: Headings. The first column names the row.
+        rows: Cells; numbers are shown to ``digits`` significant digits, None and NaN as a dash.
+        caption: Text above it; markup as in ``Prose``.
+        highlight: Numbers of rows (from 0) to stress.
+        digits: Significant digits of floats; integers are shown in full.
+
+    Raises:
+        ValueError: A row has not as many cells as there are columns.
+    """
+
+    template: ClassVar[str] = "table.html"
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+    caption: str = ""
+    highlight: Sequence[int] = ()
+    digits: int = 3
+
+    def __post_init__(self) -> None:
+        for number, row in enumerate(self.rows):
+            if len(row) != len(self.columns):
+                raise ValueError(
+                    f"row {number} of the table has {len(row)} cells, expected "
+                    f"{len(self.columns)}: one for each of {', '.join(self.columns)}"
+                )
+
+    @property
+    def numeric(self) -> list[bool]:
+        """Per column: does it hold numbers only (None apart)?"""
+        columns = zip(*self.rows, strict=True) if self.rows else [()] * len(self.columns)
+        return [
+            any(cell is not None for cell in cells)
+            and all(_is_number(cell) for cell in cells if cell is not None)
+            for cells in columns
+        ]
+
+
+@dataclasses.dataclass(frozen=True)
+class KeyValues(Section):
+    """Names and their values.
+
+    Args:
+        items: Value by name, in order; a unit belongs into the value's text.
+        style: ``"tiles"`` for up to about six headline numbers, ``"list"`` for settings.
+        digits: Significant digits of floats.
+    """
+
+    template: ClassVar[str] = "key_values.html"
+    items: Mapping[str, Cell]
+    style: Literal["list", "tiles"] = "list"
+    digits: int = 3
+
+
+@dataclasses.dataclass(frozen=True)
+class Code(Section):
+    """Text shown letter by letter (a command, a config), folded under ``summary`` if given."""
+
+    template: ClassVar[str] = "code.html"
+    text: str
+    summary: str = ""
+
+
+def _is_number(cell: Cell) -> bool:
+    return isinstance(cell, float | int) and not isinstance(cell, bool)

@@ -1,0 +1,57 @@
+"""Means over seeds with their intervals."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import stats
+
+
+@dataclasses.dataclass(frozen=True)
+class Mean:
+    """A mean over seeds.
+
+    Attributes:
+        value: The mean.
+        half_width: Half of its 95 % interval by Student's t; NaN for a single seed.
+        worst: The smallest value.
+        count: Number of seeds.
+    """
+
+    value: float
+    half_width: float
+    worst: float
+    count: int
+
+    @property
+    def low(self) -> float:
+        """Lower end of the interval; the mean itself for a single seed."""
+        return self.value - np.nan_to_num(self.half_width)
+
+    @property
+    def high(self) -> float:
+        """Upper end of the interval; the mean itself for a single seed."""
+        return self.value + np.nan_to_num(self.half_width)
+
+    def __str__(self) -> str:
+        if self.count == 1:
+            return f"{self.value:.1f}"
+        return f"{self.value:.1f} ± {self.half_width:.1f}"
+
+
+def mean(values: Sequence[float]) -> Mean:
+    """The mean of a sample of independent runs with its 95 % interval.
+
+    Raises:
+        ValueError: No values.
+    """
+    sample = np.asarray(values, float)
+    if not len(sample):
+        raise ValueError("a mean needs at least one value")
+    half = np.nan
+    if len(sample) > 1:
+        standard_error = sample.std(ddof=1) / np.sqrt(len(sample))
+        half = float(stats.t.ppf(0.975, len(sample) - 1) * standard_error)
+    return Mean(float(sample.mean()), half, float(sample.min()), len(sample))

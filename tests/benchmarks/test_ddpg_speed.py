@@ -1,0 +1,181 @@
+"""DDPG's speed on one core: against stable-baselines3, and against its own matrix products.
+
+Run with ``pytest tests/benchmarks/test_ddpg_speed.py --benchmark-only``. What is compared runs
+in turns, and the ratios are in the ``extra_info`` of ``--benchmark-json``. "Same work" is ``STEPS``
+steps of one environment with one update of batch 64 each, networks 400 and 300 wide, float32. The
+critics differ in one place: stable-baselines3 feeds the action to the first layer, ours, as in the
+DDPG paper, to the second.
+"""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from torch.utils._python_dispatch import TorchDispatchMode
+
+from policy import DDPG, DDPGConfig
+
+# Processor time of this one thread: another program on the core then does not count.
+TIMER = time.thread_time
+pytestmark = pytest.mark.benchmark(timer=TIMER)
+STEPS = 200
+SIZES = {"pendulum": (3, 1), "leo": (15, 6)}
+
+
+class Free(gymnasium.Env[np.ndarray, np.ndarray]):
+    """An environment that costs next to nothing, of any size; episodes of 400 steps."""
+
+    def __init__(self, observations: int, actions: int) -> None:
+        self.observation_space = gymnasium.spaces.Box(-10, 10, (observations,))
+        self.action_space = gymnasium.spaces.Box(-1, 1, (actions,))
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[np.ndarray, dict]:
+        super().reset(seed=seed)
+        self.k = 0
+        self.x = self.np_random.normal(size=self.observation_space.shape).astype(np.float32)
+        return self.x, {}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+        self.k += 1
+        self.x = 0.9 * self.x
+        self.x[0] += action[0]
+        return self.x.astype(np.float32), -abs(float(self.x[0])), False, self.k == 400, {}
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture(params=SIZES)
+def env(request: pytest.FixtureRequest) -> gymnasium.Env[np.ndarray, np.ndarray]:
+    return Free(*SIZES[request.param])
+
+
+def trained(env: gymnasium.Env[np.ndarray, np.ndarray]) -> DDPG:
+    agent = DDPG.for_env(env, DDPGConfig(warm_up=100))
+    agent.learn(env, 300)
+    return agent
+
+
+def measure(
+    benchmark: Any, work: Callable[[], Any], peer: Callable[[], Any] = lambda: None
+) -> float:
+    """Time ``work`` in rounds, before each of them ``peer``; returns the peer's median time."""
+    times = []
+
+    def run_peer() -> None:
+        start = TIMER()
+        peer()
+        times.append(TIMER() - start)
+
+    for _ in range(2):
+        work()
+        peer()
+    benchmark.pedantic(work, setup=run_peer, rounds=10)
+    return float(np.median(times))
+
+
+def test_learn_against_stable_baselines3(benchmark, env):
+    agent = trained(env)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        peer = pytest.importorskip("stable_baselines3").DDPG(
+            "MlpPolicy",
+            env,
+            policy_kwargs={"net_arch": [400, 300]},
+            batch_size=64,
+            buffer_size=300_000,
+            tau=1e-3,
+            learning_starts=100,
+            train_freq=1,
+            gradient_steps=1,
+            seed=0,
+            device="cpu",
+        )
+        peer.learn(300)
+        before = agent.updates, peer._n_updates
+        peer_time = measure(
+            benchmark,
+            lambda: agent.learn(env, STEPS),
+            lambda: peer.learn(STEPS, reset_num_timesteps=False),
+        )
+    assert (agent.updates - before[0], peer._n_updates - before[1]) == (12 * STEPS, 12 * STEPS)
+    own_time = benchmark.stats.stats.median
+    benchmark.extra_info["steps_per_second"] = STEPS / own_time
+    benchmark.extra_info["stable_baselines3_steps_per_second"] = STEPS / peer_time
+    benchmark.extra_info["times_stable_baselines3"] = peer_time / own_time
+
+
+class _Products(TorchDispatchMode):
+    """Notes every matrix product, with its operands."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.calls: list[tuple[Any, tuple, dict]] = []
+
+    def __torch_dispatch__(self, func, types, args=(), kwargs=None):
+        if func.overloadpacket in (torch.ops.aten.mm, torch.ops.aten.addmm):
+            self.calls.append((func, args, kwargs or {}))
+        return func(*args, **(kwargs or {}))
+
+
+def _operations(calls: list[tuple[Any, tuple, dict]]) -> int:
+    """Multiplications and additions in the products of one update."""
+    return sum(
+        2 * args[-2].shape[0] * args[-2].shape[1] * args[-1].shape[1] for _, args, _ in calls
+    )
+
+
+def test_update_against_its_products(benchmark, env):
+    """The peer is the very products of one update, on the same tensors, without the rest."""
+    agent = trained(env)
+    with _Products() as products:
+        agent.update()
+    assert _operations(products.calls) > 8 * 2 * 64 * 400 * 300
+
+    @torch.inference_mode()
+    def alone() -> None:
+        for _ in range(STEPS):
+            for func, args, kwargs in products.calls:
+                func(*args, **kwargs)
+
+    large = torch.randn(3, 1024, 1024, generator=torch.Generator().manual_seed(0))
+    peaks = []
+
+    def products_and_peak() -> None:
+        start = TIMER()
+        torch.mm(large[0], large[1], out=large[2])
+        peaks.append(2 * 1024**3 / (TIMER() - start))
+        alone()
+
+    def update() -> None:
+        for _ in range(STEPS):
+            agent.update()
+
+    peer_time = measure(benchmark, update, products_and_peak)
+    peak = float(np.median(peaks))
+    peer_time -= 2 * 1024**3 / peak
+    own_time = benchmark.stats.stats.median
+    operations = STEPS * _operations(products.calls)
+    benchmark.extra_info["updates_per_second"] = STEPS / own_time
+    benchmark.extra_info["share_of_products"] = peer_time / own_time
+    benchmark.extra_info["matrix_peak_gflop_per_second"] = peak / 1e9
+    benchmark.extra_info["share_of_peak"] = operations / own_time / peak
+
+
+def test_act_one_row(benchmark, env):
+    agent = DDPG.for_env(env)
+    observation, _ = env.reset(seed=0)
+    measure(benchmark, lambda: [agent.act(observation) for _ in range(STEPS)])
+    benchmark.extra_info["microseconds"] = 1e6 * benchmark.stats.stats.median / STEPS
