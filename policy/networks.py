@@ -1,6 +1,6 @@
 """The actor and the critic with their gradients written out as matrix products.
 
-Autograd's bookkeeping costs as much as a third of the arithmetic at these sizes. Here every
+Autograd's bookkeeping is a noticeable share of an update at these sizes. Here every
 network is one flat tensor (so that an optimiser step or a target update is one call), a pass
 writes into buffers that are allocated once, and no product is computed that is not used: the
 actor's step takes from the critic only the gradient with respect to the action.

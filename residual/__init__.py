@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from residual.registration import register
 
 if TYPE_CHECKING:
-    from residual.accuracy import accuracy
+    from residual.accuracy import Accuracy, accuracy_along
     from residual.corrected import CorrectedSimulator
     from residual.difference import DifferenceModel
     from residual.dropout_net import DropoutNet
@@ -21,12 +21,13 @@ if TYPE_CHECKING:
     from residual.persistence import load, save
 
 __all__ = [
+    "Accuracy",
     "CorrectedSimulator",
     "DifferenceModel",
     "DropoutNet",
     "GaussianProcess",
     "Linear",
-    "accuracy",
+    "accuracy_along",
     "load",
     "save",
 ]
@@ -37,7 +38,8 @@ _HOMES = {
     "DropoutNet": "dropout_net",
     "GaussianProcess": "gaussian_process",
     "Linear": "linear",
-    "accuracy": "accuracy",
+    "Accuracy": "accuracy",
+    "accuracy_along": "accuracy",
     "load": "persistence",
     "save": "persistence",
 }

@@ -38,7 +38,7 @@ class Accuracy:
     coverage90: float | None
 
 
-def accuracy(
+def accuracy_along(
     corrected: CorrectedSimulator,
     states: Array,
     actions: Array,

@@ -52,11 +52,12 @@ class GaussianProcess(Estimator):
         noise_: Noise variance, shape (n_out,), in the same unit.
         points_: The rows or inducing points conditioned on, standardised, shape (m, n_in).
         exact_: Whether they are all rows.
+        n_iter_: Iterations of L-BFGS for each output, shape (n_out,).
     """
 
     _learned: ClassVar[tuple[str, ...]] = (
         "center_", "column_scale_", "lengthscale_", "outputscale_", "noise_", "points_",
-        "weights_", "exact_", "factors_",
+        "weights_", "exact_", "factors_", "n_iter_",
     )  # fmt: skip
 
     def __init__(
@@ -91,6 +92,7 @@ class GaussianProcess(Estimator):
         self.lengthscale_ = np.array([part[0] for part in found])
         self.outputscale_ = np.array([part[1] for part in found])
         self.noise_ = np.array([part[2] for part in found])
+        self.n_iter_ = np.array([part[3] for part in found])
         self.exact_ = len(X) <= self.max_points
         if self.exact_:
             self.points_ = X
@@ -214,8 +216,8 @@ class GaussianProcess(Estimator):
 
 def maximise_likelihood(
     X: Array, y: Array, kernel: str, max_iter: int
-) -> tuple[Array, float, float]:
-    """Length scales, signal variance and noise variance of largest marginal likelihood.
+) -> tuple[Array, float, float, int]:
+    """Length scales, signal and noise variance of largest marginal likelihood, and iterations.
 
     Args:
         X: standardised inputs, shape (n, n_in).
@@ -223,8 +225,12 @@ def maximise_likelihood(
         kernel: ``"rbf"`` or ``"matern"``.
         max_iter: Most iterations of L-BFGS.
     """
-    import gpytorch
     import torch
+
+    with warnings.catch_warnings():
+        # It uses torch.jit.script, which warns that it is deprecated.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        import gpytorch
 
     def positive() -> gpytorch.constraints.Positive:
         return gpytorch.constraints.Positive(transform=torch.exp, inv_transform=torch.log)
@@ -289,6 +295,7 @@ def maximise_likelihood(
         base.lengthscale.detach().numpy().ravel().copy(),
         float(process.kernel.outputscale.item()),
         float(process.likelihood.noise.item()),
+        max(int(found.nit), 1),
     )
 
 

@@ -52,8 +52,8 @@ def check_simulator(
     """
     rng = rng or np.random.default_rng(0)
     if states is None or actions is None:
-        size = 24 if states is None and actions is None else len(np.asarray(states or actions))
-        drawn = _draw(simulator, size, rng)
+        given = actions if states is None else states
+        drawn = _draw(simulator, 24 if given is None else len(np.asarray(given)), rng)
         states = drawn[0] if states is None else states
         actions = drawn[1] if actions is None else actions
     states, actions = simulator.check_rows(states, actions)

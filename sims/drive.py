@@ -2,6 +2,8 @@
 
 An input is averaged over each sub-step, as the difference of its cumulative integral, so that
 a jump or a delay that falls between two samples is exact in the mean and smooth in the delay.
+Beside the mean goes the rise of a straight line that keeps the first moment as well: without
+it, every jump inside a sub-step would leave a lasting error of the position.
 """
 
 from __future__ import annotations
@@ -44,10 +46,13 @@ def lags(effects: Iterable[ActuatorEffect]) -> list[ActuatorLag]:
     return [effect for effect in effects if isinstance(effect, ActuatorLag)]
 
 
-def substep_means(
+def substep_inputs(
     samples: Array, durations: Array, substeps: int, delay: float | Array, hold: Hold
-) -> Array:
-    """Mean of a delayed input over every sub-step.
+) -> tuple[Array, Array]:
+    """Mean and rise of a delayed input in every sub-step.
+
+    The rise is the difference between both ends of the straight line that has the same mean
+    and the same first moment as the input; with it, positions are right too.
 
     Args:
         samples: (rows, T) values of the input at the start of each sample interval.
@@ -59,55 +64,104 @@ def substep_means(
             input has its first value.
 
     Returns:
-        (rows, T, substeps).
+        Means and rises, each (rows, T, substeps).
     """
     rows, length = samples.shape
     following = np.concatenate([samples[:, 1:], samples[:, -1:]], axis=1)
     slope = (following - samples) if hold == "linear" else np.zeros_like(samples)
     middles = (np.arange(substeps) + 0.5) / substeps
     prompt = samples[:, :, None] + slope[:, :, None] * middles
+    prompt_rise = np.broadcast_to(slope[:, :, None] / substeps, prompt.shape)
     late = np.broadcast_to(np.asarray(delay, float), (rows,))
     if not late.any():
-        return prompt
+        return prompt, prompt_rise
     starts = np.concatenate([[0.0], np.cumsum(durations)])
-    whole = np.cumsum((samples + 0.5 * slope) * durations, axis=1)
-    whole = np.concatenate([np.zeros((rows, 1)), whole], axis=1)
+    lengths = np.broadcast_to(durations, samples.shape)
+    # Integrals of the input, and of its integral, up to every sample.
+    once = _running(samples * lengths + 0.5 * slope * lengths)
+    twice = _running(once[:, :-1] * lengths + 0.5 * samples * lengths**2 + slope * lengths**2 / 6)
     edges = starts[:-1, None] + durations[:, None] * np.arange(substeps) / substeps
     times = np.append(edges.ravel(), starts[-1]) - late[:, None]
     k = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, length - 1)
     into = times - starts[k]
     value = np.take_along_axis(samples, k, axis=1)
-    rise = np.take_along_axis(slope, k, axis=1) / durations[k]
-    rise = np.where(into < 0, 0.0, rise)
-    integral = np.take_along_axis(whole, k, axis=1) + into * (value + 0.5 * rise * into)
-    means = np.diff(integral, axis=1).reshape(rows, length, substeps)
-    means /= (durations / substeps)[:, None]
-    return np.where(late[:, None, None] > 0, means, prompt)
+    steep = np.where(into < 0, 0.0, np.take_along_axis(slope, k, axis=1) / durations[k])
+    first = np.take_along_axis(once, k, axis=1)
+    integral = first + into * (value + 0.5 * steep * into)
+    area = np.take_along_axis(twice, k, axis=1) + into * (
+        first + into * (0.5 * value + steep * into / 6)
+    )
+    h = np.repeat(durations / substeps, substeps)
+    means = np.diff(integral, axis=1) / h
+    # By parts: the moment about the middle is h (I0 + I1) / 2 - (A1 - A0).
+    moment = 0.5 * h * (integral[:, :-1] + integral[:, 1:]) - np.diff(area, axis=1)
+    rises = 12 * moment / (h * h)
+    shape = (rows, length, substeps)
+    there = late[:, None, None] > 0
+    return (
+        np.where(there, means.reshape(shape), prompt),
+        np.where(there, rises.reshape(shape), prompt_rise),
+    )
+
+
+def _running(parts: Array) -> Array:
+    """Sums of the first 0, 1, 2, ... parts along the second axis."""
+    return np.concatenate([np.zeros((len(parts), 1)), np.cumsum(parts, axis=1)], axis=1)
 
 
 def lagged(
-    means: Array, durations: Array, time_constant: float | Array, start: Array
-) -> tuple[Array, Array]:
-    """First-order filter of an input that is held over each sub-step, exactly.
+    means: Array,
+    rises: Array,
+    durations: Array,
+    time_constant: float | Array,
+    start: Array,
+) -> tuple[Array, Array, Array]:
+    """First-order filter of an input that runs straight in each sub-step, exactly.
 
     Args:
-        means: (rows, T, substeps).
+        means, rises: (rows, T, substeps).
         durations: (T,) seconds.
         time_constant: Seconds, scalar or (rows,); zero leaves the input as it is.
         start: (rows,) output before the first sub-step.
 
     Returns:
-        Means of the output, same shape, and its last value, (rows,).
+        Means and rises of the output, same shapes, and its last value, (rows,).
     """
-    filtered = np.empty_like(means)
-    y = np.array(start, float)
-    for k, duration in enumerate(durations / means.shape[2]):
-        with np.errstate(divide="ignore"):
-            ratio = duration / np.asarray(time_constant, float)
-        stays = np.exp(-ratio)
-        share = -np.expm1(-ratio) / ratio
-        for i in range(means.shape[2]):
-            u = means[:, k, i]
-            filtered[:, k, i] = u + (y - u) * share
-            y = u + (y - u) * stays
-    return filtered, y
+    substeps = means.shape[2]
+    constants = np.broadcast_to(np.asarray(time_constant, float), len(means))
+    with np.errstate(divide="ignore"):
+        ratio = (durations / substeps) / constants[:, None]
+    stays = np.exp(-ratio)
+    # The output follows the line at a distance, and what it lacked at first fades.
+    behind = rises / ratio[..., None]
+    first, last = means - 0.5 * rises - behind, means + 0.5 * rises - behind
+    gained = last - first * stays[..., None]
+    # Only from interval to interval is it a recursion in Python; inside, all rows at once.
+    added = np.zeros_like(ratio)
+    for i in range(substeps):
+        added = added * stays + gained[:, :, i]
+    kept = stays**substeps
+    begins = np.empty_like(ratio)
+    y = np.array(np.broadcast_to(start, len(means)), float)
+    for k in range(ratio.shape[1]):
+        begins[:, k] = y
+        y = kept[:, k] * y + added[:, k]
+    share, tilt = -np.expm1(-ratio) / ratio, _tilt(ratio)
+    filtered, tilted = np.empty_like(means), np.empty_like(means)
+    now = begins
+    for i in range(substeps):
+        lack = now - first[:, :, i]
+        filtered[:, :, i] = means[:, :, i] - behind[:, :, i] + lack * share
+        tilted[:, :, i] = rises[:, :, i] + lack * tilt
+        now = stays * now + gained[:, :, i]
+    return filtered, tilted, y
+
+
+def _tilt(ratio: Array) -> Array:
+    """Rise of the line with the mean and first moment of exp(-ratio s), s in [0, 1]."""
+    large = np.minimum(np.maximum(ratio, 0.02), 700.0)
+    faded = np.exp(-large)
+    exact = 12 * ((1 - faded - large * faded) / large**2 - (1 - faded) / (2 * large))
+    small = np.minimum(ratio, 0.02)
+    series = -small * (1 - small / 2 + 3 * small**2 / 20 - small**3 / 30)
+    return np.where(ratio < 0.02, series, np.where(np.isinf(ratio), 0.0, exact))

@@ -124,11 +124,10 @@ class EquationOfMotion(HostSimulator):
         for i, (_, play) in enumerate(motion.plays):
             edge = 0.5 * np.asarray(play.width)
             state.x[i] = np.clip(state.x[i], -edge, edge)
-        u = np.ascontiguousarray(inputs.transpose(1, 2, 0))
-        h = np.asarray(durations, float) / len(u)
+        h = np.asarray(durations, float) / inputs.shape[1]
         move = advance if motion.dry or motion.plays else advance_smoothly
-        for held in u:
-            state = move(motion, state, held, h)
+        for u in substep_ends(inputs):
+            state = move(motion, state, u, h)
         after = np.empty_like(states)
         after[:, self._positions] = state.q.T
         after[:, self._rates] = state.v.T
@@ -142,11 +141,11 @@ class EquationOfMotion(HostSimulator):
         # The system's author sees rows first.
         def acceleration(q: Array, v: Array, u: Array, f: Array, p: dict[str, Any]) -> Array:
             found = self.acceleration(q.T, v.T, u.T, f.T, SimpleNamespace(**p))
-            return np.ascontiguousarray(np.asarray(found, float).T)
+            return _by_joint(found, q.shape, "acceleration")
 
         def drive_force(q: Array, v: Array, u: Array, p: dict[str, Any]) -> Array:
             found = self.drive_force(q.T, v.T, u.T, SimpleNamespace(**p))
-            return np.ascontiguousarray(np.asarray(found, float).T)
+            return _by_joint(found, q.shape, "drive_force")
 
         return Motion(
             acceleration,
@@ -203,22 +202,45 @@ class FirstOrderSystem(HostSimulator):
         loads = [(names.index(e.joint), e) for e in self.joint_effects()]
         p = SimpleNamespace(**self.parameter_values())
         x = np.ascontiguousarray(np.asarray(states, float).T)
-        inputs = np.ascontiguousarray(np.asarray(inputs, float).transpose(1, 2, 0))
-        h = np.asarray(durations, float) / len(inputs)
+        inputs = np.asarray(inputs, float)
+        h = np.asarray(durations, float) / inputs.shape[1]
 
         def change(x: Array, u: Array) -> Array:
-            rates = np.array(self.derivative(x.T, u.T, p), float).T
+            rates = _by_joint(self.derivative(x.T, u.T, p), x.shape, "derivative")
             for j, load in loads:
                 rates[j] += load.force(x[j], np.zeros_like(x[j]))
             return rates
 
-        for u in inputs:
-            k1 = change(x, u)
-            k2 = change(x + 0.5 * h * k1, u)
-            k3 = change(x + 0.5 * h * k2, u)
-            k4 = change(x + h * k3, u)
+        for start, end in substep_ends(inputs):
+            middle = 0.5 * (start + end)
+            k1 = change(x, start)
+            k2 = change(x + 0.5 * h * k1, middle)
+            k3 = change(x + 0.5 * h * k2, middle)
+            k4 = change(x + h * k3, end)
             x = x + h / 6 * (k1 + 2 * (k2 + k3) + k4)
         return x.T.copy()
+
+
+def substep_ends(inputs: Array) -> Array:
+    """Values at both ends of every sub-step, (substeps, 2, n_a, n), rows contiguous."""
+    if inputs.ndim == 3:
+        ends = np.stack([inputs, inputs])
+    else:
+        mean, rise = inputs[..., 0], inputs[..., 1]
+        ends = np.stack([mean - 0.5 * rise, mean + 0.5 * rise])
+    return np.ascontiguousarray(ends.transpose(2, 0, 3, 1))
+
+
+def _by_joint(found: Any, shape: tuple[int, ...], what: str) -> Array:
+    """What the system's author returned, rows last; checked, since broadcasting hides errors."""
+    found = np.array(found, dtype=float)
+    if found.shape != shape[::-1]:
+        raise ValueError(
+            f"{what} returned shape {found.shape}, expected {shape[::-1]}: one row for each "
+            "state. Compute with columns such as q[:, 0], since parameters are scalars or "
+            "shape (n,), and stack the results on axis 1"
+        )
+    return np.ascontiguousarray(found.T)
 
 
 def _joint(rate: Channel, channels: Sequence[Channel]) -> Joint:

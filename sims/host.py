@@ -72,7 +72,8 @@ class HostSimulator(Simulator):
         Args:
             states: shape (n, n_i), columns ``integrated_channels``.
             inputs: shape (n, substeps, n_a), each held over one of equal sub-steps; how many
-                sub-steps there are is read from the shape.
+                sub-steps there are is read from the shape. Or (n, substeps, n_a, 2): mean
+                and rise of an input that runs straight in each sub-step.
             durations: shape (n,) in seconds, one per row.
 
         Returns:
@@ -168,6 +169,9 @@ class HostSimulator(Simulator):
     def step(self, states: ArrayLike, actions: ArrayLike) -> Array:
         """Advance every row by one control period; see ``Simulator.step``."""
         states, actions = self.check_rows(states, actions)
+        if not self.effects:
+            inputs = np.repeat(actions[:, None, :], self.substeps, axis=1)
+            return self.integrate(states, inputs, np.full(len(states), self.dt))
         own = len(self.integrated_channels)
         following = np.empty_like(states)
         inputs, following[:, own:] = self._inputs(states[:, own:], actions)
@@ -183,6 +187,7 @@ class HostSimulator(Simulator):
         substeps: int | None = None,
         hold: path.Hold = "zero",
         before: ArrayLike | None = None,
+        rises: bool = False,
     ) -> Array:
         """Effective inputs of a recorded trajectory: its commands through the actuator path.
 
@@ -194,12 +199,25 @@ class HostSimulator(Simulator):
                 the next (``"linear"``).
             before: shape (k, n_a), earlier commands, as far apart as the first interval is
                 long; without them the input is taken to have had its first value.
+            rises: Whether to tell how the input runs within sub-steps too. ``integrate`` is
+                then more accurate after jumps between sub-steps, with lags, and with
+                ``hold="linear"``.
 
         Returns:
             Mean input of each sub-step, shape (T, substeps, n_a), or, if values of actuator
-            effects are arrays of length V, (V, T, substeps, n_a).
+            effects are arrays of length V, (V, T, substeps, n_a); with ``rises`` a last
+            axis of 2 is added, for mean and rise.
+
+        Raises:
+            ValueError: The shapes do not fit, or a duration is not positive.
         """
         actions, durations = np.asarray(actions, float), np.asarray(durations, float)
+        expected = (len(durations), len(self.action_channels))
+        if actions.shape != expected or not (durations > 0).all():
+            raise ValueError(
+                f"actions have shape {actions.shape}, expected {expected}: a row for each of "
+                "the durations, which must be positive, and a column for each input"
+            )
         substeps = substeps or self.substeps
         earlier = np.empty((0, actions.shape[1])) if before is None else np.asarray(before, float)
         k = len(earlier)
@@ -212,14 +230,15 @@ class HostSimulator(Simulator):
             late = path.total_delay(effects)
             if np.ndim(late):
                 samples = np.broadcast_to(samples, (len(np.asarray(late)), samples.shape[1]))
-            means = path.substep_means(samples, durations, substeps, late, hold)
+            means, rise = path.substep_inputs(samples, durations, substeps, late, hold)
             for lag in path.lags(effects):
-                means = np.broadcast_to(means, (lag.rows or len(means), *means.shape[1:]))
+                shape = (lag.rows or len(means), *means.shape[1:])
+                means, rise = np.broadcast_to(means, shape), np.broadcast_to(rise, shape)
                 start = np.broadcast_to(samples[:, 0], len(means))
-                means, _ = path.lagged(means, durations, lag.time_constant, start)
-            columns.append(means[:, k:])
+                means, rise, _ = path.lagged(means, rise, durations, lag.time_constant, start)
+            columns.append((np.stack([means, rise], axis=-1) if rises else means)[:, k:])
         rows = {e.rows for e in self.effects if isinstance(e, ActuatorEffect)} - {None}
-        inputs = np.stack(np.broadcast_arrays(*columns), axis=-1)
+        inputs = np.stack(np.broadcast_arrays(*columns), axis=3)
         if not rows:
             return inputs[0]
         return np.broadcast_to(inputs, (rows.pop() or 1, *inputs.shape[1:]))
@@ -297,6 +316,7 @@ class HostSimulator(Simulator):
         inputs = np.repeat(actions[:, None, :], self.substeps, axis=1)
         if not any(isinstance(effect, ActuatorEffect) for effect in self.effects):
             return inputs, memory
+        inputs = np.stack([inputs, np.zeros_like(inputs)], axis=-1)
         after = np.empty_like(memory)
         at = 0
         for j, channel in enumerate(self.action_channels):
@@ -307,19 +327,20 @@ class HostSimulator(Simulator):
             commands = np.concatenate([memory[:, at : at + kept], actions[:, j : j + 1]], axis=1)
             after[:, at : at + kept] = commands[:, 1:]
             at += kept
-            means = path.substep_means(
+            means, rises = path.substep_inputs(
                 path.shaped(commands, effects),
                 np.full(kept + 1, self.dt),
                 self.substeps,
                 path.total_delay(effects),
                 "zero",
-            )[:, -1:]
+            )
+            means, rises = means[:, -1:], rises[:, -1:]
             for lag in path.lags(effects):
-                means, after[:, at] = path.lagged(
-                    means, np.array([self.dt]), lag.time_constant, memory[:, at]
+                means, rises, after[:, at] = path.lagged(
+                    means, rises, np.array([self.dt]), lag.time_constant, memory[:, at]
                 )
                 at += 1
-            inputs[:, :, j] = means[:, 0]
+            inputs[:, :, j] = np.stack([means[:, 0], rises[:, 0]], axis=-1)
         return inputs, after
 
     def _sensors(self, states: Array, forward: bool) -> Array:

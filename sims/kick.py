@@ -60,11 +60,16 @@ class DrivenJoint:
 
 def kick(
     joint: DrivenJoint, angle: float, rate: float, x: float, load: float, u: float, h: float
-) -> tuple[float, float]:
-    """Rate and place in the play after ``h`` seconds under a constant ``load`` and input."""
+) -> tuple[float, float, float]:
+    """Rate and place in the play after ``h`` seconds under a constant ``load`` and input.
+
+    The third value is what leapfrog lacks in the position after an event: the integral of the
+    rate less ``h`` times the mean of its ends. Without events it is zero.
+    """
     edge = 0.5 * joint.width
     holds = joint.limit(0.0)
     left = h
+    first, moved = rate, 0.0
     for events in range(MOST_EVENTS, -1, -1):
         pushing = joint.push(rate, u)
         side = 0
@@ -80,6 +85,7 @@ def kick(
         over = [end for end in mode.ends() if mode.margin(end, *after) < 0]
         if not over or events == 0:
             break
+        began = rate
         # The first of the ends; what it makes zero is then made exactly zero.
         share, end = min((mode.time_of(end, rate, x, left), end) for end in over)
         rate, x = mode.after(rate, x, share)
@@ -90,9 +96,13 @@ def kick(
             x = side * edge * (1 - 1e-12)
         else:
             x = edge if end == "upper" else -edge
+        moved += 0.5 * share * (began + rate)
         left -= share
-    rate, x = after
-    return (0.0 if slip * rate < 0 else rate), max(-edge, min(edge, x))
+    began, (rate, x) = rate, after
+    rate = 0.0 if slip * rate < 0 else rate
+    if left < h:
+        moved += 0.5 * left * (began + rate) - 0.5 * h * (first + rate)
+    return rate, max(-edge, min(edge, x)), moved
 
 
 @dataclasses.dataclass(frozen=True)

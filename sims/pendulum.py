@@ -15,6 +15,7 @@ from sims.effects.friction import DryFriction
 from sims.effects.joint import JointEffect, ViscousFriction
 from sims.host import HostSimulator, Joint
 from sims.kick import DrivenJoint, kick
+from sims.render import PendulumRenderer
 from sims.simulator import Array, Channel, Parameter
 
 IDEALISED_MASS, TRUE_MASS = 0.055, 0.090
@@ -65,7 +66,7 @@ class Pendulum(HostSimulator):
         mass: float = IDEALISED_MASS,
         inertia_follows_mass: bool = False,
         dt: float = 0.05,
-        substeps: int = 10,
+        substeps: int = 8,
         effects: Sequence[Effect] = (),
     ) -> None:
         self.dt = dt
@@ -82,6 +83,10 @@ class Pendulum(HostSimulator):
     def true(cls, inertia_follows_mass: bool = False, **options: Any) -> Self:
         """The paper's true pendulum: 0.090 kg instead of 0.055 kg."""
         return cls(TRUE_MASS, inertia_follows_mass, **options)
+
+    def renderer(self) -> PendulumRenderer:
+        """How it looks."""
+        return PendulumRenderer()
 
     def drive_forces(self, states: Array, inputs: Array) -> Array:
         """Motor torque (K/R) (u - K phi'), shape (n, 1)."""
@@ -106,9 +111,9 @@ class Pendulum(HostSimulator):
         )
         rows = zip(
             states.tolist(),
-            np.asarray(inputs, float)[:, :, 0].tolist(),
+            _halves(np.asarray(inputs, float)).tolist(),
             np.asarray(durations, float).tolist(),
-            *(np.broadcast_to(value, len(states)).tolist() for value in constants),
+            *(_by_row(value, len(states)) for value in constants),
             strict=True,
         )
         forces: list[Effect] = [*self.joint_effects(), *self.plays()]
@@ -123,8 +128,9 @@ class Pendulum(HostSimulator):
             row = _Row(moment, damping, drive, back, own) if own else None
             swing = self._swing if row is None or row.simple else self._swing_by_kicks
             # Leapfrog errs in even powers of the sub-step; this removes the second.
-            fine = swing(state, voltages, duration, 2, moment, weight, motor, row)
-            coarse = swing(state, voltages, duration, 1, moment, weight, motor, row)
+            whole = [0.5 * (a + b) for a, b in zip(voltages[::2], voltages[1::2], strict=True)]
+            fine = swing(state, voltages, duration, moment, weight, motor, row)
+            coarse = swing(state, whole, duration, moment, weight, motor, row)
             after[i] = [f + (f - c) / 3 for f, c in zip(fine, coarse, strict=True)]
             if row is not None and row.joint.width:
                 after[i, 2] = np.clip(after[i, 2], -0.5 * row.joint.width, 0.5 * row.joint.width)
@@ -139,7 +145,6 @@ class Pendulum(HostSimulator):
         state: list[float],
         voltages: list[float],
         duration: float,
-        split: int,
         inertia: float,
         weight: float,
         motor: list[float],
@@ -151,7 +156,7 @@ class Pendulum(HostSimulator):
         damping, drive, back = motor
         friction = damping + back + (row.viscous if row else 0.0)
         forces = row.by_angle if row else ()
-        h = duration / (len(voltages) * split)
+        h = duration / len(voltages)
         body.moment = inertia
         body.angle = angle - 0.5 * h * rate
         body.angular_velocity = rate
@@ -161,15 +166,13 @@ class Pendulum(HostSimulator):
         pull = inertia * decay / h
         push = -pull / friction if friction > 0 else 1.0
         for voltage in voltages:
-            torque = drive * voltage
-            for _ in range(split):
-                load = weight * sin(middle) + torque
-                for effect in forces:
-                    load += float(effect.force(middle, 0.0))
-                body.torque = pull * rate + push * load
-                advance(h)
-                rate = body.angular_velocity
-                middle += h * rate
+            load = weight * sin(middle) + drive * voltage
+            for effect in forces:
+                load += float(effect.force(middle, 0.0))
+            body.torque = pull * rate + push * load
+            advance(h)
+            rate = body.angular_velocity
+            middle += h * rate
         return [body.angle + 0.5 * h * rate, rate, *play]
 
     def _swing_by_kicks(
@@ -177,7 +180,6 @@ class Pendulum(HostSimulator):
         state: list[float],
         voltages: list[float],
         duration: float,
-        split: int,
         inertia: float,
         weight: float,
         motor: list[float],
@@ -188,24 +190,26 @@ class Pendulum(HostSimulator):
         body, advance, sin = self._body, self._space.step, math.sin
         angle, rate, *play = state
         x = play[0] if play else 0.0
-        h = duration / (len(voltages) * split)
+        h = duration / len(voltages)
         body.moment = inertia
         body.angle = angle - 0.5 * h * rate
         body.angular_velocity = rate
         middle = angle + 0.5 * h * rate
         for voltage in voltages:
-            for _ in range(split):
-                load = weight * sin(middle)
-                for effect in row.by_angle:
-                    load += float(effect.force(middle, 0.0))
-                wanted, x = kick(row.joint, middle, rate, x, load, voltage, h)
-                body.torque = inertia * (wanted - rate) / h
-                advance(h)
-                if wanted == 0:
-                    # Held is held: no rate is left by rounding.
-                    body.angular_velocity = 0.0
-                rate = body.angular_velocity
-                middle += h * rate
+            load = weight * sin(middle)
+            for effect in row.by_angle:
+                load += float(effect.force(middle, 0.0))
+            wanted, x, moved = kick(row.joint, middle, rate, x, load, voltage, h)
+            body.torque = inertia * (wanted - rate) / h
+            advance(h)
+            if wanted == 0:
+                # Held is held: no rate is left by rounding.
+                body.angular_velocity = 0.0
+            if moved:
+                body.angle += moved
+                middle += moved
+            rate = body.angular_velocity
+            middle += h * rate
         end = [body.angle + 0.5 * h * rate, rate]
         return [*end, x] if play else end
 
@@ -223,6 +227,18 @@ class Pendulum(HostSimulator):
         # Copies get a body of their own: the body is a scratch pad, not a state.
         self.__dict__.update(state)
         self._make_body()
+
+
+def _by_row(value: float | Array, n: int) -> list[float]:
+    return np.broadcast_to(value, n).tolist() if np.ndim(value) else [float(value)] * n
+
+
+def _halves(inputs: Array) -> Array:
+    """Mean voltage in both halves of every sub-step, (n, 2 substeps)."""
+    if inputs.ndim == 3:
+        return np.repeat(inputs[:, :, 0], 2, axis=1)
+    mean, quarter = inputs[:, :, 0, 0], 0.25 * inputs[:, :, 0, 1]
+    return np.stack([mean - quarter, mean + quarter], axis=2).reshape(len(mean), -1)
 
 
 class _Row:

@@ -6,7 +6,8 @@ the sub-step, and the rows that have one are stepped to it and on from it. At re
 the force that holds the joint, up to its limit, so a held joint keeps its bits.
 
 Arrays have joints first and rows last, (n_joints, n): a column of one quantity is then
-contiguous, which NumPy needs to round equally in every batch.
+contiguous, which NumPy needs to round equally in every batch. An input runs straight from its
+value at the start of a sub-step to its value at the end: (2, n_a, n).
 """
 
 from __future__ import annotations
@@ -114,8 +115,8 @@ class Mode:
 
 
 def advance(motion: Motion, state: State, u: Array, h: Array, events: int = MOST_EVENTS) -> State:
-    """State after ``h`` seconds, (n,), under inputs ``u`` (n_a, n)."""
-    mode = _mode(motion, state, u)
+    """State after ``h`` seconds, (n,), under inputs ``u`` (2, n_a, n)."""
+    mode = _mode(motion, state, u[0])
     held = mode.stuck.any(axis=0)
     if not held.any():
         return _between_events(motion, state, u, h, mode, events)
@@ -125,7 +126,7 @@ def advance(motion: Motion, state: State, u: Array, h: Array, events: int = MOST
     for rows in (np.flatnonzero(~held), np.flatnonzero(busy)):
         if rows.size:
             part = _between_events(
-                motion.take(rows), state.take(rows), u[:, rows], h[rows], mode.take(rows), events
+                motion.take(rows), state.take(rows), u[..., rows], h[rows], mode.take(rows), events
             )
             after.put(rows, part)
     return after
@@ -133,22 +134,26 @@ def advance(motion: Motion, state: State, u: Array, h: Array, events: int = MOST
 
 def advance_smoothly(motion: Motion, state: State, u: Array, h: Array) -> State:
     """The same without dry friction and play."""
-    return runge_kutta(lambda q, v, x: (motion.accelerate(q, v, u), x), state, h)
+    return runge_kutta(lambda q, v, x, u: (motion.accelerate(q, v, u), x), state, u, h)
 
 
 def runge_kutta(
-    accelerate: Callable[[Array, Array, Array], tuple[Array, Array]], state: State, h: Array
+    rates: Callable[[Array, Array, Array, Array], tuple[Array, Array]],
+    state: State,
+    u: Array,
+    h: Array,
 ) -> State:
-    """One classical fourth-order step of q'' = a(q, v, x), x' = b(q, v, x)."""
+    """One classical fourth-order step of q'' = a(q, v, x, u), x' = b(q, v, x, u)."""
     q, v, x = state.q, state.v, state.x
+    middle = 0.5 * (u[0] + u[1])
     half = 0.5 * h
-    a1, b1 = accelerate(q, v, x)
+    a1, b1 = rates(q, v, x, u[0])
     v2 = v + half * a1
-    a2, b2 = accelerate(q + half * v, v2, x + half * b1)
+    a2, b2 = rates(q + half * v, v2, x + half * b1, middle)
     v3 = v + half * a2
-    a3, b3 = accelerate(q + half * v2, v3, x + half * b2)
+    a3, b3 = rates(q + half * v2, v3, x + half * b2, middle)
     v4 = v + h * a3
-    a4, b4 = accelerate(q + h * v3, v4, x + h * b3)
+    a4, b4 = rates(q + h * v3, v4, x + h * b3, u[1])
     sixth = h / 6
     return State(
         q + sixth * (v + 2 * (v2 + v3) + v4),
@@ -158,7 +163,7 @@ def runge_kutta(
 
 
 def _step(motion: Motion, state: State, u: Array, h: Array, mode: Mode) -> State:
-    after = runge_kutta(lambda q, v, x: _rates(motion, q, v, x, u, mode), state, h)
+    after = runge_kutta(lambda q, v, x, u: _rates(motion, q, v, x, u, mode), state, u, h)
     after.v[mode.stuck] = 0.0
     return after
 
@@ -219,7 +224,9 @@ def _mobility(
 def _holding(mobility: Array, acceleration: Array, stuck: Mask) -> Array:
     """Forces that keep the stuck joints from accelerating, zero on the others."""
     if len(acceleration) == 1:
-        return np.where(stuck, -acceleration / mobility[0], 0.0)
+        # A force that moves nothing holds nothing: the joint then slips.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(stuck, -acceleration / mobility[0], 0.0)
     both = stuck[:, None] & stuck[None]
     matrix = np.where(both, mobility, np.eye(len(stuck))[:, :, None]).transpose(2, 1, 0)
     wanted = np.where(stuck, -acceleration, 0.0).T[:, :, None]
@@ -300,28 +307,36 @@ def _between_events(
     motion: Motion, state: State, u: Array, h: Array, mode: Mode, events: int
 ) -> State:
     after = _step(motion, state, u, h, mode)
-    end = _events(motion, after, u, mode)
+    end = _events(motion, after, u[1], mode)
     rows = np.flatnonzero((end < 0).any(axis=0))
     if not rows.size:
         return after
     if events == 0:
         after.v[mode.slip * after.v < 0] = 0.0
         return after
-    motion, state, u, h = motion.take(rows), state.take(rows), u[:, rows], h[rows]
+    motion, state, u, h = motion.take(rows), state.take(rows), u[..., rows], h[rows]
     mode, end = mode.take(rows), end[:, rows]
-    start = _events(motion, state, u, mode)
+    start = _events(motion, state, u[0], mode)
     # The first event by a straight line, then by a parabola through a state near it.
     line = np.where(end < 0, 0.5, np.inf)
     np.divide(start, start - end, out=line, where=(end < 0) & (start > 0))
     which = line.argmin(axis=0)
     pick = (which, np.arange(rows.size))
     guess = np.clip(line[pick], 1e-3, 1.0)
-    near = _events(motion, _step(motion, state, u, guess * h, mode), u, mode)[pick]
+    until = _until(u, guess)
+    near = _events(motion, _step(motion, state, until, guess * h, mode), until[1], mode)[pick]
     share = _parabola_root(start[pick], guess, near, end[pick])
-    reached = _step(motion, state, u, share * h, mode)
+    until = _until(u, share)
+    reached = _step(motion, state, until, share * h, mode)
     _make_exact(motion, reached, mode, which)
-    after.put(rows, advance(motion, reached, u, (1 - share) * h, events - 1))
+    rest = np.stack([until[1], u[1]])
+    after.put(rows, advance(motion, reached, rest, (1 - share) * h, events - 1))
     return after
+
+
+def _until(u: Array, share: Array) -> Array:
+    """The first part of inputs that run straight, up to a share of the sub-step."""
+    return np.stack([u[0], u[0] + share * (u[1] - u[0])])
 
 
 def _parabola_root(start: Array, guess: Array, near: Array, end: Array) -> Array:

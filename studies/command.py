@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import copy
+import importlib
+import inspect
 import itertools
+import json
 import platform
 import re
 import sys
@@ -70,6 +73,23 @@ def _assign(config: dict[str, Any], key: str, value: Any, block: int) -> None:
     if not isinstance(config, dict) or last not in config:
         raise ValueError(f"grid block {block}: there is no setting {key!r}; see --help")
     config[last] = copy.deepcopy(value)
+
+
+def class_label(chosen: Mapping[str, Any]) -> str:
+    """A class and those of its settings that are not the default, such as ``Linear(alpha=1)``.
+
+    Args:
+        chosen: ``class_path`` and ``init_args``, as in a config file.
+    """
+    module, _, name = chosen["class_path"].rpartition(".")
+    signature = inspect.signature(getattr(importlib.import_module(module), name))
+    changed = [
+        f"{key}={value}"
+        for key, value in (chosen.get("init_args") or {}).items()
+        if key in signature.parameters
+        and json.dumps(value) != json.dumps(signature.parameters[key].default, default=str)
+    ]
+    return f"{name}({', '.join(changed)})" if changed else name
 
 
 def versions() -> dict[str, str]:

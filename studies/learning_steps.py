@@ -23,7 +23,7 @@ from policy.ddpg import DDPG, DDPGConfig
 from policy.evaluate import Rollout, collect, rollout
 from policy.noise import OrnsteinUhlenbeck
 from policy.selection import Point, learn_and_select
-from residual.accuracy import accuracy, uniform_rollouts
+from residual.accuracy import accuracy_along, uniform_rollouts
 from residual.corrected import CorrectedSimulator
 from residual.difference import DifferenceModel
 from residual.persistence import load, save
@@ -154,8 +154,8 @@ class LearningSteps:
         atomic_write_json(
             folder / "accuracy.json",
             {
-                "visited": accuracy(corrected, states, actions),
-                "uniform": accuracy(corrected, *uniform),
+                "visited": accuracy_along(corrected, states, actions),
+                "uniform": accuracy_along(corrected, *uniform),
             },
         )
 

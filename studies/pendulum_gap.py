@@ -26,6 +26,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import threadpoolctl
 import torch
 import yaml
 from jsonargparse import DefaultHelpFormatter
@@ -37,7 +38,7 @@ from residual import DropoutNet
 from sims.pendulum import Pendulum
 from sims.simulator import Simulator
 from sims.tasks import SwingUp
-from studies.command import Parser, expand_grid, fail, versions
+from studies.command import Parser, class_label, expand_grid, fail, versions
 from studies.difference_learning import Budget, learn_by_difference
 from studies.files import atomic_write_json, atomic_write_text, copy_file
 from studies.learning_steps import Problem
@@ -115,7 +116,9 @@ def run_trial(
     Returns:
         What ``results.json`` holds (docs/results.md).
     """
+    # One thread is fastest at these sizes and leaves the other cores to other trials.
     torch.set_num_threads(1)
+    threadpoolctl.threadpool_limits(1)
     trial = instantiate(config)
     true = Pendulum.true(inertia_follows_mass=trial.inertia_follows_mass)
     problem = Problem(
@@ -146,7 +149,7 @@ def run_trial(
     return {
         "system": "pendulum",
         "estimator": config["estimator"]["class_path"],
-        "label": " ".join(repr(trial.estimator).split()),
+        "label": class_label(config["estimator"]),
         "seed": trial.seed,
         "policies": outcome.policies,
         "accuracy": outcome.accuracy,

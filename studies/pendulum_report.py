@@ -13,7 +13,6 @@ import yaml
 from matplotlib.figure import Figure as Drawing
 
 from sims.render import PendulumRenderer
-from sims.simulator import wrap
 from studies.reporting import (
     Animation,
     Code,
@@ -81,6 +80,7 @@ def write_report(results: Results, folder: Path) -> Path:
         for record in results["policies"]
         if (folder / "rollouts" / f"{record_key(record)}.npz").exists()
     }
+    titles = {record_key(record): policy_name(record) for record in results["policies"]}
     figures = folder / "figures"
     sections: list[Section] = [verdict(results), tiles(results)]
     sections.append(
@@ -95,9 +95,9 @@ def write_report(results: Results, folder: Path) -> Path:
     for heading, picture, alt, caption in (
         (
             "Trajectories on the true pendulum",
-            trajectories(rollouts, figures / "trajectories.png"),
+            trajectories(rollouts, titles, figures / "trajectories.png"),
             "Angle, rate and voltage over time for each policy on the true pendulum.",
-            "Angle 0 is upright; every run starts hanging (paper, figure 6).",
+            "Angle 0 is upright; every run starts hanging (paper, figure 6). Whole turns are kept.",
         ),
         (
             "Where the difference model is right",
@@ -213,7 +213,9 @@ def film(rollouts: Mapping[str, dict[str, np.ndarray]], results: Results) -> byt
 
 
 @styled()
-def trajectories(rollouts: Mapping[str, dict[str, np.ndarray]], path: Path) -> Drawing:
+def trajectories(
+    rollouts: Mapping[str, dict[str, np.ndarray]], titles: Mapping[str, str], path: Path
+) -> Drawing:
     """Angle, rate and voltage over the first seconds of every policy's episode."""
     figure, axes = new_figure(3, 1, height=6.0, share_x=True)
     steps = round(FILM_SECONDS / CONTROL_PERIOD)
@@ -229,23 +231,19 @@ def trajectories(rollouts: Mapping[str, dict[str, np.ndarray]], path: Path) -> D
         series = {}
         for name, run in rollouts.items():
             values = run[key][:steps, column]
-            if column == 0 and key == "states":
-                values = unbroken(wrap(values))
-            series[name] = (time, values)
+            if label.startswith("angle"):
+                # The upright at which the run ends is angle 0: no jumps, whatever the turns.
+                values = values - 2 * np.pi * np.round(values[-1] / (2 * np.pi))
+            series[titles[name]] = (time, values)
             data[f"{name}_{label.split()[0]}"] = values
         draw_lines(axes[row, 0], series)
         axes[row, 0].set_ylabel(label)
     axes[2, 0].set_xlabel("time (s)")
-    axes[0, 0].legend(*axes[0, 0].get_legend_handles_labels(), loc="upper right", ncols=2)
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.4
+    )
     save_figure(figure, path, data)
     return figure
-
-
-def unbroken(angle: np.ndarray) -> np.ndarray:
-    """NaN where a wrapped angle jumps, so that no line is drawn across the picture."""
-    angle = angle.copy()
-    angle[1:][np.abs(np.diff(angle)) > np.pi] = np.nan
-    return angle
 
 
 @styled()

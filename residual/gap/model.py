@@ -93,7 +93,10 @@ class Model:
         return np.append(physical, [0.1 * physical[names.index(joints[p.joint])] for p in plays])
 
     def inputs(self, samples: Samples, theta: Array) -> Array:
-        """Effective input of every sub-step, (V, n, substeps, n_a); V = 1 if all rows agree."""
+        """Mean and rise of the input in every sub-step, (V, n, substeps, n_a, 2).
+
+        V is 1 if the actuator path is the same for all rows of ``theta``.
+        """
         if not self._actuator.any():
             theta = theta[:1]
         key = theta[:, self._actuator].tobytes() + np.int64([id(samples), len(theta)]).tobytes()
@@ -108,8 +111,9 @@ class Model:
                     samples.durations[start:stop],
                     samples.substeps,
                     hold=samples.hold,
+                    rises=True,
                 )
-                parts.append(part if part.ndim == 4 else part[None])
+                parts.append(part if part.ndim == 5 else part[None])
             rows = max(len(part) for part in parts)
             parts = [np.broadcast_to(p, (rows, *p.shape[1:])) for p in parts]
             self._drives[key] = (samples, np.concatenate(parts, axis=1))
@@ -134,9 +138,8 @@ class Model:
             driven = self.inputs(samples, theta[first])
             driven = driven[which] if len(driven) > 1 else np.repeat(driven, variants, axis=0)
         else:
-            driven = np.broadcast_to(
-                self.inputs(samples, theta), (variants, n, samples.substeps, samples.actions.shape[1])
-            )
+            driven = self.inputs(samples, theta)
+            driven = np.broadcast_to(driven, (variants, *driven.shape[1:]))
         host = self.bind(theta, each=n)
         own = len(host.integrated_channels)
         after = np.array(states.reshape(variants * n, width))

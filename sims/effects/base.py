@@ -83,6 +83,19 @@ def number(
 class Effect(abc.ABC):
     """One named piece of physics; subclasses are frozen dataclasses.
 
+    A user's own effect derives from ``JointEffect``, ``DryFriction``, ``StaticActuatorEffect``
+    or ``SensorEffect`` in any file and is named by its import path::
+
+        @dataclasses.dataclass(frozen=True)
+        class FanTorque(JointEffect):
+            level: float = number(force=1, rate=-3, low=0.0)
+            name = "fan_torque"
+            sentence = "A torque that grows with the cube of speed."
+            needs = "fast motion"
+
+            def force(self, q, v):
+                return -self.level * v * v * v
+
     The first field says where it acts (``joint``, ``actuator``, ``channel`` or ``parameter``),
     the fields made by ``number`` say how much: scalars or, one per row of a batch, arrays.
 

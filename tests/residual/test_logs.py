@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from residual.logs import Column, LogError, LogFormat, read_logs
-from residual.units import UNITS, find_unit
+from residual.logs.units import UNITS, find_unit
 from sims.simulator import Channel
 
 ROOT = Path(__file__).parents[2]
@@ -539,8 +539,24 @@ def test_scale_of_a_sensor_that_no_unit_explains_is_a_finding(csv):
 
 
 def test_rate_unrelated_to_its_position_is_a_finding(csv):
-    rate = 3 * np.random.default_rng(2).standard_normal(200)
-    assert "kinematics" in kinds(read(csv(rate=rate)))
+    (finding,) = [f for f in read(csv(rate=np.sin(swing()["time"]))).findings[:1]]
+    assert finding.kind == "kinematics" and "or the wrong columns" in finding.says
+
+
+def test_noise_alone_is_no_finding_about_kinematics(csv):
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        angle = 0.01 * rng.standard_normal(200)
+        rate = 0.2 * rng.standard_normal(200)
+        assert "kinematics" not in kinds(read(csv(angle=angle, rate=rate)))
+
+
+def test_one_file_in_degrees_among_many_is_found(tmp_path):
+    good = [write(tmp_path / f"{n}.csv", swing()) for n in range(5)]
+    columns = swing()
+    bad = write(tmp_path / "bad.csv", columns | {"angle": DEG * columns["angle"]})
+    with pytest.raises(LogError, match=r"bad\.csv, column 'angle'|bad\.csv: column 'angle'"):
+        read_logs([*good, bad], STATES, ACTIONS)
 
 
 def test_degrees_without_a_measured_rate_are_found_by_plausibility(csv):

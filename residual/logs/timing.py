@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.log_checks import Finding
-from residual.log_tables import LogError
+from residual.logs.checks import Finding
+from residual.logs.table import LogError
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from residual.log_tables import LogError
+from residual.logs.table import LogError
 from sims.simulator import Channel
 
 
@@ -63,7 +63,7 @@ class LogFormat:
     actions: dict[str, str | int | Column] = dataclasses.field(default_factory=dict)
     trajectory: list[str | int] = dataclasses.field(default_factory=list)
     split_at_time_resets: bool = False
-    only: dict[str, list[str]] = dataclasses.field(default_factory=dict)
+    only: dict[str, list[str | int]] = dataclasses.field(default_factory=dict)
     start: float | None = None
     stop: float | None = None
     header: bool = True

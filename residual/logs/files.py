@@ -1,12 +1,10 @@
-"""Log files as tables of named columns that remember which row of the file each value is from."""
+"""Log files of every kind - text, Parquet, NPZ - as tables."""
 
 from __future__ import annotations
 
 import csv
-import dataclasses
-import difflib
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,140 +12,11 @@ import numpy as np
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from residual.logs.table import LogError, Table, shortened
 
 TEXT, PARQUET, NPZ = (".csv", ".txt", ".tsv", ".dat", ".log"), (".parquet", ".pq"), (".npz",)
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "blank": " "}
-_MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
-
-
-class LogError(ValueError):
-    """A log cannot be used; the one-line message names file, row, column and the fix."""
-
-    def __init__(
-        self,
-        says: str,
-        path: str | Path = "",
-        row: int | None = None,
-        column: str | int | None = None,
-    ) -> None:
-        place = [str(path)] if str(path) else []
-        if row is not None:
-            place.append(f"row {row}")
-        if column is not None:
-            place.append(f"column {column!r}")
-        message = f"{', '.join(place)}: {says}" if place else says
-        super().__init__("".join(c if c.isprintable() else " " for c in message))
-
-
-@dataclasses.dataclass(frozen=True)
-class Table:
-    """The columns of one file.
-
-    Attributes:
-        path: The file.
-        columns: Values by name: numbers as an array, text as a list of strings. Columns of a
-            file without header are named by their position, ``1`` being the first.
-        names: Column names in the order of the file; those that occur twice also twice.
-        rows: Row of the file that each value stands in, as an editor counts: from 1.
-        cut_off: True if the file ends in the middle of a row, which was left out.
-    """
-
-    path: Path
-    columns: Mapping[str | int, Sequence[str] | NDArray[Any]]
-    names: tuple[str | int, ...]
-    rows: NDArray[np.int64]
-    cut_off: bool = False
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def values(self, column: str | int) -> Sequence[str] | NDArray[Any]:
-        """One column as it stands in the file.
-
-        Args:
-            column: Name, or position from 1.
-
-        Raises:
-            LogError: It is not there, or there twice.
-        """
-        if isinstance(column, int) and 1 <= column <= len(self.names):
-            column = self.names[column - 1]
-        if column not in self.columns:
-            near = difflib.get_close_matches(str(column), [str(n) for n in self.names], 1, 0.5)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise LogError(
-                f"no column {column!r}, the file has {_listed(self.names)}{hint}", self.path
-            )
-        if self.names.count(column) > 1:
-            raise LogError(
-                f"{self.names.count(column)} columns have this name, expected one: "
-                "rename them, or give the position of the right one (1 is the first)",
-                self.path,
-                column=column,
-            )
-        return self.columns[column]
-
-    def numbers(self, column: str | int, decimal: str = ".") -> Array:
-        """One column as numbers; a missing value is NaN.
-
-        Args:
-            column: Name, or position from 1.
-            decimal: The decimal sign, if the file is text.
-
-        Raises:
-            LogError: The column is not there, holds text or something infinite.
-        """
-        values = self.values(column)
-        if isinstance(values, np.ndarray):
-            numbers = self._from_array(values, column)
-        else:
-            numbers = self._from_text(values, column, decimal)
-        infinite = np.flatnonzero(np.isinf(numbers))
-        if infinite.size:
-            raise LogError(
-                "found an infinite value, expected a number; delete the row or leave the value "
-                "empty",
-                self.path,
-                int(self.rows[infinite[0]]),
-                column,
-            )
-        return numbers
-
-    def _from_array(self, values: NDArray[Any], column: str | int) -> Array:
-        if values.dtype.kind == "M":
-            seconds = values.astype("datetime64[ns]").astype(np.int64) * 1e-9
-            return np.where(np.isnat(values), np.nan, seconds)
-        if values.dtype.kind == "m":
-            seconds = values.astype("timedelta64[ns]").astype(np.int64) * 1e-9
-            return np.where(np.isnat(values), np.nan, seconds)
-        if values.dtype.kind in "biuf":
-            return values.astype(float)
-        raise LogError(
-            f"holds {values.dtype.name} values, expected numbers", self.path, column=column
-        )
-
-    def _from_text(self, texts: Sequence[str], column: str | int, decimal: str) -> Array:
-        numbers = np.empty(len(texts))
-        for index, text in enumerate(texts):
-            try:
-                # Python's own extras, such as 1_000, are no numbers in a log.
-                if "_" in text:
-                    raise ValueError
-                numbers[index] = float(text if decimal == "." else text.replace(decimal, "."))
-            except ValueError:
-                if text.lower() not in _MISSING:
-                    comma = "," in text and decimal == "."
-                    fix = "set decimal: ','" if comma else "correct the value or leave it empty"
-                    raise LogError(
-                        f"found {shortened(text)}, expected a number; {fix}",
-                        self.path,
-                        int(self.rows[index]),
-                        column,
-                    ) from None
-                numbers[index] = np.nan
-        return numbers
 
 
 def read_table(
@@ -265,17 +134,22 @@ def _split(
         )
     if delimiter == " ":
         return [(number, line.split()) for number, line in lines]
-    rows = []
-    for number, line in lines:
-        try:
-            (fields,) = csv.reader([line], delimiter=delimiter, strict=True)
-        except (csv.Error, ValueError) as error:
-            raise LogError(
-                f"cannot be split into fields ({error or 'unusable'}); look for a lone quote",
-                path,
-                number,
-            ) from None
-        rows.append((number, [field.strip() for field in fields]))
+    numbers = [number for number, _ in lines]
+    reader = csv.reader(
+        (line for _, line in lines), delimiter=delimiter, skipinitialspace=True, strict=True
+    )
+    rows: list[tuple[int, list[str]]] = []
+    try:
+        for fields in reader:
+            if reader.line_num > len(rows) + 1:
+                raise csv.Error("a quoted field runs over several rows")
+            rows.append((numbers[len(rows)], [field.strip() for field in fields]))
+    except (csv.Error, ValueError) as error:
+        raise LogError(
+            f"cannot be split into fields ({error}); look for a lone quote",
+            path,
+            numbers[len(rows)],
+        ) from None
     return rows
 
 
@@ -326,13 +200,3 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def shortened(text: str, length: int = 40) -> str:
-    """Text in quotes, cut to a length that fits into a message."""
-    return repr(text if len(text) <= length else f"{text[: length - 3]}...")
-
-
-def _listed(names: Sequence[str | int], most: int = 12) -> str:
-    listed = ", ".join(repr(name) for name in names[:most])
-    return listed + (f" and {len(names) - most} more" if len(names) > most else "")

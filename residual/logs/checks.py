@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.units import UNITS, find_unit
+from residual.logs.units import UNITS, find_unit
 from sims.simulator import Channel, wrap
 
 Array = NDArray[np.float64]
@@ -56,8 +56,13 @@ class Signal(NamedTuple):
     runs: Sequence[tuple[Array, Array]]
 
 
-def check_rate(position: Signal, rate: Signal) -> list[Finding]:
+def check_rate(position: Signal, rate: Signal, where: str) -> list[Finding]:
     """Compare the change of a position with the integral of its rate.
+
+    Args:
+        position: What the rate is the derivative of.
+        rate: Sampled at the same times.
+        where: For the finding.
 
     Returns:
         A finding if they differ by a factor that no unit explains, or are unrelated.
@@ -66,8 +71,9 @@ def check_rate(position: Signal, rate: Signal) -> list[Finding]:
         ValueError: They differ by the factor of a unit, or in sign; the message says which
             column to give which unit.
     """
-    spans = [_changes(position, rate, span) for span in _SPANS]
-    spans = [(moved, integral) for moved, integral in spans if moved.size >= 10]
+    changes = {span: _changes(position, rate, span) for span in _SPANS}
+    changes = {span: change for span, change in changes.items() if change[0].size >= 25}
+    spans = list(changes.values())
     turning = position.channel.angle
     if not spans:
         return []
@@ -85,22 +91,24 @@ def check_rate(position: Signal, rate: Signal) -> list[Finding]:
         return []
     scaled = [(_scale(m, i, turning), m, i) for m, i in spans]
     misfit, scale = min((_misfit(m, scale * i, turning), scale) for scale, m, i in scaled)
-    pair = f"{rate.channel.name} and {position.channel.name}"
+    if not any(_clear(position, rate, span, *changes[span]) for span in changes):
+        return []
     if misfit > 0.3:
         says = (
             f"The change of {position.channel.name} does not follow the integral of "
-            f"{rate.channel.name} (median misfit {100 * as_is:.0f} %): noise, sampling slower "
-            "than the motion, or the wrong columns."
+            f"{rate.channel.name} (median misfit {100 * as_is:.0f} %): sampling slower than the "
+            "motion, or the wrong columns."
         )
-        return [Finding("kinematics", pair, says, {"misfit": as_is})]
-    if abs(scale - 1) < 0.05:
+        return [Finding("kinematics", where, says, {"misfit": as_is})]
+    # Noise in the rate makes the factor look smaller than it is, by about the misfit.
+    if abs(scale - 1) < 0.05 + 2 * misfit:
         return []
     says = (
         f"{position.channel.name} changes by {scale:.3f} times the integral of "
         f"{rate.channel.name}: one of the two sensors is off by that factor (set scale for its "
         "column)."
     )
-    return [Finding("kinematics", pair, says, {"scale": scale})]
+    return [Finding("kinematics", where, says, {"scale": scale})]
 
 
 def check_plausible(signal: Signal, rate_scale: float | None) -> None:
@@ -168,7 +176,7 @@ def _changes(position: Signal, rate: Signal, span: int) -> tuple[Array, Array]:
     """Change of position over ``span`` samples, and the rate's integral (trapezoids)."""
     moved, integrals = [np.zeros(0)], [np.zeros(0)]
     for (times, x), (_, v) in zip(position.runs, rate.runs, strict=True):
-        if len(times) > span:
+        if len(times) > 4 * span:
             steps = np.diff(times) * (v[1:] + v[:-1]) / 2
             total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
             gaps = np.concatenate([[0], np.cumsum(~np.isfinite(steps))])
@@ -179,10 +187,29 @@ def _changes(position: Signal, rate: Signal, span: int) -> tuple[Array, Array]:
     return np.concatenate(moved), np.concatenate(integrals)
 
 
+def _clear(position: Signal, rate: Signal, span: int, moved: Array, integral: Array) -> bool:
+    """True if both move far more than their noise, so that they ought to agree."""
+    moved, integral = _moving(moved, integral, position.channel.angle)
+    period = float(np.median(np.concatenate([np.diff(times) for times, _ in rate.runs])))
+    blur = _noise(rate) * period * math.sqrt(span)
+    return bool(
+        moved.size >= 10
+        and np.median(np.abs(moved)) > 5 * _noise(position)
+        and np.median(np.abs(integral)) > 5 * blur
+    )
+
+
+def _noise(signal: Signal) -> float:
+    """Standard deviation of the noise, from second differences; fast motion counts as noise."""
+    bends = np.concatenate([np.diff(values, 2) for _, values in signal.runs])
+    bends = np.abs(bends[np.isfinite(bends)])
+    return float(np.median(bends)) / (0.6745 * math.sqrt(6)) if bends.size else math.inf
+
+
 def _misfit(moved: Array, integral: Array, turning: bool) -> float:
     """Median of |change - integral| relative to the integral, where there is motion; 0 is best."""
     moved, integral = _moving(moved, integral, turning)
-    if moved.size < 5:
+    if moved.size < 10:
         return math.inf
     error = wrap(moved - integral) if turning else moved - integral
     size = float(np.median(np.abs(integral)))

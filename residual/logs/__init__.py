@@ -1,0 +1,8 @@
+"""Measured logs (CSV, Parquet, NPZ) as trajectories in SI units, or one clear error."""
+
+from residual.logs.checks import Finding
+from residual.logs.layout import Column, LogFormat
+from residual.logs.read import LogData, read_logs
+from residual.logs.table import LogError
+
+__all__ = ["Column", "Finding", "LogData", "LogError", "LogFormat", "read_logs"]

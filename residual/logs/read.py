@@ -1,0 +1,153 @@
+"""Measured logs (CSV and the like, Parquet, NPZ) as trajectories in SI units."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from residual.logs.checks import Finding, Signal, check_plausible, check_rate
+from residual.logs.files import read_table
+from residual.logs.layout import LogFormat, check_layout, named_column
+from residual.logs.runs import runs_of
+from residual.logs.table import LogError
+from residual.logs.timing import Run, report_sampling, tidy
+from residual.trajectories import Trajectory
+from sims.simulator import Channel
+
+
+@dataclasses.dataclass(frozen=True)
+class LogData:
+    """What was read: the trajectories, and what there is to know about their quality."""
+
+    trajectories: tuple[Trajectory, ...]
+    findings: tuple[Finding, ...]
+
+
+def read_logs(
+    paths: Sequence[str | Path],
+    state_channels: Sequence[Channel],
+    action_channels: Sequence[Channel],
+    columns: LogFormat | None = None,
+) -> LogData:
+    """Read log files into trajectories whose columns are the simulator's channels, in SI.
+
+    Repeated times are dropped, trajectories are cut at gaps and where an action is missing,
+    angles are unwrapped, and each such repair is reported as a finding. Nothing is resampled or
+    smoothed.
+
+    Args:
+        paths: The files: ``.csv .txt .tsv .dat .log``, ``.parquet .pq`` or ``.npz``.
+        state_channels: Of the simulator; those of kind ``"memory"`` are never in a log.
+        action_channels: Of the simulator.
+        columns: The layout of the files.
+
+    Returns:
+        Trajectories in the order of files and rows, and findings.
+
+    Raises:
+        LogError: A file or the layout is not usable; one line names file, row, column and fix.
+    """
+    columns = columns or LogFormat()
+    channels = [c for c in state_channels if c.kind != "memory"]
+    if not paths:
+        raise LogError("no log files, expected at least one")
+    check_layout(columns, channels, action_channels)
+    findings: list[Finding] = []
+    runs: list[Run] = []
+    # What a broken file makes of its numbers is caught by their checks, not by numpy's warnings.
+    with np.errstate(all="ignore"):
+        for path in map(Path, paths):
+            table = read_table(path, columns.delimiter, columns.header, columns.comment)
+            if table.cut_off:
+                says = "The last row is cut off and was left out."
+                findings.append(Finding("cut_off", str(path), says))
+            runs += runs_of(table, columns, channels, action_channels, findings)
+        runs = tidy(
+            runs, columns.gap, columns.minimum_samples, findings, [c.name for c in channels]
+        )
+        _check_actions(runs, action_channels, columns)
+        for path in dict.fromkeys(run.path for run in runs):
+            of_file = [run for run in runs if run.path == path]
+            findings += _check_numbers(path, of_file, channels, columns)
+        findings += report_sampling(runs)
+        trajectories = tuple(_trajectory(run, state_channels, channels, findings) for run in runs)
+    findings += _unmeasured(channels, runs)
+    return LogData(trajectories, tuple(findings))
+
+
+def _check_actions(runs: Sequence[Run], channels: Sequence[Channel], columns: LogFormat) -> None:
+    """Refuse logs in which an action never changes: they cannot tell what it does."""
+    for index, channel in enumerate(channels):
+        column = named_column(columns.actions.get(channel.name, channel.name), channel.name)
+        values = np.concatenate([run.actions[:-1, index] for run in runs])
+        if columns.allow_constant_action or column.value is not None or np.ptp(values) > 0:
+            continue
+        raise LogError(
+            f"the action {channel.name!r} is {values[0]:g} {channel.unit} in all {len(values)} "
+            "samples, expected one that changes; check the column, or if it is a run without "
+            "input, such as a free decay, set allow_constant_action: true",
+            runs[0].path,
+            column=column.column,
+        )
+
+
+def _check_numbers(
+    path: Path, runs: Sequence[Run], channels: Sequence[Channel], columns: LogFormat
+) -> list[Finding]:
+    """Compare the rates of one file with its positions, and its angles with what is plausible."""
+    findings = []
+    signals = {}
+    for index, channel in enumerate(channels):
+        column = named_column(columns.states.get(channel.name, channel.name), channel.name)
+        measured = [(run.times, run.states[:, index]) for run in runs]
+        if any(np.isfinite(values).any() for _, values in measured):
+            signals[channel.name] = Signal(channel, column.column, column.unit, measured)
+    rates = {channel.rate_of: channel for channel in channels if channel.kind == "rate"}
+    try:
+        for signal in signals.values():
+            position = signals.get(signal.channel.rate_of or "")
+            if signal.channel.kind == "rate" and position is not None:
+                findings += check_rate(position, signal, path.name)
+        for name, signal in signals.items():
+            rate = rates.get(name, signal.channel)
+            declared = rate.scale if rate.kind == "rate" and rate.scale != 1.0 else None
+            check_plausible(signal, declared)
+    except ValueError as error:
+        raise LogError(str(error), path) from None
+    return findings
+
+
+def _trajectory(
+    run: Run, states: Sequence[Channel], channels: Sequence[Channel], findings: list[Finding]
+) -> Trajectory:
+    """A run with its angles unwrapped, one column for every state channel."""
+    matrix = np.full((len(run.times), len(states)), np.nan)
+    for values, channel in zip(run.states.T, channels, strict=True):
+        column = list(states).index(channel)
+        matrix[:, column] = values
+        known = np.isfinite(values)
+        if channel.angle and known.any():
+            matrix[known, column] = np.unwrap(values[known])
+            jumps = int((np.abs(np.diff(values[known])) > np.pi).sum())
+            if jumps:
+                findings.append(
+                    Finding(
+                        "unwrapped",
+                        run.name,
+                        f"{channel.name} jumped by whole turns {jumps} times and was unwrapped.",
+                        {"jumps": jumps},
+                    )
+                )
+    return Trajectory(run.name, run.times, matrix, run.actions[:-1])
+
+
+def _unmeasured(channels: Sequence[Channel], runs: Sequence[Run]) -> list[Finding]:
+    seen = np.any([np.isfinite(run.states).any(axis=0) for run in runs], axis=0)
+    return [
+        Finding("unmeasured", channel.name, f"{channel.name} was not measured.")
+        for channel, there in zip(channels, seen, strict=True)
+        if not there
+    ]

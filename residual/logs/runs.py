@@ -1,0 +1,191 @@
+"""From the table of a file to its runs: units, trajectories, the time that is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.logs.checks import Finding
+from residual.logs.layout import Column, LogFormat, named_column
+from residual.logs.table import LogError, Table
+from residual.logs.timing import Run
+from residual.logs.units import find_unit
+from sims.simulator import Channel
+
+Array = NDArray[np.float64]
+
+# Beyond it, in SI, sums of squares lose all meaning; nanoseconds since 1970 are well below.
+_LARGEST = 1e15
+
+
+def _layout(
+    table: Table, given: Mapping[str, str | int | Column], channels: Sequence[Channel]
+) -> dict[str, Column]:
+    """The column of every channel that this file holds."""
+    if given:
+        return {name: named_column(column, name) for name, column in given.items()}
+    return {c.name: Column(c.name) for c in channels if c.name in table.columns}
+
+
+def runs_of(
+    table: Table,
+    columns: LogFormat,
+    states: Sequence[Channel],
+    actions: Sequence[Channel],
+    findings: list[Finding],
+) -> Iterator[Run]:
+    """The trajectories of one file as they were recorded, in SI.
+
+    Args:
+        table: The file.
+        columns: Its layout.
+        states: State channels that a log can hold.
+        actions: Action channels.
+        findings: Trajectories that ``start`` and ``stop`` leave out are added here.
+
+    Raises:
+        LogError: A column is missing or holds no numbers, or the time goes backwards.
+    """
+    found = _layout(table, columns.states, states)
+    inputs = _layout(table, columns.actions, actions)
+    if not found:
+        wanted = ", ".join(repr(channel.name) for channel in states)
+        raise LogError(
+            f"no column is named like a state of the simulator ({wanted}), the file has "
+            f"{table.listed}; say under states which column is which",
+            table.path,
+        )
+    lacking = [channel.name for channel in actions if channel.name not in inputs]
+    if lacking:
+        raise LogError(
+            f"no column for action {lacking[0]!r}, the file has "
+            f"{table.listed}; say under actions which column it is, or "
+            "give it a constant value",
+            table.path,
+        )
+    time = named_column(columns.time, "time")
+    times = _si(table, time, Channel("time", "s", "other"), columns.decimal)
+    seen = [
+        _si(table, found[channel.name], channel, columns.decimal)
+        if channel.name in found
+        else np.full(len(table), np.nan)
+        for channel in states
+    ]
+    acted = [_si(table, inputs[channel.name], channel, columns.decimal) for channel in actions]
+    for channel, values in (*zip(states, seen, strict=True), *zip(actions, acted, strict=True)):
+        column = (found | inputs).get(channel.name)
+        if column is not None and not np.isfinite(values).any():
+            raise LogError(
+                f"no value at all for {channel.name!r}, expected numbers; leave the channel out "
+                "if it was not measured",
+                table.path,
+                column=column.column,
+            )
+    if not np.isfinite(times).any():
+        raise LogError("no time at all, expected seconds", table.path, column=time.column)
+    matrix = np.column_stack(seen)
+    inputs_matrix = np.column_stack(acted) if acted else np.zeros((len(table), 0))
+    for label, rows in _groups(table, columns):
+        for part in _resets(table, times, rows, columns.split_at_time_resets, time.column):
+            inside = _between(times[part], columns.start, columns.stop)
+            if len(inside) < min(len(part), columns.minimum_samples):
+                says = f"Only {len(inside)} of {len(part)} samples lie between start and stop."
+                findings.append(Finding("selection", f"{table.path.name} {label}".strip(), says))
+                continue
+            part = part[inside]
+            yield Run(
+                table.path,
+                f"{table.path.name} {label}".strip(),
+                table.rows[part],
+                times[part],
+                matrix[part],
+                inputs_matrix[part],
+            )
+
+
+def _si(table: Table, column: Column, channel: Channel, decimal: str) -> Array:
+    """One column in the unit of its channel, shape (n,); a missing value is NaN."""
+    if column.value is not None:
+        return np.full(len(table), column.value)
+    try:
+        unit = find_unit(column.unit, channel.unit)
+    except ValueError as error:
+        raise LogError(str(error), table.path, column=column.column) from None
+    numbers = table.numbers(column.column, decimal)
+    values = column.scale * (unit.factor * numbers + unit.offset) + column.offset
+    wild = np.flatnonzero(~np.isnan(numbers) & ~(np.abs(values) < _LARGEST))
+    if wild.size:
+        raise LogError(
+            f"found {numbers[wild[0]]:g}, which is beyond any measurement; correct the value or "
+            "leave it empty",
+            table.path,
+            int(table.rows[wild[0]]),
+            column.column,
+        )
+    return values
+
+
+def _groups(table: Table, columns: LogFormat) -> list[tuple[str, NDArray[np.int64]]]:
+    """Rows of every trajectory of a file, in the order of their first row, with its label."""
+    chosen = np.ones(len(table), bool)
+    for name, wanted in columns.only.items():
+        texts = _texts(table, name)
+        values = [str(value) for value in wanted]
+        chosen &= np.isin(texts, values)
+        if not chosen.any():
+            there = ", ".join(sorted(set(texts))[:12])
+            raise LogError(
+                f"no row holds {' or '.join(values)}, the column has {there}",
+                table.path,
+                column=name,
+            )
+    rows = np.flatnonzero(chosen)
+    if not columns.trajectory:
+        return [("", rows)]
+    labels = [_texts(table, name) for name in columns.trajectory]
+    groups: dict[str, list[int]] = {}
+    for row in rows:
+        groups.setdefault(" ".join(texts[row] for texts in labels), []).append(int(row))
+    return [(label, np.array(members)) for label, members in groups.items()]
+
+
+def _texts(table: Table, column: str | int) -> list[str]:
+    """A column as text; whole numbers without a point, so that 1.0 and 1 are one trajectory."""
+    texts = []
+    for value in table.values(column):
+        try:
+            number = float(value)
+            texts.append(str(int(number)) if number.is_integer() else str(value))
+        except (TypeError, ValueError):
+            texts.append(str(value))
+    return texts
+
+
+def _resets(
+    table: Table, times: Array, rows: NDArray[np.int64], split: bool, column: str | int
+) -> list[NDArray[np.int64]]:
+    """Rows split where the time goes backwards, which is an error unless ``split``."""
+    known = rows[np.isfinite(times[rows])]
+    back = np.flatnonzero(np.diff(times[known]) < 0) + 1
+    if back.size and not split:
+        here = known[back[0]]
+        raise LogError(
+            f"time goes backwards, from {times[known[back[0] - 1]]:g} s to {times[here]:g} s; sort "
+            "the rows, or if a new run begins there set split_at_time_resets: true or name the "
+            "trajectory column",
+            table.path,
+            int(table.rows[here]),
+            column,
+        )
+    return np.split(rows, np.searchsorted(rows, known[back]))
+
+
+def _between(times: Array, start: float | None, stop: float | None) -> NDArray[np.int64]:
+    chosen = np.ones(len(times), bool)
+    if start is not None:
+        chosen &= times >= start
+    if stop is not None:
+        chosen &= times <= stop
+    return np.flatnonzero(chosen)

@@ -1,0 +1,158 @@
+"""One file as named columns that remember which row of the file each value is from."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import difflib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
+
+
+class LogError(ValueError):
+    """A log cannot be used; the one-line message names file, row, column and the fix."""
+
+    def __init__(
+        self,
+        says: str,
+        path: str | Path = "",
+        row: int | None = None,
+        column: str | int | None = None,
+    ) -> None:
+        place = [str(path)] if str(path) else []
+        if row is not None:
+            place.append(f"row {row}")
+        if column is not None:
+            place.append(f"column {column!r}")
+        message = f"{', '.join(place)}: {says}" if place else says
+        super().__init__("".join(c if c.isprintable() else " " for c in message))
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """The columns of one file.
+
+    Attributes:
+        path: The file.
+        columns: Values by name: numbers as an array, text as a list of strings. Columns of a
+            file without header are named by their position, ``1`` being the first.
+        names: Column names in the order of the file; those that occur twice also twice.
+        rows: Row of the file that each value stands in, as an editor counts: from 1.
+        cut_off: True if the file ends in the middle of a row, which was left out.
+    """
+
+    path: Path
+    columns: Mapping[str | int, Sequence[str] | NDArray[Any]]
+    names: tuple[str | int, ...]
+    rows: NDArray[np.int64]
+    cut_off: bool = False
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def listed(self) -> str:
+        """The names of the columns, for a message."""
+        listed = ", ".join(shortened(str(name)) for name in self.names[:12])
+        return listed + (f" and {len(self.names) - 12} more" if len(self.names) > 12 else "")
+
+    def values(self, column: str | int) -> Sequence[str] | NDArray[Any]:
+        """One column as it stands in the file.
+
+        Args:
+            column: Name, or position from 1.
+
+        Raises:
+            LogError: It is not there, or there twice.
+        """
+        if isinstance(column, int) and 1 <= column <= len(self.names):
+            column = self.names[column - 1]
+        if column not in self.columns:
+            near = difflib.get_close_matches(str(column), [str(n) for n in self.names], 1, 0.5)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise LogError(f"no column {column!r}, the file has {self.listed}{hint}", self.path)
+        if self.names.count(column) > 1:
+            raise LogError(
+                f"{self.names.count(column)} columns have this name, expected one: "
+                "rename them, or give the position of the right one (1 is the first)",
+                self.path,
+                column=column,
+            )
+        return self.columns[column]
+
+    def numbers(self, column: str | int, decimal: str = ".") -> Array:
+        """One column as numbers; a missing value is NaN.
+
+        Args:
+            column: Name, or position from 1.
+            decimal: The decimal sign, if the file is text.
+
+        Raises:
+            LogError: The column is not there, holds text or something infinite.
+        """
+        values = self.values(column)
+        if isinstance(values, np.ndarray):
+            numbers = self._from_array(values, column)
+        else:
+            numbers = self._from_text(values, column, decimal)
+        infinite = np.flatnonzero(np.isinf(numbers))
+        if infinite.size:
+            raise LogError(
+                "found an infinite value, expected a number; delete the row or leave the value "
+                "empty",
+                self.path,
+                int(self.rows[infinite[0]]),
+                column,
+            )
+        return numbers
+
+    def _from_array(self, values: NDArray[Any], column: str | int) -> Array:
+        if values.dtype.kind == "M":
+            seconds = values.astype("datetime64[ns]").astype(np.int64) * 1e-9
+            return np.where(np.isnat(values), np.nan, seconds)
+        if values.dtype.kind == "m":
+            seconds = values.astype("timedelta64[ns]").astype(np.int64) * 1e-9
+            return np.where(np.isnat(values), np.nan, seconds)
+        if values.dtype.kind in "biuf":
+            return values.astype(float)
+        raise LogError(
+            f"holds {values.dtype.name} values, expected numbers", self.path, column=column
+        )
+
+    def _from_text(self, texts: Sequence[str], column: str | int, decimal: str) -> Array:
+        # The common case, without a missing value, is ten times faster in one go.
+        with contextlib.suppress(ValueError):
+            if decimal == "." and not any("_" in text for text in texts):
+                return np.array(texts, dtype=float)
+        numbers = np.empty(len(texts))
+        for index, text in enumerate(texts):
+            try:
+                # Python's own extras, such as 1_000, are no numbers in a log.
+                if "_" in text:
+                    raise ValueError
+                numbers[index] = float(text if decimal == "." else text.replace(decimal, "."))
+            except ValueError:
+                if text.lower() not in _MISSING:
+                    comma = "," in text and decimal == "."
+                    fix = "set decimal: ','" if comma else "correct the value or leave it empty"
+                    raise LogError(
+                        f"found {shortened(text)}, expected a number; {fix}",
+                        self.path,
+                        int(self.rows[index]),
+                        column,
+                    ) from None
+                numbers[index] = np.nan
+        return numbers
+
+
+def shortened(text: str, length: int = 40) -> str:
+    """Text in quotes, cut to a length that fits into a message."""
+    return repr(text if len(text) <= length else f"{text[: length - 3]}...")

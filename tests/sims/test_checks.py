@@ -1,0 +1,123 @@
+"""The simulator checker finds each way of breaking the contract, and nothing else."""
+
+import numpy as np
+import pytest
+
+from sims.checks import check_simulator
+from sims.pendulum import Pendulum
+from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel, Parameter, Simulator
+
+
+class Good(Simulator):
+    name = "good"
+    dt = 0.1
+    state_channels = (Channel("angle", "rad", "position", angle=True),)
+    action_channels = (Channel("rate", "rad/s", "input", low=-1.0, high=1.0),)
+
+    def __init__(self, gain=1.0):
+        self.parameters = {"gain": Parameter(gain, "1", "gain of the drive")}
+
+    def with_parameters(self, **values):
+        return type(self)(**values)
+
+    def step(self, states, actions):
+        states, actions = self.check_rows(states, actions)
+        return states + self.parameters["gain"].value * self.dt * actions
+
+
+class Noisy(Good):
+    def step(self, states, actions):
+        noise = np.random.default_rng().normal(size=(len(states), 1))
+        return super().step(states, actions) + 1e-12 * noise
+
+
+class Remembering(Good):
+    last = 0.0
+
+    def step(self, states, actions):
+        following = super().step(states, actions) + 1e-6 * self.last
+        self.last = float(np.ravel(actions)[-1])
+        return following
+
+
+class Mixing(Good):
+    def step(self, states, actions):
+        return super().step(states, actions) + 1e-9 * np.mean(states)
+
+
+class Wrapping(Good):
+    def step(self, states, actions):
+        return np.mod(super().step(states, actions), 2 * np.pi)
+
+
+class Unclipped(Good):
+    def step(self, states, actions):
+        return np.asarray(states) + self.dt * np.asarray(actions)
+
+
+class Overwriting(Good):
+    def step(self, states, actions):
+        states += self.dt * np.clip(actions, -1, 1)
+        return states.copy()
+
+
+class Diverging(Good):
+    def step(self, states, actions):
+        following = super().step(states, actions)
+        following[states[:, 0] > 0] = np.nan
+        return following
+
+
+class Deaf(Good):
+    def step(self, states, actions):
+        states, actions = self.check_rows(states, actions)
+        return states + self.dt * actions
+
+
+@pytest.mark.parametrize("simulator", [Good(), Pendulum.true(), PendulumEquation()])
+def test_what_keeps_the_contract_passes(simulator):
+    findings = check_simulator(simulator)
+    assert all(finding.ok for finding in findings), "\n".join(map(str, findings))
+
+
+@pytest.mark.parametrize(
+    ("broken", "check"),
+    [
+        (Noisy, "repeatable"),
+        (Remembering, "pure"),
+        (Mixing, "batch"),
+        (Wrapping, "angle angle"),
+        (Unclipped, "bounds"),
+        (Overwriting, "arguments"),
+        (Diverging, "finite"),
+        (Deaf, "parameter gain"),
+    ],
+)
+def test_what_breaks_it_is_named(broken, check):
+    failed = {
+        finding.check: str(finding) for finding in check_simulator(broken()) if not finding.ok
+    }
+    assert check in failed
+    if check in ("repeatable", "pure", "batch", "finite"):
+        assert "for example state [" in failed[check]
+
+
+def test_rows_can_be_given():
+    findings = check_simulator(Good(), states=[[7.0]], actions=[[0.5]])
+    assert all(finding.ok for finding in findings)
+    findings = check_simulator(Good(), states=np.array([[7.0], [-1.0]]))
+    assert all(finding.ok for finding in findings)
+    with pytest.raises(ValueError, match="angle"):
+        check_simulator(Good(), states=[[7.0, 1.0]], actions=[[0.5]])
+
+
+def test_an_effect_that_does_not_reach_the_output_is_named():
+    class Unfelt(PendulumEquation):
+        def acceleration(self, q, v, u, force, p):
+            return super().acceleration(q, v, u, np.zeros_like(force), p)
+
+    failed = [finding.check for finding in check_simulator(Unfelt()) if not finding.ok]
+    assert (
+        "effect viscous_friction@pivot" in failed and "effect actuator_gain@voltage" not in failed
+    )

@@ -1,0 +1,214 @@
+"""The study through its command line, as its user runs it."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from safetensors import safe_open
+
+TINY = [
+    "--estimator", "residual.Linear",
+    "--budget.true_samples", "60",
+    "--budget.iterations", "1",
+    "--budget.idealised_steps", "1400",
+    "--budget.difference_steps", "1300",
+    "--ddpg.hidden", "[32, 32]",
+]  # fmt: skip
+
+
+def start(arguments, cwd):
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    return subprocess.Popen(
+        [sys.executable, "-m", "studies.pendulum_gap", *map(str, arguments)],
+        cwd=cwd,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def run(arguments, cwd):
+    process = start(arguments, cwd)
+    out, err = process.communicate()
+    return process.returncode, out, err
+
+
+def results(folder):
+    """What must not change between runs: everything but the clock."""
+
+    def timeless(value):
+        if isinstance(value, dict):
+            return {k: timeless(v) for k, v in value.items() if "seconds" not in k}
+        return [timeless(item) for item in value] if isinstance(value, list) else value
+
+    return timeless(json.loads((folder / "results.json").read_text()))
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    code, out, err = run([*TINY, "--output", folder / "run"], folder)
+    assert code == 0, err
+    return folder / "run", out
+
+
+def test_the_results_are_complete(undisturbed):
+    folder, out = undisturbed
+    found = json.loads((folder / "results.json").read_text())
+    assert found["system"] == "pendulum" and found["seed"] == 0
+    assert [policy["name"] for policy in found["policies"]] == ["idealised", "difference"]
+    for policy in found["policies"]:
+        assert set(policy) >= {
+            "name", "iteration", "true_samples", "simulated_steps", "return_true",
+            "return_model", "seconds",
+        }  # fmt: skip
+    (accuracy,) = found["accuracy"]
+    assert accuracy["true_samples"] == 60 and accuracy["fit_seconds"] > 0
+    for where in ("visited", "uniform"):
+        assert set(accuracy[where]["one_step"]) == {"angle", "rate"}
+        assert set(accuracy[where]["multi_step"]) == {"0.25 s", "1 s"}
+        assert 0 <= accuracy[where]["coverage90"] <= 1
+    assert found["versions"]["torch"] and found["config"]["budget"]["iterations"] == 1
+    assert "difference model, update 1" in out
+
+
+def test_the_folder_holds_all_that_was_made(undisturbed):
+    folder, _ = undisturbed
+    made = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    assert made >= {
+        "results.json", "report.html", "config.yaml", "figures/trajectories.png",
+        "figures/trajectories.csv", "figures/accuracy.png", "policies/idealised.safetensors",
+        "policies/difference-1.safetensors", "models/difference-1.safetensors",
+    }  # fmt: skip
+    page = (folder / "report.html").read_text()
+    assert "<img" in page or "<svg" in page
+    assert "http://" not in page.replace("http://www.w3.org", "") and "src=\"/" not in page
+
+
+def test_saved_policies_and_models_can_be_used(undisturbed):
+    import gymnasium
+
+    from policy.ddpg import DDPG
+
+    folder, _ = undisturbed
+    found = json.loads((folder / "results.json").read_text())
+    agent = DDPG.load(folder / "policies" / "difference-1.safetensors")
+    env = gymnasium.make(
+        "simgap/PendulumCorrected-v0", difference=folder / "models" / "difference-1.safetensors"
+    )
+    observation, _ = env.reset(seed=0)
+    total, done = 0.0, False
+    while not done:
+        observation, reward, _, done, _ = env.step(agent.act(observation))
+        total += float(reward)
+    assert total == pytest.approx(found["policies"][1]["return_model"], rel=1e-9)
+
+
+def test_no_file_is_a_pickle(undisturbed):
+    folder, _ = undisturbed
+    for path in folder.rglob("*.safetensors"):
+        with safe_open(path, "np") as file:
+            assert list(file.keys())
+    for path in folder.rglob("*.npz"):
+        with np.load(path, allow_pickle=False) as data:
+            assert all(data[name].dtype != object for name in data)
+
+
+def test_a_study_killed_again_and_again_ends_with_the_same_results(undisturbed, tmp_path):
+    folder, _ = undisturbed
+    random.seed(os.getpid())
+    command = [*TINY, "--output", tmp_path / "run"]
+    for _ in range(3):
+        process = start(command, tmp_path)
+        time.sleep(random.uniform(2, 9))
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        for path in tmp_path.rglob("results.json"):
+            json.loads(path.read_text())
+    code, _, err = run(command, tmp_path)
+    assert code == 0, err
+    assert results(tmp_path / "run") == results(folder)
+
+
+def test_an_estimator_of_ones_own_needs_no_registration(tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "import numpy as np\n"
+        "from sklearn.base import BaseEstimator, RegressorMixin\n\n"
+        "class Nearest(RegressorMixin, BaseEstimator):\n"
+        "    def __init__(self, scale: float = 1.0):\n"
+        "        self.scale = scale\n"
+        "    def fit(self, X, y):\n"
+        "        self.X_, self.y_ = X, y\n"
+        "        return self\n"
+        "    def predict(self, X):\n"
+        "        distance = ((X[:, None] - self.X_) ** 2).sum(-1)\n"
+        "        return self.scale * self.y_[distance.argmin(1)]\n"
+    )
+    arguments = [*TINY, "--estimator", "mine.Nearest", "--estimator.scale", "0.5"]
+    code, out, err = run([*arguments, "--output", tmp_path / "run"], tmp_path)
+    assert code == 0, err
+    found = results(tmp_path / "run")
+    assert found["estimator"] == "mine.Nearest"
+    assert found["config"]["estimator"]["init_args"] == {"scale": 0.5}
+    assert found["accuracy"][0]["visited"]["coverage90"] is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        (["--estimator", "residual.NoSuch"], "NoSuch"),
+        (["--estimator", "no_such_module.Thing"], "no_such_module"),
+        (["--estimator.dropuot", "0.2"], "dropuot"),
+        (["--estimator", "residual.Linear", "--estimator.degree", "many"], "degree"),
+        (["--budget.true_samples", "-5"], "true_samples"),
+        (["--ddpg.gamma", "1.5"], "gamma"),
+        (["--seed", "x"], "seed"),
+        (["--config", "absent.yaml"], "absent.yaml"),
+        (["--nonsense"], "nonsense"),
+    ],
+)
+def test_a_wrong_argument_gets_one_line_and_exit_code_2(arguments, names, tmp_path):
+    code, out, err = run([*arguments, "--output", tmp_path / "run"], tmp_path)
+    assert code == 2
+    assert len(err.strip().splitlines()) == 1 and names in err
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_grid_runs_every_trial_and_reports_failed_ones(tmp_path):
+    (tmp_path / "grid.yaml").write_text(
+        "budget: {iterations: 1, idealised_steps: 1400, difference_steps: 1300}\n"
+        "ddpg: {hidden: [32, 32]}\n"
+        "estimator: {class_path: residual.Linear}\n"
+        "grid:\n"
+        "- seed: [0, 1]\n"
+        "  budget.true_samples: [40, 60]\n"
+        "- estimator: [{class_path: mine.Broken}]\n"
+    )
+    (tmp_path / "mine.py").write_text(
+        "from sklearn.base import BaseEstimator\n"
+        "class Broken(BaseEstimator):\n"
+        "    def fit(self, X, y):\n"
+        "        raise RuntimeError('deliberate')\n"
+        "    def predict(self, X):\n"
+        "        return X\n"
+    )
+    command = ["--config", "grid.yaml", "--jobs", "2", "--output", "out"]
+    code, out, err = run(command, tmp_path)
+    assert code == 1 and "deliberate" in err
+    rows = (tmp_path / "out" / "results.csv").read_text().splitlines()
+    assert len(rows) == 1 + 4 * 2
+    assert "1 trials failed" in (tmp_path / "out" / "report.html").read_text()
+    assert "residual.Linear" in (tmp_path / "out" / "results.json").read_text()
+
+
+def test_help_teaches(tmp_path):
+    code, out, _ = run(["--help"], tmp_path)
+    assert code == 0
+    assert "python -m studies.pendulum_gap --estimator" in out and "true_samples" in out
