@@ -276,9 +276,8 @@ class DDPG:
     def update(self) -> None:
         """One update of the critic and the actor from one batch of the replay.
 
-        Both gradients are those of the networks as they are before the update, so that actor
-        and critic share the critic's pass over the observations; Algorithm 1 of Lillicrap et
-        al. (2016) takes the actor's gradient one critic step of size ``critic_lr`` later.
+        Both gradients are those of the networks as they are before the update; Algorithm 1 of
+        Lillicrap et al. (2016) takes the actor's one critic step of size ``critic_lr`` later.
         """
         c = self.config
         observations, actions, rewards, alive, following = self.replay.sample(c.batch, self._rng)

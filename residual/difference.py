@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from typing import Any, Self
+from typing import Any, Literal, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -162,6 +162,16 @@ class DifferenceModel:
         """Whether ``predict(..., return_std=True)`` returns a standard deviation."""
         estimator = self.estimator
         return "return_std" in inspect.signature(estimator.predict).parameters
+
+    @overload
+    def predict(
+        self, states: ArrayLike, actions: ArrayLike, return_std: Literal[False] = False
+    ) -> Array: ...
+
+    @overload
+    def predict(
+        self, states: ArrayLike, actions: ArrayLike, return_std: Literal[True]
+    ) -> tuple[Array, Array | None]: ...
 
     def predict(
         self, states: ArrayLike, actions: ArrayLike, return_std: bool = False

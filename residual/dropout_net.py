@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.utils import check_random_state
 
+from residual.dropout_training import train
 from residual.estimator import Array, Estimator
 
-if TYPE_CHECKING:
-    import torch
-
 _BLOCK = 4
-_AVERAGING = 8
 _CHUNK = 4096
 
 
@@ -31,8 +28,9 @@ class DropoutNet(Estimator):
     The mean prediction uses all units. The standard deviation combines two parts: the spread
     of the outputs over ``samples`` networks with units dropped (Gal and Ghahramani, Dropout as
     a Bayesian approximation, ICML 2016), and noise; the factor of the one and the size of the
-    other maximise the likelihood of rows held out from training. The dropped units are drawn
-    once, in ``fit``, so that ``predict`` is a pure function of its rows.
+    other maximise the likelihood of rows held out from training. Those rows are like the
+    training rows, so away from them the intervals rest on the spread growing as the error does.
+    The dropped units are drawn once, in ``fit``, so that ``predict`` is a pure function.
 
     Args:
         hidden: Width of each hidden layer.
@@ -68,7 +66,7 @@ class DropoutNet(Estimator):
         samples: int = 30,
         validation_fraction: float = 0.1,
         patience: int | None = None,
-        random_state: int | np.random.RandomState | None = None,
+        random_state: int | None = None,
     ) -> None:
         self.hidden = hidden
         self.dropout = dropout
@@ -89,9 +87,19 @@ class DropoutNet(Estimator):
         targets = y.astype(np.float32)
         order = random.permutation(len(X))
         held = max(1, round(self.validation_fraction * len(X)))
-        check, train = order[:held], order[held:]
-        weights, biases, self.epochs_ = _train(
-            inputs[train], targets[train], inputs[check], targets[check], self, random
+        check, rest = order[:held], order[held:]
+        weights, biases, self.epochs_ = train(
+            inputs[rest],
+            targets[rest],
+            inputs[check],
+            targets[check],
+            random,
+            hidden=tuple(map(int, self.hidden)),
+            dropout=self.dropout,
+            epochs=self.epochs,
+            batch_size=self.batch_size,
+            learning_rate=self.learning_rate,
+            patience=self.patience,
         )
         self.weights_, self.biases_ = tuple(weights), tuple(biases)
         self.masks_ = tuple(
@@ -118,21 +126,26 @@ class DropoutNet(Estimator):
             raise ValueError(f"learning_rate={self.learning_rate!r}: give a positive number")
 
     def _calibrate(self, error: Array, variance: Array) -> None:
-        """Choose factor f and noise s so that errors look drawn from N(0, f^2 variance + s^2)."""
+        """Choose factor f and noise s so that errors look drawn from N(0, f^2 variance + s^2).
+
+        Among rows like the training rows, noise alone often explains the errors best; the
+        spread, which grows away from them, is made to explain half of the squared error at least.
+        """
         power = np.maximum(np.mean(error**2, axis=0), 1e-12)
         self.spread_factor_, self.noise_ = np.zeros_like(power), np.sqrt(power)
         for k in range(error.shape[1]):
-            best = math.inf
-            for share in np.linspace(0, 1, 21):
+            best, mean = math.inf, variance[:, k].mean()
+            if not mean > 0:
+                continue
+            for share in np.linspace(0.5, 1, 11):
                 # The spread explains this share of the squared error, noise explains the rest.
-                mean = variance[:, k].mean()
-                factor = share * power[k] / mean if mean > 0 else 0.0
-                total = factor * variance[:, k] + max(1 - share, 1e-4) * power[k]
+                factor = share * power[k] / mean
+                noise = max(1 - share, 1e-4) * power[k]
+                total = factor * variance[:, k] + noise
                 surprise = np.sum(np.log(total) + error[:, k] ** 2 / total)
                 if surprise < best:
                     best = surprise
-                    self.spread_factor_[k] = np.sqrt(factor)
-                    self.noise_[k] = np.sqrt(max(1 - share, 1e-4) * power[k])
+                    self.spread_factor_[k], self.noise_[k] = np.sqrt(factor), np.sqrt(noise)
 
     def _predict(self, X: Array, return_std: bool) -> tuple[Array, Array | None]:
         rows = ((X - self.center_) / self.column_scale_).astype(np.float32)
@@ -166,7 +179,7 @@ class DropoutNet(Estimator):
         for start in range(0, len(rows), _CHUNK):
             part = rows[start : start + _CHUNK]
             outputs = []
-            for sample in range(self.samples):
+            for sample in range(len(self.masks_[0])):
                 values = part
                 layers = zip(self.weights_[:-1], self.biases_[:-1], self.masks_, strict=True)
                 for weights, biases, masks in layers:
@@ -187,117 +200,3 @@ def _frame(X: Array) -> tuple[Array, Array]:
     center = np.where((low <= 0) & (high >= 0), 0.0, (low + high) / 2)
     reach = np.maximum(high - center, center - low)
     return center, np.where(reach > 1e-13 * np.abs(center), reach, 1.0)
-
-
-def _train(
-    X: NDArray[np.float32],
-    y: NDArray[np.float32],
-    check_X: NDArray[np.float32],
-    check_y: NDArray[np.float32],
-    net: DropoutNet,
-    random: np.random.Generator,
-) -> tuple[list[NDArray[np.float32]], list[NDArray[np.float32]], int]:
-    """Minimise the mean squared error; returns weights, biases and the number of epochs.
-
-    Forward and backward pass are written out, on one flat vector of parameters: at this size a
-    step through autograd and an optimiser takes twice as long.
-    """
-    import torch
-
-    sizes = [X.shape[1], *map(int, net.hidden), y.shape[1]]
-    hidden = len(sizes) - 2
-    flat = torch.empty(sum((a + 1) * b for a, b in zip(sizes[:-1], sizes[1:], strict=True)))
-    weights, biases = _layers(flat, sizes)
-    for weight, bias in zip(weights, biases, strict=True):
-        limit = len(weight) ** -0.5
-        for target in (weight, bias):
-            start = random.uniform(-limit, limit, target.shape).astype(np.float32)
-            target.copy_(torch.from_numpy(start))
-    gradient, squares = torch.zeros_like(flat), torch.zeros_like(flat)
-    root, average = torch.empty_like(flat), flat.clone()
-    weight_gradients, bias_gradients = _layers(gradient, sizes)
-
-    inputs, targets = torch.from_numpy(X), torch.from_numpy(y)
-    batch = min(net.batch_size, len(X))
-    steps = len(X) // batch
-    rows, wanted = torch.empty(batch, sizes[0]), torch.empty(batch, sizes[-1])
-    units = [torch.empty(batch, width) for width in sizes[1:-1]]
-    deltas = [torch.empty_like(unit) for unit in units]
-    masks = [torch.empty_like(unit) for unit in units]
-    output = torch.empty(batch, sizes[-1])
-    uniform = np.empty((batch, sum(sizes[1:-1])), np.float32)
-    draws = torch.from_numpy(uniform).split(sizes[1:-1], dim=1)
-    keep = 1 / (1 - net.dropout)
-
-    step, best, stale = 0, math.inf, 0
-    kept = average
-    for epoch in range(1, net.epochs + 1):
-        order = torch.from_numpy(random.permutation(len(X)))
-        for first in range(0, steps * batch, batch):
-            chosen = order[first : first + batch]
-            torch.index_select(inputs, 0, chosen, out=rows)
-            torch.index_select(targets, 0, chosen, out=wanted)
-            values = rows
-            if net.dropout:
-                random.random(dtype=np.float32, out=uniform)
-            for layer, unit in enumerate(units):
-                torch.addmm(biases[layer], values, weights[layer], out=unit)
-                unit.relu_()
-                if net.dropout:
-                    torch.ge(draws[layer], net.dropout, out=masks[layer])
-                    unit.mul_(masks[layer]).mul_(keep)
-                values = unit
-            torch.addmm(biases[-1], values, weights[-1], out=output)
-            delta = output.sub_(wanted).mul_(2 / output.numel())
-            for layer in range(hidden, -1, -1):
-                below = units[layer - 1] if layer else rows
-                torch.mm(below.t(), delta, out=weight_gradients[layer])
-                torch.sum(delta, 0, out=bias_gradients[layer])
-                if layer:
-                    torch.mm(delta, weights[layer].t(), out=deltas[layer - 1])
-                    # A dropped unit is zero, as one that rectification cut: neither passes.
-                    delta = deltas[layer - 1].mul_(below > 0)
-                    if net.dropout:
-                        delta.mul_(keep)
-            squares.addcmul_(gradient, gradient)
-            torch.sqrt(squares, out=root)
-            flat.addcdiv_(gradient, root.add_(1e-10), value=-net.learning_rate)
-            step += 1
-            average.lerp_(flat, (_AVERAGING + 1) / (step + _AVERAGING))
-        if net.patience is not None:
-            error = _validation_error(average, sizes, check_X, check_y)
-            if error < best:
-                best, stale, kept = error, 0, average.clone()
-            else:
-                stale += 1
-            if stale >= net.patience:
-                break
-    weights, biases = _layers(kept, sizes)
-    copy = [[part.numpy().copy() for part in parts] for parts in (weights, biases)]
-    return copy[0], copy[1], epoch
-
-
-def _validation_error(
-    flat: torch.Tensor, sizes: list[int], X: NDArray[np.float32], y: NDArray[np.float32]
-) -> float:
-    import torch
-
-    values = torch.from_numpy(X)
-    weights, biases = _layers(flat, sizes)
-    for weight, bias in zip(weights[:-1], biases[:-1], strict=True):
-        values = torch.addmm(bias, values, weight).relu_()
-    error = torch.addmm(biases[-1], values, weights[-1]) - torch.from_numpy(y)
-    return float(error.square().mean())
-
-
-def _layers(
-    flat: torch.Tensor, sizes: list[int]
-) -> tuple[list[torch.Tensor], list[torch.Tensor]]:
-    """Views of the weights and biases of every layer in one flat vector."""
-    weights, biases, start = [], [], 0
-    for width, following in zip(sizes[:-1], sizes[1:], strict=True):
-        weights.append(flat[start : start + width * following].view(width, following))
-        start += width * following
-        biases.append(flat[start : start + following])
-        start += following
-    return weights, biases

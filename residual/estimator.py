@@ -54,15 +54,15 @@ class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
         Raises:
             ValueError: The shapes do not fit, or a value is not finite.
         """
-        X, y = validate_data(
+        rows, targets = validate_data(
             self, X, y, dtype=np.float64, multi_output=True, y_numeric=True, ensure_min_samples=2
         )
-        targets = np.asarray(y, float)
+        targets = np.asarray(targets, float)
         self.flat_ = targets.ndim == 1
         targets = targets.reshape(len(targets), -1)
         self.target_mean_ = targets.mean(axis=0)
         self.target_scale_ = spread(targets)
-        self._fit(X, (targets - self.target_mean_) / self.target_scale_)
+        self._fit(rows, (targets - self.target_mean_) / self.target_scale_)
         self._prepare()
         return self
 
@@ -200,8 +200,7 @@ class ChannelFeatures(TransformerMixin, BaseEstimator):
         Raises:
             ValueError: The angles or scales do not fit the number of columns.
         """
-        X = validate_data(self, X, dtype=np.float64)
-        self._columns(X.shape[1])
+        self._columns(validate_data(self, X, dtype=np.float64).shape[1])
         return self
 
     def transform(self, X: ArrayLike) -> Array:
@@ -223,12 +222,13 @@ class ChannelFeatures(TransformerMixin, BaseEstimator):
         ):
             check_is_fitted(self)
             X = validate_data(self, X, dtype=np.float64, reset=False)
-        angles, others, factors = self._columns(X.shape[1])
+        rows = np.asarray(X, float)
+        angles, others, factors = self._columns(rows.shape[1])
         if not len(angles):
-            return X * factors
-        turned = X[:, angles]
+            return rows * factors
+        turned = rows[:, angles]
         return np.concatenate(
-            [np.cos(turned), np.sin(turned), X[:, others] * factors],
+            [np.cos(turned), np.sin(turned), rows[:, others] * factors],
             axis=1,
         )
 

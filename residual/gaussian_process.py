@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
-from scipy.optimize import minimize
 from sklearn.utils import check_random_state
 
 from residual.estimator import Array, Estimator, spread
+from residual.likelihood import BOUNDS, maximise_likelihood
 
 _KERNELS = ("rbf", "matern")
 _CHUNK = 2048
+_CANDIDATES = 5000
 _KEPT_BYTES = 2**29
-# In units of the standardised data. The floor of the noise variance bounds the condition of the
-# kernel matrix where a simulated system is observed without noise.
-_BOUNDS = {"lengthscale": (1e-2, 1e3), "outputscale": (1e-4, 1e4), "noise": (1e-9, 1e1)}
 
 
 class GaussianProcess(Estimator):
@@ -67,7 +64,7 @@ class GaussianProcess(Estimator):
         inducing: int = 600,
         hyper_points: int = 600,
         max_iter: int = 60,
-        random_state: int | np.random.RandomState | None = None,
+        random_state: int | None = None,
     ) -> None:
         self.kernel = kernel
         self.max_points = max_points
@@ -118,7 +115,7 @@ class GaussianProcess(Estimator):
             return self._kept[k]
         matrix = self._kernel(self.points_, self.points_, k)
         # Inducing points lie closer together than their summary needs: a nugget of its own.
-        nugget = self.noise_[k] if self.exact_ else 1e-8 * self.outputscale_[k]
+        nugget = self.noise_[k] if self.exact_ else 1e-12 * self.outputscale_[k]
         while True:
             try:
                 np.fill_diagonal(matrix, self.outputscale_[k] + nugget)
@@ -131,7 +128,15 @@ class GaussianProcess(Estimator):
         return factor
 
     def _choose(self, X: Array, random: np.random.RandomState) -> NDArray[np.intp]:
-        return random.permutation(len(X))[: self.inducing]
+        """Spread-out rows: each the farthest, in mean length scales, from those before it."""
+        some = random.permutation(len(X))[: max(_CANDIDATES, 2 * self.inducing)]
+        scaled = X[some] / np.exp(np.log(self.lengthscale_).mean(axis=0))
+        chosen, distance = [0], np.full(len(some), np.inf)
+        for _ in range(min(self.inducing, len(some)) - 1):
+            offset = scaled - scaled[chosen[-1]]
+            np.minimum(distance, np.einsum("ij,ij->i", offset, offset), out=distance)
+            chosen.append(int(np.argmax(distance)))
+        return some[chosen]
 
     def _summarise(self, X: Array, y: Array) -> None:
         self._kept = {}
@@ -148,7 +153,7 @@ class GaussianProcess(Estimator):
                 gram += cross @ cross.T
                 moment += cross @ y[rows, k]
             lost = max(len(X) * self.outputscale_[k] - np.trace(gram), 0.0)
-            self.noise_[k] = _best_noise(gram, moment, y[:, k] @ y[:, k], lost, len(X))
+            self.noise_[k] = _best_noise(gram, moment, float(y[:, k] @ y[:, k]), lost, len(X))
             gram[np.diag_indices(m)] += self.noise_[k]
             inner = cholesky(gram, lower=True, check_finite=False)
             half = solve_triangular(inner, moment, lower=True, check_finite=False)
@@ -214,91 +219,6 @@ class GaussianProcess(Estimator):
         return np.sqrt(np.maximum(variance, 0) + self.noise_)
 
 
-def maximise_likelihood(
-    X: Array, y: Array, kernel: str, max_iter: int
-) -> tuple[Array, float, float, int]:
-    """Length scales, signal and noise variance of largest marginal likelihood, and iterations.
-
-    Args:
-        X: standardised inputs, shape (n, n_in).
-        y: one standardised target, shape (n,).
-        kernel: ``"rbf"`` or ``"matern"``.
-        max_iter: Most iterations of L-BFGS.
-    """
-    import torch
-
-    with warnings.catch_warnings():
-        # It uses torch.jit.script, which warns that it is deprecated.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        import gpytorch
-
-    def positive() -> gpytorch.constraints.Positive:
-        return gpytorch.constraints.Positive(transform=torch.exp, inv_transform=torch.log)
-
-    class Process(gpytorch.models.ExactGP):
-        def __init__(self) -> None:
-            likelihood = gpytorch.likelihoods.GaussianLikelihood(noise_constraint=positive())
-            super().__init__(inputs, targets, likelihood)
-            width = X.shape[1]
-            base = (
-                gpytorch.kernels.RBFKernel(ard_num_dims=width, lengthscale_constraint=positive())
-                if kernel == "rbf"
-                else gpytorch.kernels.MaternKernel(
-                    nu=2.5, ard_num_dims=width, lengthscale_constraint=positive()
-                )
-            )
-            self.kernel = gpytorch.kernels.ScaleKernel(base, outputscale_constraint=positive())
-            self.mean = gpytorch.means.ZeroMean()
-
-        def forward(self, x: torch.Tensor) -> gpytorch.distributions.MultivariateNormal:
-            return gpytorch.distributions.MultivariateNormal(self.mean(x), self.kernel(x))
-
-    inputs, targets = torch.from_numpy(X.copy()), torch.from_numpy(y.copy())
-    process = Process().double()
-    process.kernel.base_kernel.lengthscale = X.shape[1] ** 0.5
-    process.kernel.outputscale = 1.0
-    process.likelihood.noise = 1e-2
-    process.train()
-    marginal = gpytorch.mlls.ExactMarginalLogLikelihood(process.likelihood, process)
-    parameters = dict(process.named_parameters())
-    sizes = [parameter.numel() for parameter in parameters.values()]
-    bounds = [
-        tuple(np.log(_BOUNDS[name.rsplit("raw_", 1)[1]]))
-        for name, size in zip(parameters, sizes, strict=True)
-        for _ in range(size)
-    ]
-
-    def loss(values: Array) -> tuple[float, Array]:
-        pieces = torch.from_numpy(values.copy()).split(sizes)
-        with torch.no_grad():
-            for parameter, piece in zip(parameters.values(), pieces, strict=True):
-                parameter.copy_(piece.view_as(parameter))
-        process.zero_grad()
-        value = -marginal(process(inputs), targets)
-        value.backward()
-        return value.item(), torch.cat([p.grad.ravel() for p in parameters.values()]).numpy()
-
-    start = torch.cat([p.detach().ravel() for p in parameters.values()]).numpy()
-    with (
-        gpytorch.settings.fast_computations(False, False, False),
-        gpytorch.settings.max_cholesky_size(len(X) + 1),
-        warnings.catch_warnings(),
-    ):
-        # gpytorch warns when it adds jitter on the way; the optimum is judged by its value.
-        warnings.simplefilter("ignore")
-        found = minimize(
-            loss, start, jac=True, bounds=bounds, method="L-BFGS-B", options={"maxiter": max_iter}
-        )
-        loss(found.x)
-    base = process.kernel.base_kernel
-    return (
-        base.lengthscale.detach().numpy().ravel().copy(),
-        float(process.kernel.outputscale.item()),
-        float(process.likelihood.noise.item()),
-        max(int(found.nit), 1),
-    )
-
-
 def _best_noise(gram: Array, moment: Array, energy: float, lost: float, rows: int) -> float:
     """Noise variance that maximises Titsias' bound, by a fine logarithmic grid.
 
@@ -312,7 +232,7 @@ def _best_noise(gram: Array, moment: Array, energy: float, lost: float, rows: in
     eigenvalues, vectors = np.linalg.eigh(gram)
     eigenvalues = np.maximum(eigenvalues, 0)
     projected = vectors.T @ moment
-    grid = 10.0 ** np.linspace(*np.log10(_BOUNDS["noise"]), 201)
+    grid = np.geomspace(*BOUNDS["noise"], 201)
     inverse = 1 / (eigenvalues + grid[:, None])
     misfit = np.maximum(energy - inverse @ projected**2, 1e-14 * energy)
     volume = np.sum(np.log1p(eigenvalues / grid[:, None]), axis=1) + rows * np.log(grid)

@@ -15,6 +15,7 @@ from sims.simulator import Simulator
 
 _KINDS = ("raw", "quadratic", "trigonometric")
 _MOST_COLUMNS = 1000
+_TOO_MANY_COLUMNS = 10_000
 _CHUNK = 4096
 
 
@@ -107,9 +108,7 @@ class Linear(Estimator):
         projected = np.where(seen[:, None], vectors.T @ moment, 0.0)
 
         energy = np.sum(y**2, axis=0)
-        self.alpha_, variance = _evidence(
-            eigenvalues, projected, energy, len(X), self.alpha
-        )
+        self.alpha_, variance = _evidence(eigenvalues, projected, energy, len(X), self.alpha)
         self.noise_ = np.sqrt(variance)
         shrunk = eigenvalues[:, None] + self.alpha_
         self.coef_ = vectors @ (projected / shrunk) / scale[:, None]
@@ -148,6 +147,11 @@ class Linear(Estimator):
     def _monomials(self, width: int, degree: int) -> NDArray[np.intp]:
         """Columns to multiply for each feature, shape (degree, n_features); 0 stands for one."""
         angles = len(self.angles) if self.features == "trigonometric" else 0
+        if degree > 100 or math.comb(width + angles + degree, degree) > _TOO_MANY_COLUMNS:
+            raise ValueError(
+                f"a polynomial of degree {degree} in {width + angles} columns has more than "
+                f"{_TOO_MANY_COLUMNS} features: choose a lower degree"
+            )
         sines = range(angles + 1, 2 * angles + 1)
         products = [
             product
@@ -176,9 +180,7 @@ class Linear(Estimator):
     def _feature_moments(self, X: Array) -> tuple[Array, Array]:
         chunks = range(0, len(X), _CHUNK)
         mean = sum(self._features(X[k : k + _CHUNK]).sum(axis=0) for k in chunks) / len(X)
-        squares = sum(
-            ((self._features(X[k : k + _CHUNK]) - mean) ** 2).sum(axis=0) for k in chunks
-        )
+        squares = sum(((self._features(X[k : k + _CHUNK]) - mean) ** 2).sum(axis=0) for k in chunks)
         deviation = np.sqrt(squares / len(X))
         return mean, np.where(deviation > 1e-13 * np.maximum(np.abs(mean), 1.0), deviation, 1.0)
 

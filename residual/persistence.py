@@ -7,12 +7,10 @@ numbers and text; nothing in the file is executed or imported.
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import importlib
 import json
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +120,9 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray]]:
     with safe_open(path, framework="numpy") as file:
         metadata = file.metadata() or {}
         if _KEY not in metadata:
-            raise _Unusable("a safetensors file, but not of this project: give one of residual.save")
+            raise _Unusable(
+                "a safetensors file, but not of this project: give one of residual.save"
+            )
         arrays = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
     header = json.loads(metadata[_KEY])
     if header["version"] != VERSION:
@@ -160,7 +160,9 @@ def _restore(header: dict[str, Any], arrays: dict[str, NDArray]) -> DifferenceMo
         np.array(fields["mean"], float),
         np.array(fields["scale"], float),
     )
-    model.predict(np.zeros((1, len(model.state_channels))), np.zeros((1, len(model.action_channels))))
+    model.predict(
+        np.zeros((1, len(model.state_channels))), np.zeros((1, len(model.action_channels)))
+    )
     return model
 
 
@@ -182,12 +184,10 @@ def _tuples(value: Any) -> Any:
 
 
 def _write(path: Path, content: bytes) -> None:
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.replace(name, path)
+        part.write_bytes(content)
+        os.replace(part, path)
     except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(name)
+        part.unlink(missing_ok=True)
         raise

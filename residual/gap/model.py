@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from residual.gap.candidates import Candidate
 from residual.gap.samples import Samples
+from residual.gap.workers import integrate
 from sims.effects.backlash import Backlash
 from sims.host import HostSimulator
 
@@ -40,14 +41,14 @@ class Model:
         self.step = np.array([knob.step for knob in self.knobs])
         plays = sum(isinstance(c.effect, Backlash) for c in self.chosen)
         self.physical = len(simulator.physical_channels)
-        self.width = self.physical + plays
+        self.width = len(simulator.integrated_channels) + plays
         self.free = list(range(self.physical))
         enters = [c.effect.enters for c in self.chosen]
         self._actuator = np.array(
             [enters[i] == "actuator" and not isinstance(self.chosen[i].effect, Backlash)
              for i in self.owner], bool,
         )  # fmt: skip
-        self.has_sensor = "sensor" in enters
+        self.has_sensor = "sensor" in enters + [effect.enters for effect in simulator.effects]
         # The samples are kept with their inputs, so that an identity is never reused.
         self._drives: dict[bytes, tuple[Samples, Array]] = {}
 
@@ -55,7 +56,7 @@ class Model:
         return len(self.knobs)
 
     def bind(self, theta: Array, each: int = 1) -> HostSimulator:
-        """The simulator with its effects.
+        """The simulator with its own effects and these.
 
         Args:
             theta: Unknowns, (p,), or (V, p) to serve a batch of V times ``each`` rows.
@@ -68,7 +69,7 @@ class Model:
                 effects.append(candidate.bind([float(value) for value in theta[own]]))
             else:
                 effects.append(candidate.bind([np.repeat(v, each) for v in theta[:, own].T]))
-        return self.simulator.with_effects(effects)
+        return self.simulator.with_effects((*self.simulator.effects, *effects))
 
     def widen(self, samples: Samples, states: Array, theta: Array) -> Array:
         """Physical states (n, n_physical) with the play of each backlash appended."""
@@ -89,7 +90,8 @@ class Model:
         """Typical variation of every state column, from that of the physical ones."""
         names = [channel.name for channel in self.simulator.physical_channels]
         joints = {joint.name: joint.position for joint in self.simulator.joints}
-        plays = [c.effect for c in self.chosen if isinstance(c.effect, Backlash)]
+        effects = (*self.simulator.plays(), *(c.effect for c in self.chosen))
+        plays = [effect for effect in effects if isinstance(effect, Backlash)]
         return np.append(physical, [0.1 * physical[names.index(joints[p.joint])] for p in plays])
 
     def inputs(self, samples: Samples, theta: Array) -> Array:
@@ -119,13 +121,20 @@ class Model:
             self._drives[key] = (samples, np.concatenate(parts, axis=1))
         return self._drives[key][1]
 
-    def advance(self, samples: Samples, states: Array, theta: Array) -> Array:
+    def advance(
+        self,
+        samples: Samples,
+        states: Array,
+        theta: Array,
+        rows: NDArray[np.int64] | None = None,
+    ) -> Array:
         """One sample interval from every state.
 
         Args:
             samples: Gives inputs and durations.
-            states: shape (V, n, n_s), a state at every sample.
+            states: shape (V, n, n_s), a state at every sample, or at those of ``rows``.
             theta: shape (V, p).
+            rows: Samples that the states belong to, if not all.
 
         Returns:
             States at the next sample, shape (V, n, n_s).
@@ -140,16 +149,19 @@ class Model:
         else:
             driven = self.inputs(samples, theta)
             driven = np.broadcast_to(driven, (variants, *driven.shape[1:]))
+        durations = samples.durations
+        if rows is not None:
+            driven, durations = driven[:, rows], durations[rows]
         host = self.bind(theta, each=n)
         own = len(host.integrated_channels)
         after = np.array(states.reshape(variants * n, width))
-        with np.errstate(all="ignore"):
-            after[:, :own] = host.integrate(
-                after[:, :own],
-                driven.reshape(variants * n, *driven.shape[2:]),
-                np.tile(samples.durations, variants),
-            )
-        return np.nan_to_num(after, nan=1e6, posinf=1e6, neginf=-1e6).reshape(variants, n, width)
+        after[:, :own] = integrate(
+            host,
+            after[:, :own],
+            driven.reshape(variants * n, *driven.shape[2:]),
+            np.tile(durations, variants),
+        )
+        return after.reshape(variants, n, width)
 
     def sense(self, states: Array, theta: Array) -> Array:
         """What the sensors show of states (V, n, n_s) under unknowns (V, p)."""
@@ -158,3 +170,17 @@ class Model:
         variants, n, width = states.shape
         host = self.bind(theta, each=n)
         return host.sense(np.array(states).reshape(variants * n, width)).reshape(states.shape)
+
+    def roll(
+        self, samples: Samples, rows: NDArray[np.int64], states: Array, steps: int, theta: Array
+    ) -> Array:
+        """Open loop from states (k, width) at some rows, shape (k, steps + 1, width)."""
+        driven = self.inputs(samples, theta[None])[0]
+        host = self.bind(theta)
+        own = len(host.integrated_channels)
+        path = np.repeat(states[:, None], steps + 1, axis=1)
+        for k in range(steps):
+            path[:, k + 1, :own] = integrate(
+                host, path[:, k, :own], driven[rows + k], samples.durations[rows + k]
+            )
+        return path

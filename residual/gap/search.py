@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap import noise
+from residual.gap.adequacy import remainder
 from residual.gap.candidates import Candidate
 from residual.gap.model import Model
 from residual.gap.samples import Samples
-from residual.gap.shooting import Fit, fit
+from residual.gap.shooting import Fit
 from residual.gap.tournament import Arena, Key, Settings, choose, rivals
-from residual.gap.windows import Windows, by_growth
+from residual.gap.windows import by_growth
+from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
@@ -29,13 +31,14 @@ class Found:
 
     Attributes:
         arena: All training runs; holds the fits of the chosen set, its rivals and the nominal.
+        trial: The runs of the tournament; holds all rivals that were tried.
         key: The chosen candidates.
         floor: Noise and smooth path around the chosen model.
         nominal_floor: The same around the nominal model.
-        history: Chosen sets in the order in which they were accepted.
     """
 
     arena: Arena
+    trial: Arena
     key: Key
     floor: noise.Floor
     nominal_floor: noise.Floor
@@ -64,65 +67,58 @@ def survey(
 
 
 def search(
-    simulator,
+    simulator: HostSimulator,
     candidates: Sequence[Candidate],
     samples: Samples,
     rng: np.random.Generator,
     settings: Settings,
     longest: int = 25,
-    most_runs: int = 6,
     tell: Callable[[str], None] = lambda _: None,
 ) -> Found:
-    """Choose the missing effects from training runs."""
-    some = sorted(rng.permutation(len(samples.runs))[:most_runs].tolist())
+    """Choose the missing effects from training runs.
+
+    Args:
+        simulator: The nominal simulator.
+        candidates: What may be missing.
+        samples: The training runs.
+        rng: Chooses the runs that the tournament sees.
+        settings: How hard to search.
+        longest: Longest window in samples.
+        tell: Progress.
+    """
+    some = sorted(rng.permutation(len(samples.runs))[: settings.runs].tolist())
     part, rows = samples.pick(some)
     nominal_floor, scale = survey(Model(simulator), samples, np.zeros(0), None, None)
-    floor, key, theta = nominal_floor, (), np.zeros(0)
     physical = len(simulator.physical_channels)
-    for turn in range(3):
-        model = Model(simulator, [candidates[i] for i in key])
-        windows = by_growth(part, floor.slope.by_state[rows][:, :physical, :physical], scale[:physical], longest)
-        arena = Arena(
-            simulator, candidates, part, windows, floor.nodes[rows][:, :physical], floor.sigma,
-            scale[:physical], settings, tell,
+    scale = scale[:physical]
+    floor, key, theta = nominal_floor, (), np.zeros(0)
+
+    def arena(table: Samples, index: NDArray[np.int64]) -> Arena:
+        nodes = floor.nodes[index][:, :physical]
+        by_state = floor.slope.by_state[index][:, :physical, :physical]
+        windows = by_growth(table, by_state, scale, longest)
+        return Arena(
+            simulator, candidates, table, windows, nodes, by_state, floor.sigma, scale, settings,
+            tell,
         )  # fmt: skip
+
+    for turn in range(3):
+        trial = arena(part, rows)
         before = key
-        key = choose(arena, {key: theta})
-        theta = arena.tried[key].theta
+        key = choose(trial, {key: theta})
+        theta = trial.tried[key].theta
+        if key:
+            model = Model(simulator, [candidates[i] for i in key])
+            floor, _ = survey(model, samples, theta, None, floor.sigma)
+        full = arena(samples, np.arange(len(samples)))
+        sets = {key: [theta]} if key else {}
+        sets.update({rival: [trial.tried[rival].theta] for rival in rivals(trial, key)})
+        full.refit(full.tried[()], sets, most=True)
+        full.threshold, full.noise_gain = trial.threshold, trial.noise_gain
+        left = remainder(full.tried[key], samples, full.windows, floor.sigma, floor, scale)
+        if left.adequate or (turn and key == before) or turn == 2:
+            break
         if not key:
             break
-        model = Model(simulator, [candidates[i] for i in key])
-        fresh, _ = survey(model, samples, theta, None, floor.sigma)
-        change = np.abs(np.log(fresh.sigma / floor.sigma)).max()
-        floor = fresh
-        if key == before and change < 0.05:
-            break
-        if turn == 0 and change < 0.05 and settled(arena, key):
-            break
-    found = everything(simulator, candidates, samples, arena, key, floor, scale, settings, longest)
-    return Found(found, key, floor, nominal_floor)
-
-
-def settled(arena: Arena, key: Key) -> bool:
-    """Whether the chosen set leaves about the noise."""
-    freedom = arena.size - 2 * len(arena.windows)
-    return arena.tried[key].costs.sum() / freedom < 1.1
-
-
-def everything(
-    simulator, candidates: Sequence[Candidate], samples: Samples, arena: Arena, key: Key,
-    floor: noise.Floor, scale: Array, settings: Settings, longest: int,
-) -> Arena:  # fmt: skip
-    """Refit nominal, chosen set and near rivals on all training runs."""
-    physical = len(simulator.physical_channels)
-    windows = by_growth(
-        samples, floor.slope.by_state[:, :physical, :physical], scale[:physical], longest
-    )
-    full = Arena(
-        simulator, candidates, samples, windows, floor.nodes[:, :physical], floor.sigma,
-        scale[:physical], settings, arena.tell,
-    )  # fmt: skip
-    sets = {key: [arena.tried[key].theta]} if key else {}
-    sets.update({rival: [arena.tried[rival].theta] for rival in rivals(arena, key)})
-    full.refit(full.tried[()], sets, most=True)
-    return full
+        theta = full.tried[key].theta
+    return Found(full, trial, key, floor, nominal_floor)

@@ -89,6 +89,7 @@ def slopes(
     widths: Array,
     scale: Array,
     by_state: Array | None = None,
+    rows: NDArray[np.int64] | None = None,
 ) -> Slope:
     """Everything at the nodes in one batch.
 
@@ -96,7 +97,31 @@ def slopes(
         widths: Finite-difference width of every unknown.
         scale: Typical variation of every state; a state is moved by 1e-4 of it.
         by_state: Derivative by the state from an earlier call, to be used again.
+        rows: Samples that matter, if not all; the derivatives of the others are zero.
     """
+    if rows is not None and len(rows) < len(nodes):
+        return _some(model, samples, nodes, theta, widths, scale, by_state, rows)
+    return _all(model, samples, nodes, theta, widths, scale, by_state, None)
+
+
+def _some(
+    model: Model, samples: Samples, nodes: Array, theta: Array, widths: Array, scale: Array,
+    by_state: Array | None, rows: NDArray[np.int64],
+) -> Slope:  # fmt: skip
+    known = None if by_state is None else by_state[rows]
+    part = _all(model, samples, nodes[rows], theta, widths, scale, known, rows)
+    full = {}
+    for field in dataclasses.fields(Slope):
+        values = getattr(part, field.name)
+        full[field.name] = np.zeros((len(nodes), *values.shape[1:]))
+        full[field.name][rows] = values
+    return Slope(**full)
+
+
+def _all(
+    model: Model, samples: Samples, nodes: Array, theta: Array, widths: Array, scale: Array,
+    by_state: Array | None, rows: NDArray[np.int64] | None,
+) -> Slope:  # fmt: skip
     n, width = nodes.shape
     p = len(theta)
     moves = np.zeros((0, width)) if by_state is not None else 1e-4 * np.diag(scale)
@@ -104,7 +129,7 @@ def slopes(
     thetas = np.vstack([theta[None], np.repeat(theta[None], len(moves), 0), theta + np.diag(up)])
     states = np.repeat(nodes[None], 1 + len(moves) + p, axis=0)
     states[1 : 1 + len(moves)] += moves[:, None, :]
-    after = model.advance(samples, states, thetas)
+    after = model.advance(samples, states, thetas, rows)
     base = after[0]
     if by_state is None:
         by_state = np.stack(
@@ -187,6 +212,7 @@ def fit(
     start = np.zeros((nodes.shape[1], len(free)))
     start[free, range(len(free))] = 1.0
     ridge = 1e-2 / scale[free]
+    used = np.unique(windows.index[windows.inside])
     memory = [i for i in range(nodes.shape[1]) if i not in free]
     best: Fit | None = None
     step_nodes = np.zeros_like(nodes)
@@ -194,7 +220,9 @@ def fit(
     damping, made = 1e-6, 0
     for turn in range(iterations + 1):
         width = model.step * max(widths * shrink**turn, 0.005)
-        slope = slopes(model, samples, nodes, theta, width, scale, by_state if turn == 0 else None)
+        slope = slopes(
+            model, samples, nodes, theta, width, scale, by_state if turn == 0 else None, used
+        )
         gaps = defects(samples, slope, nodes)
         response = carry(
             windows, slope.by_state, start, np.concatenate([slope.by_knob, gaps[..., None]], axis=2)

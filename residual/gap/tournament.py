@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from residual.gap.candidates import Candidate
 from residual.gap.model import Model
 from residual.gap.samples import Samples
-from residual.gap.shooting import Fit, fit
+from residual.gap.shooting import Fit, capped, fit
 from residual.gap.signatures import (
     Gain,
     Signatures,
@@ -42,7 +42,10 @@ class Settings:
         swaps: Exchanges that enter a round.
         most: Largest number of effects chosen.
         share: Smallest part of the noise energy worth a name.
-        first_turns, more_turns: Gauss-Newton iterations of all rivals, and of the close ones.
+        nominal_turns: Gauss-Newton iterations of the nominal simulator.
+        first_turns, more_turns: The same of all rivals, and of the close ones.
+        runs: Training runs that the tournament sees; the final fit sees all.
+        close: Rivals refitted on all training runs.
     """
 
     singles: int = 5
@@ -50,12 +53,19 @@ class Settings:
     swaps: int = 3
     most: int = 3
     share: float = 0.004
+    nominal_turns: int = 6
     first_turns: int = 3
     more_turns: int = 5
+    runs: int = 6
+    close: int = 4
 
 
 class Arena:
     """Fixed windows of some runs, on which rival sets of effects are refitted.
+
+    Args:
+        nodes: Smoothed path of the physical states, where every refit starts.
+        by_state: Derivatives by the state there.
 
     Attributes:
         tried: Every refitted set: sorted candidate numbers -> fit.
@@ -68,6 +78,7 @@ class Arena:
         samples: Samples,
         windows: Windows,
         nodes: Array,
+        by_state: Array,
         sigma: Array,
         scale: Array,
         settings: Settings,
@@ -80,13 +91,19 @@ class Arena:
             np.isfinite(samples.seen[windows.index[windows.inside]][:, samples.measured]).sum()
         )
         self.cap = np.inf
+        self.nodes = nodes
         self.tried: dict[Key, Fit] = {}
-        nominal = self._fit(Model(simulator), nodes, np.zeros(0), 6, None)
+        nominal = self._fit(Model(simulator), nodes, np.zeros(0), settings.nominal_turns, None)
         rows = windows.inside.sum(axis=1).max() * len(samples.measured)
         self.cap = 20 * max(float(np.median(nominal.costs)), float(rows))
-        self.tried[()] = self._fit(Model(simulator), nominal.nodes, np.zeros(0), 2, None)
+        self.tried[()] = dataclasses.replace(
+            nominal, cap=self.cap, merit=capped(nominal.costs, self.cap)
+        )
+        self.by_state = by_state
+        self._signatures: dict[Key, Signatures] = {}
         self.material = settings.share * self.size
-        self.threshold = max(16.0, self.material)
+        self.noise_gain = 16.0
+        self.threshold = max(self.noise_gain, self.material)
 
     def _fit(
         self, model: Model, nodes: Array, theta: Array, turns: int, by_state: Array | None,
@@ -139,9 +156,8 @@ class Arena:
             for theta in starts:
                 model = Model(self.simulator, [self.candidates[i] for i in key])
                 theta = np.clip(theta, model.low, model.high)
-                found = self._fit(
-                    model, base.nodes, theta, settings.first_turns, base.slope.by_state
-                )
+                # From the measured path, not from a rival's: that may be in a wrong basin.
+                found = self._fit(model, self.nodes, theta, settings.first_turns, self.by_state)
                 if key not in self.tried or found.merit < self.tried[key].merit:
                     self.tried[key] = found
         if not sets:
@@ -163,7 +179,13 @@ class Arena:
 
     def signatures(self, key: Key) -> Signatures:
         """Signatures of all candidates around a fitted set."""
-        return signatures(self.tried[key], self.samples, self.windows, self.sigma, self.candidates)
+        if key not in self._signatures:
+            self._signatures = {
+                key: signatures(
+                    self.tried[key], self.samples, self.windows, self.sigma, self.candidates
+                )
+            }
+        return self._signatures[key]
 
     def merged(self, key: Key, additions: Sequence[tuple[int, Array]], drop: Key = ()) -> tuple[Key, Array]:
         """Sorted key and start vector of a set with some candidates added and some dropped."""
@@ -221,6 +243,11 @@ def choose(arena: Arena, known: dict[Key, Array]) -> Key:
     return current
 
 
+def near_floor(arena: Arena, key: Key) -> bool:
+    """Whether a set leaves little more than noise."""
+    return arena.tried[key].merit < 1.3 * arena.size
+
+
 def additions(
     arena: Arena, current: Key, found: Signatures, singles: int
 ) -> dict[Key, list[Array]]:
@@ -228,6 +255,9 @@ def additions(
     settings = arena.settings
     sets: dict[Key, list[Array]] = {}
     ranked = [g for g in gains(found) if found.variants[g.variants[0]].candidate not in current]
+    if near_floor(arena, current):
+        # So near the noise the linear picture holds: what promises nothing need not be tried.
+        ranked = [g for g in ranked if g.value > 0.5 * arena.threshold]
     entered: dict[int, list[Gain]] = {}
     for gain in ranked:
         number = found.variants[gain.variants[0]].candidate
@@ -254,9 +284,10 @@ def additions(
             sets.setdefault(key, []).append(theta)
     if len(current) + 2 <= settings.most:
         kept = 0
+        lead_value = ranked[0].value
         for gain in pair_gains(found):
             numbers = [found.variants[i].candidate for i in gain.variants]
-            if kept == settings.pairs or gain.value < ranked[0].value + arena.threshold:
+            if kept == settings.pairs or gain.value < lead_value + arena.threshold:
                 break
             if any(n in current for n in numbers):
                 continue
@@ -316,8 +347,11 @@ def exchanges(arena: Arena, current: Key, found: Signatures) -> dict[Key, list[A
                     best.append((value - residual @ residual - arena.threshold, key, theta))
     best.sort(key=lambda item: -item[0])
     sets: dict[Key, list[Array]] = {}
-    for _, key, theta in best:
-        if len(sets) == arena.settings.swaps:
+    limit = -np.inf
+    if near_floor(arena, current):
+        limit = -float((fit_now.weights * fit_now.costs).sum()) - 3 * arena.threshold
+    for value, key, theta in best:
+        if len(sets) == arena.settings.swaps or value < limit:
             break
         if key and key not in arena.tried:
             sets.setdefault(key, [theta])
@@ -359,7 +393,7 @@ def backward(arena: Arena, best: Key) -> Key:
     return best
 
 
-def rivals(arena: Arena, key: Key, reach: float = 400.0) -> list[Key]:
+def rivals(arena: Arena, key: Key, reach: float = 100.0) -> list[Key]:
     """Refitted sets of the same size that differ in one member and come close in score."""
     if not key:
         return []
@@ -371,4 +405,4 @@ def rivals(arena: Arena, key: Key, reach: float = 400.0) -> list[Key]:
         and len(set(other) - set(key)) == 1
         and arena.score(other) - best < reach
     ]
-    return sorted(near, key=arena.score)[:4]
+    return sorted(near, key=arena.score)[: arena.settings.close]

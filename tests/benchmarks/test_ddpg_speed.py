@@ -2,9 +2,8 @@
 
 Run with ``pytest tests/benchmarks/test_ddpg_speed.py --benchmark-only``. What is compared runs
 in turns, and the ratios are in the ``extra_info`` of ``--benchmark-json``. "Same work" is ``STEPS``
-steps of one environment with one update of batch 64 each, networks 400 and 300 wide, float32. The
-critics differ in one place: stable-baselines3 feeds the action to the first layer, ours, as in the
-DDPG paper, to the second.
+steps of one environment with one update of batch 64 each, the same networks, 400
+and 300 wide, float32.
 """
 
 from __future__ import annotations

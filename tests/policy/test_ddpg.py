@@ -68,9 +68,9 @@ def test_one_update_is_algorithm_1_of_the_paper():
         return torch.tanh(torch.relu(torch.relu(x @ w1.T + b1) @ w2.T + b2) @ w3.T + b3)
 
     def critic(flat, x, u):
-        (w1, b1), (w2, b2), (wa, _), (w3, b3) = layers(agent._critics[0], flat)
-        hidden = torch.relu(x @ w1.T + b1) @ w2.T + b2 + u @ wa.T
-        return torch.relu(hidden) @ w3.T + b3
+        (w1, b1), (wa, _), (w2, b2), (w3, b3) = layers(agent._critics[0], flat)
+        hidden = torch.relu(x @ w1.T + u @ wa.T + b1)
+        return torch.relu(hidden @ w2.T + b2) @ w3.T + b3
 
     goal = r + config.gamma * alive * critic(
         before["critic1.target"], following, actor(before["actor.target"], following)

@@ -56,9 +56,9 @@ def actor_autograd(layers: list, observations: torch.Tensor) -> torch.Tensor:
 def critic_autograd(
     layers: list, observations: torch.Tensor, actions: torch.Tensor
 ) -> torch.Tensor:
-    (w1, b1), (w2, b2), (wa, _), (w3, b3) = layers
-    hidden = torch.relu(observations @ w1.T + b1)
-    return torch.relu(hidden @ w2.T + b2 + actions @ wa.T) @ w3.T + b3
+    (w1, b1), (wa, _), (w2, b2), (w3, b3) = layers
+    hidden = torch.relu(observations @ w1.T + actions @ wa.T + b1)
+    return torch.relu(hidden @ w2.T + b2) @ w3.T + b3
 
 
 @settings(max_examples=40, deadline=None)

@@ -130,7 +130,7 @@ def test_every_way_to_give_a_row_gives_the_same_prediction(fitted):
 
 def test_wrong_rows_get_scikit_learns_errors(fitted):
     X = wave(4)[0]
-    with pytest.raises(ValueError, match="4 features, but .* is expecting 3 features"):
+    with pytest.raises(ValueError, match=r"4 features, but .* is expecting 3 features"):
         fitted.predict(np.zeros((2, 4)))
     with pytest.raises(ValueError, match="Expected 2D array"):
         fitted.predict(X[0])

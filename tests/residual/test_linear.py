@@ -75,7 +75,7 @@ def test_whole_turns_of_an_angle_do_not_matter(features):
     X = rows(200, 0)
     model = Linear(features=features, angles=(0,), scales=(1.0, 10.0, 3.0)).fit(X, swing(X))
     for turns in (-3, 1, 20):
-        turned = X + [2 * np.pi * turns, 0, 0]
+        turned = X + np.array([2 * np.pi * turns, 0, 0])
         assert np.allclose(model.predict(turned), model.predict(X), rtol=1e-6, atol=1e-6)
 
 

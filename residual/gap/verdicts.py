@@ -1,0 +1,130 @@
+"""The answer in words."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from residual.gap.adequacy import Remainder
+from residual.gap.result import Blind, Gap, Number, Verdict
+
+#: Effects that differ in form more than in kind.
+FAMILIES: dict[str, frozenset[str]] = {
+    "delay or lag": frozenset({"delay", "actuator_lag"}),
+    "dry friction": frozenset({"coulomb_friction", "stribeck_friction"}),
+    "dissipation": frozenset(
+        {"viscous_friction", "coulomb_friction", "stribeck_friction", "quadratic_drag", "damping"}
+    ),
+    "constant push": frozenset({"constant_load", "actuator_bias", "sensor_offset"}),
+    "spring": frozenset({"linear_spring", "cubic_spring"}),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Claim:
+    """One chosen effect with everything that bears on its verdict.
+
+    Attributes:
+        name, where, label: What and where.
+        numbers: Fitted numbers.
+        ties: Effects that these data cannot exclude in its place.
+        twins: Exact aliases: no data could.
+        gain: What leaving it out would cost.
+        artefact: True if another step size or input hold explains it.
+        sentence: What the effect is.
+    """
+
+    name: str
+    where: str
+    label: str
+    numbers: dict[str, Number]
+    ties: tuple[str, ...]
+    twins: tuple[str, ...]
+    gain: float
+    artefact: bool
+    sentence: str
+
+
+def family(labels: Sequence[str]) -> str:
+    """The family that all effects belong to, or an empty string."""
+    names = {label.split("@")[0] for label in labels}
+    for title, members in FAMILIES.items():
+        if names <= members:
+            return title
+    return ""
+
+
+def verdicts(
+    claims: Sequence[Claim],
+    left: Remainder,
+    gap: Gap,
+    sets: Sequence[tuple[str, ...]],
+    tolerance: float | None,
+    blind: Sequence[Blind],
+) -> tuple[Verdict, ...]:
+    """All verdicts, most important first."""
+    found: list[Verdict] = []
+    small = tolerance is not None and gap.before.value <= tolerance
+    real = [claim for claim in claims if not claim.artefact]
+    # Three free effects imitate nearly anything, so they name nothing.
+    sound = left.adequate and len(claims) <= 2
+    removed = gap.windows_before / max(gap.windows_after, 1e-9)
+    for claim in real:
+        found.append(_effect(claim, sound, removed, gap))
+    for claim in claims:
+        if claim.artefact:
+            found.append(
+                Verdict("unexplained", "", "", {}, (claim.label,), "",
+                        f"numerics: what looks like {claim.label} changes with the integration "
+                        "step or the input hold, so it is not given a physical name")
+            )  # fmt: skip
+    if not claims and sound:
+        found.insert(0, Verdict("no_gap", "", "", {}, (), "", "no gap above noise"))
+    elif small:
+        found.insert(
+            0,
+            Verdict("no_gap", "", "", {}, (), "",
+                    f"nothing that matters: the {gap.horizon_s:.3g} s error is "
+                    f"{gap.before.value:.3g} {gap.unit}, within the tolerance of {tolerance:.3g}"),
+        )  # fmt: skip
+    if not sound:
+        found.append(_unexplained(left, gap, len(claims)))
+    if blind:
+        names = ", ".join(f"{b.effect} (needs {b.needs})" for b in blind)
+        found.append(
+            Verdict("needs_data", "", "", {}, tuple(b.effect for b in blind), "",
+                    f"this log could not show: {names}")
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _effect(claim: Claim, sound: bool, removed: float, gap: Gap) -> Verdict:
+    numbers = ", ".join(
+        f"{name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}"
+        for name, n in claim.numbers.items()
+    )
+    title = family((claim.label, *claim.ties)) if claim.ties else ""
+    says = f"{claim.label}: {numbers}"
+    confirmed = (sound or removed >= 10) and (not claim.ties or bool(title))
+    if claim.ties:
+        says += f"; these data cannot exclude {', '.join(claim.ties)}"
+        if title:
+            says += f" ({title}, form undecided)"
+    if claim.twins:
+        says += f"; the same motion as {', '.join(claim.twins)}"
+    if not sound:
+        says += "; a remainder is unexplained"
+    kind = "confirmed" if confirmed else "ambiguous"
+    return Verdict(
+        kind, claim.name, claim.where, claim.numbers, (*claim.twins, *claim.ties), title, says
+    )
+
+
+def _unexplained(left: Remainder, gap: Gap, count: int) -> Verdict:
+    size = float(left.ratio.max())
+    says = f"unexplained: the residual is {size:.3g} times the noise"
+    if left.force:
+        says += f"; it looks like a force that follows {left.force}"
+    if count > 2:
+        says += f"; {count} effects at once can imitate others, so take them as a lead only"
+    return Verdict("unexplained", "", "", {}, (), "", says)

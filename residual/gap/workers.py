@@ -1,0 +1,55 @@
+"""Spread the rows of a slow simulator over processes."""
+
+from __future__ import annotations
+
+import contextlib
+import contextvars
+from collections.abc import Iterator
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+_POOL: contextvars.ContextVar[Parallel | None] = contextvars.ContextVar("pool", default=None)
+
+#: Fewer rows than this are not worth sending.
+WORTH = 300
+
+
+@contextlib.contextmanager
+def workers(count: int) -> Iterator[None]:
+    """Within this context ``integrate`` uses ``count`` processes."""
+    if count <= 1:
+        yield
+        return
+    with Parallel(n_jobs=count) as pool:
+        token = _POOL.set(pool)
+        try:
+            yield
+        finally:
+            _POOL.reset(token)
+
+
+def integrate(host: HostSimulator, states: Array, inputs: Array, durations: Array) -> Array:
+    """``host.integrate``, in parallel over chunks of rows inside ``workers``."""
+    pool = _POOL.get()
+    if pool is None or len(states) < WORTH:
+        return _rows(host, states, inputs, durations)
+    # Neighbouring rows may need more work than others, so every process gets several chunks.
+    edges = np.linspace(0, len(states), 4 * pool.n_jobs + 1).astype(int)
+    parts = pool(
+        delayed(_rows)(host.take(np.s_[a:b]), states[a:b], inputs[a:b], durations[a:b])
+        for a, b in zip(edges[:-1], edges[1:], strict=True)
+    )
+    return np.concatenate(parts)
+
+
+def _rows(host: HostSimulator, states: Array, inputs: Array, durations: Array) -> Array:
+    # A trial that runs away is a number like any other here: it loses.
+    with np.errstate(all="ignore"):
+        after = host.integrate(states, inputs, durations)
+    return np.nan_to_num(after, nan=1e6, posinf=1e6, neginf=-1e6)
