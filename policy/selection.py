@@ -3,7 +3,7 @@
 Returns oscillate by hundreds from one evaluation to the next, so the last policy is a poor
 choice. The one with the best single rollout is also risky: on a corrected simulator it may
 live from an error of the correction. The rule here averages one rollout without noise and a
-few with exploration noise, all in the environment that the agent learns in.
+few with a little noise, all in the environment that the agent learns in.
 """
 
 from __future__ import annotations
@@ -82,6 +82,7 @@ def learn_and_select(
     steps: int,
     every: int = 1000,
     noisy: int = 3,
+    sigma: float = 0.03,
     seed: int = 0,
     callback: Callable[[Point], bool | None] | None = None,
     random_steps: int = 0,
@@ -99,7 +100,9 @@ def learn_and_select(
             disturb the episode being learnt from.
         steps: Environment steps to learn for.
         every: Steps between evaluations.
-        noisy: Rollouts with noise per evaluation, as strong as the agent's exploration.
+        noisy: Rollouts with noise per evaluation.
+        sigma: Their noise, as ``DDPGConfig.noise_sigma``. As much as in exploration would
+            prefer policies that are safe under noise to those that are good without it.
         seed: Seed of the evaluations' start states and noise.
         callback: Called with every evaluation; learning stops if it returns True.
         random_steps: As in ``DDPG.learn``.
@@ -117,7 +120,7 @@ def learn_and_select(
             return False
         scored_at = agent.updates
         point = Point(
-            step, *score(agent.policy, evaluation_env, noisy, c.noise_sigma, c.noise_theta, seed)
+            step, *score(agent.policy, evaluation_env, noisy, sigma, c.noise_theta, seed)
         )
         curve.append(point)
         if not kept or point.score > kept[0][2].score:

@@ -45,6 +45,7 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._renderer: Renderer | None = renderer_for(simulator) if render_mode else None
         low = np.array([channel.low for channel in simulator.action_channels])
         high = np.array([channel.high for channel in simulator.action_channels])
+        self._bounds = low, high
         self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
         bounds = np.concatenate(
             [
@@ -76,9 +77,7 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     ) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Hold ``action`` for one control period; a time-out is ``truncated``."""
         states = self._state[None]
-        actions = np.clip(
-            np.asarray(action, float)[None], self.action_space.low, self.action_space.high
-        )
+        actions = np.clip(np.asarray(action, float)[None], *self._bounds)
         next_states = self.simulator.step(states, actions)
         reward = float(self.task.reward(states, actions, next_states)[0])
         terminated = bool(self.task.terminal(next_states)[0])
@@ -87,7 +86,7 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         truncated = self._steps >= self.task.horizon
         return self._observe(), reward, terminated, truncated, {"state": self._state.copy()}
 
-    def render(self) -> np.ndarray | None:  # type: ignore[override]
+    def render(self) -> np.ndarray | None:
         """The present state as an RGB picture, shape (height, width, 3), or None."""
         return self._renderer.frame(self._state) if self._renderer else None
 

@@ -238,6 +238,9 @@ class HostSimulator(Simulator):
                 means, rise, _ = path.lagged(means, rise, durations, lag.time_constant, start)
             columns.append((np.stack([means, rise], axis=-1) if rises else means)[:, k:])
         rows = {e.rows for e in self.effects if isinstance(e, ActuatorEffect)} - {None}
+        if not columns:
+            shape = (len(actions), substeps, 0)
+            return np.empty((*shape, 2) if rises else shape)
         inputs = np.stack(np.broadcast_arrays(*columns), axis=3)
         if not rows:
             return inputs[0]

@@ -46,7 +46,7 @@ class Budget:
     true_samples: int = 3750
     iterations: int = 2
     idealised_steps: int = 20_000
-    difference_steps: int = 10_000
+    difference_steps: int = 20_000
     true_steps: int = 0
     baseline_steps: int = 0
 
@@ -147,7 +147,8 @@ def learn_by_difference(
         folders[f"difference-{iteration}"] = policy
         seen = {"iteration": iteration, "true_samples": iteration * budget.true_samples}
         policies.append(steps.record(policy, "difference") | seen)
-        accuracy.append(seen | read_json(measured / "accuracy.json") | read_json(model / "fit.json"))
+        errors = read_json(measured / "accuracy.json")
+        accuracy.append(seen | errors | read_json(model / "fit.json"))
 
     # The reference and the cold start are one experiment, read at two budgets.
     if longest := max(budget.true_steps, budget.baseline_steps):

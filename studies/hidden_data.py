@@ -80,7 +80,6 @@ class Truth:
     saturation: float = np.inf
     delay: float = 0.0
     actuator_lag: float = 0.0
-    backlash: float = 0.0
     sensor_offset: float = 0.0
     sensor_scale: float = 0.0
     resonance: float = 0.0
@@ -236,6 +235,4 @@ def make_logs(
     path, volts = simulate(truth, motion, excitation, runs, steps)
     seen = measure(truth, path, NOISES[noise], sensor)
     times = DT * np.arange(steps + 1)
-    return [
-        Trajectory(f"run {i}", times, seen[i], volts[i][:, None]) for i in range(runs)
-    ]
+    return [Trajectory(f"run {i}", times, seen[i], volts[i][:, None]) for i in range(runs)]

@@ -18,6 +18,7 @@ continues where it stopped when the same command is given again.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import sys
 import time
@@ -166,9 +167,9 @@ def instantiate(config: Mapping[str, Any]) -> PendulumTrial:
     return PendulumTrial(**{name: chosen[name] for name in names})
 
 
-def quiet_trial(config: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def quiet_trial(stages: Path, config: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """``run_trial`` without progress, for worker processes."""
-    return run_trial(config, folder, Stages(folder.parent / "stages"), Silent())
+    return run_trial(config, folder, Stages(stages), Silent())
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -178,20 +179,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     settings = json.loads(parser.dump(given, format="json", skip_unset=False))
     output, jobs, grid = (settings.pop(name) for name in ("output", "jobs", "grid"))
     settings.pop("config", None)
+    # Runs in the default place share their finished steps; a folder given holds all of its own.
+    stages = (Path(output) if output else RESULTS) / "stages"
     instantiate(settings)  # a wrong value is reported before anything is written
     if grid:
         name = Path(str(given.config[0])).stem if given.config else "grid"
-        run_grid(settings, grid, Path(output) if output else RESULTS / name, jobs)
+        target = Path(output) if output else RESULTS / name
+        run_grid(settings, grid, target, stages, jobs)
     else:
-        run_single(settings, Path(output) if output else None)
+        label = trial_label(settings)
+        target = Path(output) if output else trial_folder(RESULTS, label, settings)
+        run_single(settings, target, stages)
 
 
-def run_single(settings: dict[str, Any], output: Path | None) -> None:
+def run_single(settings: dict[str, Any], output: Path, stages: Path) -> None:
     """One trial with progress bars, a table on the terminal and a report."""
-    stages = Stages(output / "stages" if output else RESULTS / "stages")
-    output = output or trial_folder(RESULTS, trial_label(settings), settings)
     begin = time.perf_counter()
-    results = run_trial(settings, output, stages, Bars())
+    results = run_trial(settings, output, Stages(stages), Bars())
     results["seconds"] = time.perf_counter() - begin
     atomic_write_text(output / "config.yaml", yaml.safe_dump(settings, sort_keys=False))
     write_report(results, output)
@@ -200,7 +204,11 @@ def run_single(settings: dict[str, Any], output: Path | None) -> None:
 
 
 def run_grid(
-    settings: dict[str, Any], grid: list[dict[str, list[Any]]], output: Path, jobs: int
+    settings: dict[str, Any],
+    grid: list[dict[str, list[Any]]],
+    output: Path,
+    stages: Path,
+    jobs: int,
 ) -> None:
     """Many trials, a table over all of them and a report."""
     try:
@@ -208,7 +216,7 @@ def run_grid(
     except ValueError as error:
         fail(str(error))
     trials = {trial_folder(output, trial_label(config), config): config for config in configs}
-    results, failures = run_trials(trials, quiet_trial, jobs, Bars())
+    results, failures = run_trials(trials, functools.partial(quiet_trial, stages), jobs, Bars())
     if results:
         print(f"\n{write_grid_report(results, failures, output)}")
         print(f"\nreport: {output / 'report.html'}")
@@ -238,4 +246,7 @@ class _HelpFormatter(DefaultHelpFormatter, RawDescriptionHelpFormatter):
 
 
 if __name__ == "__main__":
-    main()
+    # By its importable name, which worker processes need to find the same classes.
+    from studies import pendulum_gap
+
+    pendulum_gap.main()

@@ -133,11 +133,14 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
     shared = rows[rows["name"] != "difference"].drop_duplicates(
         ["name", "seed", "true_samples", "return_true"]
     )
-    for (name, samples), part in shared.groupby(["name", "true_samples"], sort=False):
-        table.append(_row("", POLICY_WORDS[name], samples, mean(part["return_true"])))
+    for _, part in shared.groupby(["name", "true_samples"], sort=False):
+        first = part.iloc[0]
+        words = POLICY_WORDS[first["name"]]
+        table.append(_row("", words, int(first["true_samples"]), returns(part)))
     learnt = rows[rows["name"] == "difference"]
     keys = ["estimator", "samples_per_update", "iteration"]
-    for (estimator, samples, iteration), part in learnt.groupby(keys, sort=False):
+    for _, part in learnt.groupby(keys, sort=False):
+        estimator, samples, iteration = part.iloc[0][keys]
         seen = errors[
             (errors["estimator"] == estimator)
             & (errors["samples_per_update"] == samples)
@@ -149,8 +152,8 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
             _row(
                 estimator,
                 POLICY_WORDS["difference"].format(iteration=iteration),
-                samples * iteration,
-                mean(part["return_true"]),
+                int(samples * iteration),
+                returns(part),
             )
             | {
                 "one-step error": round(one_step, 4),
@@ -159,6 +162,11 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(table)
+
+
+def returns(rows: pd.DataFrame) -> Mean:
+    """Mean return on the true system of some policies."""
+    return mean(rows["return_true"].tolist())
 
 
 def _row(estimator: str, policy: str, samples: int, value: Mean) -> dict[str, Any]:
@@ -230,7 +238,7 @@ def complexity_sections(
             [
                 POLICY_WORDS[name].format(iteration=int(part["iteration"].iloc[0])),
                 int(part["true_samples"].iloc[0]),
-                str(mean(part.drop_duplicates("seed")["return_true"])),
+                str(returns(part.drop_duplicates("seed"))),
                 PAPER_FIXED_BUDGET[name],
             ]
             for name, part in at_budget.groupby("name", sort=False)
@@ -282,7 +290,7 @@ def budget_figure(
     for colour, (estimator, part) in zip(
         PALETTE * 2, first.groupby("estimator", sort=False), strict=False
     ):
-        means = {n: mean(group["return_true"]) for n, group in part.groupby("true_samples")}
+        means = {n: returns(group) for n, group in part.groupby("true_samples")}
         budgets = list(means)
         axes[0, 0].plot(budgets, [-m.value for m in means.values()], "o-", color=colour,
                         label=estimator)  # fmt: skip
@@ -290,7 +298,8 @@ def budget_figure(
                                 [-m.low for m in means.values()], color=colour, alpha=0.15,
                                 linewidth=0)  # fmt: skip
         own = visited[visited["estimator"] == estimator]
-        error = own.groupby("samples_per_update")[list(own.filter(like="one_step"))].mean().mean(1)
+        channels = list(own.filter(like="one_step"))
+        error = own.groupby("samples_per_update")[channels].mean().mean(axis=1)
         axes[1, 0].plot(error.index, error, "o-", color=colour)
         numbers += [
             {"estimator": estimator, "true_samples": n, "return": m.value,

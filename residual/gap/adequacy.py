@@ -61,7 +61,7 @@ def generic_forces(
             for k in (1, 2, 3, 5):
                 add(f"sin({k} {channel.name})", np.sin(k * x))
                 add(f"cos({k} {channel.name})", np.cos(k * x))
-        size = max(np.std(x), 1e-12)
+        size = max(float(np.std(x)), 1e-12)
         middle = 0.0 if channel.kind == "rate" else float(np.mean(x))
         z = (x - middle) / size
         add(channel.name, z)
@@ -75,14 +75,14 @@ def generic_forces(
         before[start] = samples.actions[start]
     for j, channel in enumerate(simulator.action_channels):
         u, past = samples.actions[:, j], before[:, j]
-        size = max(np.std(u), 1e-12)
+        size = max(float(np.std(u)), 1e-12)
         add(channel.name, u / size)
         add(f"{channel.name} |{channel.name}|", u * np.abs(u) / size**2)
         add(f"sign of {channel.name}", np.tanh(2 * u / size))
         add(f"change of {channel.name}", (u - past) / size)
         for i, other in enumerate(channels):
             if other.kind == "rate":
-                z = nodes[:, i] / max(np.std(nodes[:, i]), 1e-12)
+                z = nodes[:, i] / max(float(np.std(nodes[:, i])), 1e-12)
                 add(f"{channel.name} {other.name}^2", u * z**2 / size)
     return np.stack(columns, axis=1), names
 
@@ -108,7 +108,8 @@ def remainder(
     unit = push(model, samples)
     columns = np.einsum("nsd,ng->nsdg", unit, values).reshape(len(samples), model.width, -1)
     response = carry(windows, fit.slope.by_state, np.zeros((model.width, 0)), columns)
-    shown = observe(samples, windows, fit.slope, response, sigma).reshape(count, -1, columns.shape[2])
+    shown = observe(samples, windows, fit.slope, response, sigma)
+    shown = shown.reshape(count, -1, columns.shape[2])
     shown = shown - fit.basis @ (fit.basis.transpose(0, 2, 1) @ shown)
     chosen = flatten(fit.by_knob, fit.weights)
     matrix = project_out(chosen, flatten(shown, fit.weights))

@@ -131,9 +131,9 @@ def _candidate(effect: Effect, known: dict[str, Quantity], reach: float) -> Cand
         starts = [tuple(s / quantities[i].scale * reach for s in starts[0]) for i in shapes]
     trials = []
     for shape in itertools.product(*starts):
-        sizes = [
-            list(quantities[i].starts) or [0.1 * quantities[i].scale] for i in strengths
-        ] or [[0.0]]
+        sizes = [list(quantities[i].starts) or [0.1 * quantities[i].scale] for i in strengths] or [
+            [0.0]
+        ]
         if len(strengths) > 1:
             sizes = [[size[0]] for size in sizes]
         for chosen in sizes[0] if len(strengths) <= 1 else [None]:

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 def features(simulator: HostSimulator, states: Array, actions: Array, before: Array) -> Array:
     """States (angles as cosine and sine), inputs and the inputs before, (n, features)."""
-    columns = []
+    columns: list[Array] = []
     for i, channel in enumerate(simulator.physical_channels):
         x = states[:, i]
         columns += [np.cos(x), np.sin(x)] if channel.angle else [x]

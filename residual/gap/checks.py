@@ -7,8 +7,10 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.model import Model
+from residual.gap.samples import Samples
 from residual.gap.search import Found
-from residual.gap.shooting import fit
+from residual.gap.shooting import Fit, fit
 from residual.gap.windows import Windows
 
 Array = NDArray[np.float64]
@@ -42,7 +44,7 @@ def integration(found: Found, most_windows: int | None = None) -> Integration:
     model = best.model
     scale = model.scales(arena.scale)
 
-    def again(model, samples, start, theta):  # type: ignore[no-untyped-def]
+    def again(model: Model, samples: Samples, start: Array, theta: Array) -> Fit:
         return fit(model, samples, windows, start, theta, arena.sigma, scale, 4, arena.cap, 0.02)
 
     finer = dataclasses.replace(arena.samples, substeps=2 * arena.samples.substeps)

@@ -16,7 +16,7 @@ from residual.gap.windows import Windows, by_growth
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
-Correction = Callable[[Array, Array], Array]
+Correction = Callable[[Array, NDArray[np.int64]], Array]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,7 +63,7 @@ def plan(
     scaled = jacobians * scale[None, None, :] / scale[None, :, None]
     while True:
         passes, total, kept = [], 0, 0
-        for offset in (0, (lead + steps) // 2):
+        for offset in sorted({k * (lead + steps) // 4 for k in range(4)}):
             rows = []
             for start, stop in samples.runs:
                 for a in range(start + offset, stop - lead - steps + 1, lead + steps):

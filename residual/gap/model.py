@@ -101,7 +101,7 @@ class Model:
         """
         if not self._actuator.any():
             theta = theta[:1]
-        key = theta[:, self._actuator].tobytes() + np.int64([id(samples), len(theta)]).tobytes()
+        key = theta[:, self._actuator].tobytes() + np.array([id(samples), len(theta)]).tobytes()
         if key not in self._drives:
             if len(self._drives) > 4:
                 self._drives.clear()

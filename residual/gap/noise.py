@@ -50,7 +50,7 @@ def push(model: Model, samples: Samples) -> Array:
     for j, column in enumerate(columns):
         effect[:, column, j] = samples.durations
         if channels[column].kind == "rate" and channels[column].rate_of in names:
-            effect[:, names.index(channels[column].rate_of), j] = 0.5 * samples.durations**2
+            effect[:, names.index(str(channels[column].rate_of)), j] = 0.5 * samples.durations**2
     return effect
 
 
@@ -190,7 +190,9 @@ def local_noise(samples: Samples, length: int = 9) -> Array:
                     squares.append(float(rest @ rest) / (length - 4))
         spread = np.nanstd(samples.seen[:, column])
         guess = np.sqrt(np.median(squares)) if squares else 1e-3 * spread
-        guesses.append(max(guess, quantum(samples.seen[:, column]) / np.sqrt(12), 1e-9 * spread, 1e-12))
+        guesses.append(
+            max(guess, quantum(samples.seen[:, column]) / np.sqrt(12), 1e-9 * spread, 1e-12)
+        )
     return np.array(guesses)
 
 

@@ -150,7 +150,6 @@ class Where:
         lags_s: Lags of the input in s.
         lag_correlation: Correlation of the missing acceleration with the input that long ago.
         run_ratio: Residual over noise of each training run, by name.
-        times_s, ratio: Residual over noise along time, for the worst run.
     """
 
     by_channel: dict[str, float]

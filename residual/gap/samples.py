@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from residual.trajectories import Trajectory
 
 Array = NDArray[np.float64]
+Hold = Literal["zero", "linear"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,11 +38,11 @@ class Samples:
     runs: tuple[tuple[int, int], ...]
     names: tuple[str, ...]
     substeps: int
-    hold: str = "zero"
+    hold: Hold = "zero"
 
     @classmethod
     def join(
-        cls, trajectories: Sequence[Trajectory], substeps: int, hold: str = "zero"
+        cls, trajectories: Sequence[Trajectory], substeps: int, hold: Hold = "zero"
     ) -> Samples:
         """All trajectories below each other.
 
@@ -53,7 +55,9 @@ class Samples:
         return cls(
             seen=np.concatenate([t.states for t in trajectories]).astype(float),
             actions=np.concatenate([np.vstack([t.actions, t.actions[-1:]]) for t in trajectories]),
-            durations=np.concatenate([np.append(t.durations, t.durations[-1]) for t in trajectories]),
+            durations=np.concatenate(
+                [np.append(t.durations, t.durations[-1]) for t in trajectories]
+            ),
             times=np.concatenate([t.times for t in trajectories]),
             runs=tuple(zip([0, *ends[:-1]], ends, strict=True)),
             names=tuple(t.name for t in trajectories),

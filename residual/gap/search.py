@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from residual.gap import noise
 from residual.gap.adequacy import remainder
+from residual.gap.arena import Arena, Key, Settings
 from residual.gap.candidates import Candidate
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from residual.gap.shooting import Fit
-from residual.gap.tournament import Arena, Key, Settings, choose, rivals
+from residual.gap.tournament import choose, rivals
 from residual.gap.windows import by_growth
 from sims.host import HostSimulator
 
@@ -91,7 +92,8 @@ def search(
     nominal_floor, scale = survey(Model(simulator), samples, np.zeros(0), None, None)
     physical = len(simulator.physical_channels)
     scale = scale[:physical]
-    floor, key, theta = nominal_floor, (), np.zeros(0)
+    floor, theta = nominal_floor, np.zeros(0)
+    key: Key = ()
 
     def arena(table: Samples, index: NDArray[np.int64]) -> Arena:
         nodes = floor.nodes[index][:, :physical]

@@ -132,9 +132,7 @@ def _all(
     after = model.advance(samples, states, thetas, rows)
     base = after[0]
     if by_state is None:
-        by_state = np.stack(
-            [(after[1 + i] - base) / moves[i, i] for i in range(width)], axis=-1
-        )
+        by_state = np.stack([(after[1 + i] - base) / moves[i, i] for i in range(width)], axis=-1)
     by_knob = np.zeros((n, width, p))
     for j in range(p):
         by_knob[:, :, j] = (after[1 + len(moves) + j] - base) / up[j]
@@ -213,7 +211,7 @@ def fit(
     start[free, range(len(free))] = 1.0
     ridge = 1e-2 / scale[free]
     used = np.unique(windows.index[windows.inside])
-    memory = [i for i in range(nodes.shape[1]) if i not in free]
+    memory = np.array([i for i in range(nodes.shape[1]) if i not in free], int)
     best: Fit | None = None
     step_nodes = np.zeros_like(nodes)
     step_theta = np.zeros_like(theta)
@@ -232,7 +230,9 @@ def fit(
         if p and model.has_sensor:
             measured = samples.measured
             extra = slope.shown_by_knob[:, measured][windows.index] / sigma[:, None]
-            valid = np.isfinite(samples.seen[:, measured])[windows.index] & windows.inside[..., None]
+            valid = (
+                np.isfinite(samples.seen[:, measured])[windows.index] & windows.inside[..., None]
+            )
             shown[..., f : f + p] += extra * valid[..., None]
         residual = misfit(samples, windows, slope, sigma) - shown[..., -1]
         count = len(windows)
@@ -260,7 +260,7 @@ def fit(
             break
         if turn == iterations or (finished and turn >= min(iterations, 4)):
             break
-        if not better:
+        if not better and best is not None:
             # Back along the last step: the same direction, shorter.
             made += 1
             factor = 0.3**made
@@ -275,11 +275,13 @@ def fit(
         limit = 3 * scale[free]
         first = first * np.minimum(1.0, (limit / np.maximum(np.abs(first), 1e-300)).min(1))[:, None]
         moves = (
-            response[..., :f] @ first[:, None, :, None]
-        )[..., 0] + response[..., f : f + p] @ step_theta + response[..., -1]
+            (response[..., :f] @ first[:, None, :, None])[..., 0]
+            + response[..., f : f + p] @ step_theta
+            + response[..., -1]
+        )
         step_nodes = np.zeros_like(nodes)
         step_nodes[windows.index[windows.inside]] = moves[windows.inside]
-        if memory:
+        if len(memory):
             for a, b in samples.runs:
                 fresh = np.setdiff1d(windows.index[:, 0], [a])
                 fresh = fresh[(fresh > a) & (fresh < b)]
@@ -295,7 +297,9 @@ def capped(costs: Array, cap: float) -> float:
     """Sum of costs, those above the cap counted by their logarithm."""
     if not np.isfinite(cap):
         return float(costs.sum())
-    return float(np.where(costs > cap, cap * (1 + np.log(np.maximum(costs, cap) / cap)), costs).sum())
+    return float(
+        np.where(costs > cap, cap * (1 + np.log(np.maximum(costs, cap) / cap)), costs).sum()
+    )
 
 
 def _step(
@@ -322,7 +326,9 @@ def _step(
         if not loose.any():
             break
         shift = right[loose] - matrix[np.ix_(loose, active)] @ (step[active] * size[active])
-        step[loose] = np.linalg.lstsq(matrix[np.ix_(loose, loose)], shift, rcond=None)[0] / size[loose]
+        step[loose] = (
+            np.linalg.lstsq(matrix[np.ix_(loose, loose)], shift, rcond=None)[0] / size[loose]
+        )
         out = loose & ((step < low) | (step > high))
         if not out.any():
             break

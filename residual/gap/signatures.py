@@ -112,9 +112,9 @@ def signatures(
             moved.append(after.transpose(1, 2, 0))
             shown.append(np.zeros((n, width, len(rows))))
         for trial in candidate.trials:
-            columns = tuple(range(total, total + len(trial.values)))
-            variants.append(Variant(number, trial, columns, candidate.linear))
-            total += len(columns)
+            places = tuple(range(total, total + len(trial.values)))
+            variants.append(Variant(number, trial, places, candidate.linear))
+            total += len(places)
     start = np.zeros((width, 0))
     response = carry(windows, fit.slope.by_state, start, np.concatenate(moved, axis=2))
     columns = observe(samples, windows, fit.slope, response, sigma)
@@ -177,7 +177,9 @@ def variant_start(variant: Variant, coefficients: Array) -> Array:
     return start
 
 
-def constrained(columns: Array, residual: Array, one_sided: NDArray[np.bool_]) -> tuple[float, Array]:
+def constrained(
+    columns: Array, residual: Array, one_sided: NDArray[np.bool_]
+) -> tuple[float, Array]:
     """Least squares with some coefficients not negative; fall of the cost and coefficients."""
     gram, right = columns.T @ columns, columns.T @ residual
     return constrained_gram(gram, right, one_sided)
@@ -202,7 +204,7 @@ def constrained_gram(
         if not wrong.any():
             break
         alive = alive & ~wrong
-    return float(max(2 * best @ right - best @ gram @ best, 0.0)), best
+    return max(float(2 * best @ right - best @ gram @ best), 0.0), best
 
 
 def pair_gains(found: Signatures, top: int = 40) -> list[Gain]:

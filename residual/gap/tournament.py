@@ -5,16 +5,10 @@ The linear gain of a signature only says who may enter; it never names an effect
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.candidates import Candidate
-from residual.gap.model import Model
-from residual.gap.samples import Samples
-from residual.gap.shooting import Fit, capped, fit
+from residual.gap.arena import Arena, Key
 from residual.gap.signatures import (
     Gain,
     Signatures,
@@ -22,186 +16,10 @@ from residual.gap.signatures import (
     gains,
     pair_gains,
     project_out,
-    signatures,
     variant_start,
 )
-from residual.gap.windows import Windows
-from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
-Key = tuple[int, ...]
-
-
-@dataclasses.dataclass(frozen=True)
-class Settings:
-    """How hard to search.
-
-    Args:
-        singles: Effects that enter a round by their own gain.
-        pairs: Pairs that enter a round.
-        swaps: Exchanges that enter a round.
-        most: Largest number of effects chosen.
-        share: Smallest part of the noise energy worth a name.
-        nominal_turns: Gauss-Newton iterations of the nominal simulator.
-        first_turns, more_turns: The same of all rivals, and of the close ones.
-        runs: Training runs that the tournament sees; the final fit sees all.
-        close: Rivals refitted on all training runs.
-    """
-
-    singles: int = 5
-    pairs: int = 2
-    swaps: int = 3
-    most: int = 3
-    share: float = 0.004
-    nominal_turns: int = 6
-    first_turns: int = 3
-    more_turns: int = 5
-    runs: int = 6
-    close: int = 4
-
-
-class Arena:
-    """Fixed windows of some runs, on which rival sets of effects are refitted.
-
-    Args:
-        nodes: Smoothed path of the physical states, where every refit starts.
-        by_state: Derivatives by the state there.
-
-    Attributes:
-        tried: Every refitted set: sorted candidate numbers -> fit.
-    """
-
-    def __init__(
-        self,
-        simulator: HostSimulator,
-        candidates: Sequence[Candidate],
-        samples: Samples,
-        windows: Windows,
-        nodes: Array,
-        by_state: Array,
-        sigma: Array,
-        scale: Array,
-        settings: Settings,
-        tell: Callable[[str], None] = lambda _: None,
-    ) -> None:
-        self.simulator, self.candidates = simulator, list(candidates)
-        self.samples, self.windows = samples, windows
-        self.sigma, self.scale, self.settings, self.tell = sigma, scale, settings, tell
-        self.size = int(
-            np.isfinite(samples.seen[windows.index[windows.inside]][:, samples.measured]).sum()
-        )
-        self.cap = np.inf
-        self.nodes = nodes
-        self.tried: dict[Key, Fit] = {}
-        nominal = self._fit(Model(simulator), nodes, np.zeros(0), settings.nominal_turns, None)
-        rows = windows.inside.sum(axis=1).max() * len(samples.measured)
-        self.cap = 20 * max(float(np.median(nominal.costs)), float(rows))
-        self.tried[()] = dataclasses.replace(
-            nominal, cap=self.cap, merit=capped(nominal.costs, self.cap)
-        )
-        self.by_state = by_state
-        self._signatures: dict[Key, Signatures] = {}
-        self.material = settings.share * self.size
-        self.noise_gain = 16.0
-        self.threshold = max(self.noise_gain, self.material)
-
-    def _fit(
-        self, model: Model, nodes: Array, theta: Array, turns: int, by_state: Array | None,
-        widths: float = 0.3,
-    ) -> Fit:  # fmt: skip
-        nodes = model.widen(self.samples, nodes[:, : model.physical], theta)
-        if by_state is not None and by_state.shape[1] != model.width:
-            by_state = None
-        return fit(
-            model, self.samples, self.windows, nodes, theta, self.sigma, model.scales(self.scale),
-            iterations=turns, cap=self.cap, by_state=by_state, widths=widths,
-        )  # fmt: skip
-
-    def calibrate(self, found: Signatures) -> None:
-        """Set the threshold from no-gap redraws: noise alone pushed through the same signatures.
-
-        The largest gain over all candidates is recorded for each redraw of the noise, and the
-        threshold is the 99.9 % point of a Gumbel law fitted to these maxima.
-        """
-        rng = np.random.default_rng(0)
-        size = np.sqrt(np.maximum(found.strengths, 1e-300))
-        alive = found.strengths > 1e-9 * max(found.strengths.max(initial=0.0), 1e-300)
-        if not alive.any():
-            return
-        unit = found.matrix[:, alive] / size[alive]
-        # The Gram matrix of unit signatures is the covariance of their products with the noise.
-        values, vectors = np.linalg.eigh(unit.T @ unit)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        drawn = root @ rng.standard_normal((len(values), 400))
-        largest = (drawn**2).max(axis=0)
-        spread = largest.std() * np.sqrt(6) / np.pi
-        point = largest.mean() - 0.5772 * spread - spread * np.log(-np.log(0.999))
-        self.threshold = max(float(point), self.material)
-
-    def score(self, key: Key) -> float:
-        """Cost plus the price of the unknowns; lower is better."""
-        found = self.tried[key]
-        return found.merit + np.log(self.size) * len(found.theta)
-
-    def refit(self, base: Fit, sets: dict[Key, list[Array]], most: bool = False) -> None:
-        """Refit sets of candidates from start values, those near the best for longer.
-
-        Args:
-            base: Where nodes start.
-            sets: Candidate numbers (sorted) -> list of start vectors.
-            most: Give every set all iterations.
-        """
-        settings = self.settings
-        for key, starts in sets.items():
-            for theta in starts:
-                model = Model(self.simulator, [self.candidates[i] for i in key])
-                theta = np.clip(theta, model.low, model.high)
-                # From the measured path, not from a rival's: that may be in a wrong basin.
-                found = self._fit(model, self.nodes, theta, settings.first_turns, self.by_state)
-                if key not in self.tried or found.merit < self.tried[key].merit:
-                    self.tried[key] = found
-        if not sets:
-            return
-        merits = {key: self.tried[key].merit for key in sets}
-        best = min(merits.values())
-        reach = base.merit - best
-        for key, merit in merits.items():
-            if most or base.merit - merit > 0.7 * reach:
-                self.polish(key)
-
-    def polish(self, key: Key) -> None:
-        """More iterations for one set, with small finite differences at the end."""
-        found = self.tried[key]
-        turns = self.settings.more_turns
-        again = self._fit(found.model, found.nodes, found.theta, turns, None, 0.05)
-        if again.merit < found.merit:
-            self.tried[key] = again
-
-    def signatures(self, key: Key) -> Signatures:
-        """Signatures of all candidates around a fitted set."""
-        if key not in self._signatures:
-            self._signatures = {
-                key: signatures(
-                    self.tried[key], self.samples, self.windows, self.sigma, self.candidates
-                )
-            }
-        return self._signatures[key]
-
-    def merged(self, key: Key, additions: Sequence[tuple[int, Array]], drop: Key = ()) -> tuple[Key, Array]:
-        """Sorted key and start vector of a set with some candidates added and some dropped."""
-        found = self.tried[key]
-        values: dict[int, Array] = {}
-        at = 0
-        for number in key:
-            width = len(self.candidates[number].knobs)
-            values[number] = found.theta[at : at + width]
-            at += width
-        for number in drop:
-            values.pop(number)
-        values.update(dict(additions))
-        fresh = tuple(sorted(values))
-        theta = np.concatenate([values[i] for i in fresh]) if fresh else np.zeros(0)
-        return fresh, theta
 
 
 def choose(arena: Arena, known: dict[Key, Array]) -> Key:
@@ -227,20 +45,33 @@ def choose(arena: Arena, known: dict[Key, Array]) -> Key:
         fresh = {k: v for k, v in sets.items() if k not in arena.tried}
         arena.refit(arena.tried[current], fresh)
         best = min(
-            (k for k in arena.tried if 0 < len(k) <= settings.most), key=arena.score, default=current
+            (k for k in arena.tried if 0 < len(k) <= settings.most),
+            key=arena.score,
+            default=current,
         )
-        if best == current or arena.score(current) - arena.score(best) < arena.threshold:
+        if best == current or not worth(arena, current, best):
             break
         if len(best) > 1:
             best = wide_check(arena, best)
         best = backward(arena, best)
-        if best == current or arena.score(current) - arena.score(best) < arena.threshold:
+        if best == current or not worth(arena, current, best):
             break
         arena.tell("trying " + " + ".join(arena.candidates[i].label for i in best))
         current = best
     if current:
         arena.polish(current)
     return current
+
+
+def worth(arena: Arena, smaller: Key, larger: Key) -> bool:
+    """Whether a set is better beyond noise and, unless it reaches the noise, by a good part.
+
+    While a remainder is left, any effect that resembles it gains significantly; only one that
+    takes a good part of the squared error is worth a name.
+    """
+    fall = arena.score(smaller) - arena.score(larger)
+    part = 0.0 if near_floor(arena, larger) else arena.settings.part * arena.tried[smaller].merit
+    return fall > max(arena.threshold, part)
 
 
 def near_floor(arena: Arena, key: Key) -> bool:
@@ -254,7 +85,12 @@ def additions(
     """Sets that add one or two candidates to the current one, with start values."""
     settings = arena.settings
     sets: dict[Key, list[Array]] = {}
-    ranked = [g for g in gains(found) if found.variants[g.variants[0]].candidate not in current]
+    taken = {arena.candidates[i].label for i in current}
+
+    def fresh(number: int) -> bool:
+        return arena.candidates[number].label not in taken
+
+    ranked = [g for g in gains(found) if fresh(found.variants[g.variants[0]].candidate)]
     if near_floor(arena, current):
         # So near the noise the linear picture holds: what promises nothing need not be tried.
         ranked = [g for g in ranked if g.value > 0.5 * arena.threshold]
@@ -289,7 +125,8 @@ def additions(
             numbers = [found.variants[i].candidate for i in gain.variants]
             if kept == settings.pairs or gain.value < lead_value + arena.threshold:
                 break
-            if any(n in current for n in numbers):
+            labels = {arena.candidates[n].label for n in numbers}
+            if len(labels) < 2 or not all(fresh(n) for n in numbers):
                 continue
             key, theta = arena.merged(current, list(zip(numbers, gain.values, strict=True)))
             if key not in sets:
@@ -324,7 +161,7 @@ def exchanges(arena: Arena, current: Key, found: Signatures) -> dict[Key, list[A
             key, theta = arena.merged(
                 current, [(variant.candidate, variant_start(variant, c))], drop=(drop,)
             )
-            best.append((value - residual @ residual, key, theta))
+            best.append((value - float(residual @ residual), key, theta))
         if len(current) < arena.settings.most:
             for _, first, _ in singles[:6]:
                 for _, second, _ in singles[:12]:
@@ -344,7 +181,7 @@ def exchanges(arena: Arena, current: Key, found: Signatures) -> dict[Key, list[A
                         ],
                         drop=(drop,),
                     )
-                    best.append((value - residual @ residual - arena.threshold, key, theta))
+                    best.append((value - float(residual @ residual) - arena.threshold, key, theta))
     best.sort(key=lambda item: -item[0])
     sets: dict[Key, list[Array]] = {}
     limit = -np.inf
@@ -386,7 +223,7 @@ def backward(arena: Arena, best: Key) -> Key:
         arena.refit(arena.tried[best], smaller, most=True)
         options = [tuple(i for i in best if i != drop) for drop in best]
         least = min(options, key=arena.score)
-        if arena.score(least) - arena.score(best) < arena.threshold:
+        if not worth(arena, least, best):
             best = least
         else:
             break

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from residual.gap.adequacy import Remainder
-from residual.gap.result import Blind, Gap, Number, Verdict
+from residual.gap.result import Blind, Gap, Kind, Number, Verdict
 
 #: Effects that differ in form more than in kind.
 FAMILIES: dict[str, frozenset[str]] = {
@@ -114,7 +114,7 @@ def _effect(claim: Claim, sound: bool, removed: float, gap: Gap) -> Verdict:
         says += f"; the same motion as {', '.join(claim.twins)}"
     if not sound:
         says += "; a remainder is unexplained"
-    kind = "confirmed" if confirmed else "ambiguous"
+    kind: Kind = "confirmed" if confirmed else "ambiguous"
     return Verdict(
         kind, claim.name, claim.where, claim.numbers, (*claim.twins, *claim.ties), title, says
     )

@@ -27,20 +27,20 @@ def locate(
     for j, column in enumerate(driven):
         target = channels[column]
         force = floor.force[inside, j]
-        variables = [(c.name, c.unit, floor.nodes[inside, i], c.angle)
-                     for i, c in enumerate(channels)]
-        variables += [(c.name, c.unit, samples.actions[inside, i], False)
-                      for i, c in enumerate(inputs)]
+        variables = [
+            (c.name, c.unit, floor.nodes[inside, i], c.angle) for i, c in enumerate(channels)
+        ]
+        variables += [
+            (c.name, c.unit, samples.actions[inside, i], False) for i, c in enumerate(inputs)
+        ]
         for name, unit, values, angle in variables:
             if angle:
                 values = (values + np.pi) % (2 * np.pi) - np.pi
             found = _profile(values, force)
             if found is not None:
-                profiles.append(
-                    Profile(name, unit, target.name, f"{target.unit}/s", *found)
-                )
+                profiles.append(Profile(name, unit, target.name, f"{target.unit}/s", *found))
     lags, correlation = _lags(samples, floor, [c.name for c in inputs])
-    count, places = windows.index.shape
+    count = len(windows)
     freedom = max(1e-9, 1 - nominal.basis.shape[2] * count / max(int(windows.inside.sum()), 1))
     per_run = {}
     for run in np.unique(windows.run):
@@ -69,7 +69,8 @@ def _profile(values: Array, force: Array, bins: int = 12) -> tuple[Array, ...] |
         if len(own) >= 4:
             # Neighbouring samples share a window's force, so a quarter of them is counted.
             half = 1.96 * own.std(ddof=1) / np.sqrt(len(own) / 4)
-            rows.append((values[place == b].mean(), own.mean(), own.mean() - half, own.mean() + half))
+            mean = own.mean()
+            rows.append((values[place == b].mean(), mean, mean - half, mean + half))
     return tuple(np.array(rows).T) if len(rows) >= 2 else None
 
 
@@ -89,4 +90,4 @@ def _lags(
                 x, y = np.concatenate(a), np.concatenate(b)
                 if x.std() > 0 and y.std() > 0:
                     found[name][lag] = float(np.corrcoef(x, y)[0, 1])
-    return np.arange(most + 1) * float(np.median(samples.durations)), found
+    return float(np.median(samples.durations)) * np.arange(most + 1.0), found

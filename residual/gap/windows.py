@@ -118,7 +118,9 @@ def carry(windows: Windows, jacobians: Array, start: Array, injected: Array) -> 
     response[:, 0, :, :f] = start
     local = injected if injected.ndim == 4 else injected[windows.index]
     steps = jacobians[windows.index]
-    for k in range(length - 1):
-        response[:, k + 1] = steps[:, k] @ response[:, k]
-        response[:, k + 1, :, f:] += local[:, k]
-    return response
+    # A trial that runs away stays finite and loses.
+    with np.errstate(over="ignore", invalid="ignore"):
+        for k in range(length - 1):
+            response[:, k + 1] = steps[:, k] @ response[:, k]
+            response[:, k + 1, :, f:] += local[:, k]
+    return np.clip(np.nan_to_num(response, nan=0.0), -1e12, 1e12)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import contextvars
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -43,7 +44,7 @@ def integrate(host: HostSimulator, states: Array, inputs: Array, durations: Arra
     edges = np.linspace(0, len(states), 4 * pool.n_jobs + 1).astype(int)
     parts = pool(
         delayed(_rows)(host.take(np.s_[a:b]), states[a:b], inputs[a:b], durations[a:b])
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
+        for a, b in itertools.pairwise(edges)
     )
     return np.concatenate(parts)
 

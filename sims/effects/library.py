@@ -161,7 +161,9 @@ def _random_rows(simulator: HostSimulator, n: int, rng: np.random.Generator) -> 
         return rng.uniform(low, high, n)
 
     states = np.stack([draw(channel) for channel in simulator.physical_channels], axis=1)
-    inputs = np.stack([draw(channel) for channel in simulator.action_channels], axis=1)
+    inputs = np.empty((n, len(simulator.action_channels)))
+    for j, channel in enumerate(simulator.action_channels):
+        inputs[:, j] = draw(channel)
     return states, inputs
 
 

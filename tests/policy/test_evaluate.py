@@ -73,7 +73,7 @@ def test_selection_keeps_the_best_and_can_go_back():
     assert tuple(seen) == selection.curve
     assert [point.step for point in seen] == [0, 250, 500, 750, 1000]
     assert selection.best == max(seen, key=lambda point: point.score)
-    rule = (3, SMALL.noise_sigma, SMALL.noise_theta, 0)
+    rule = (3, 0.03, SMALL.noise_theta, 0)
     assert score(selection.policy, Reach(), *rule)[0] == selection.best.score
     assert score(agent.policy, Reach(), *rule)[0] == seen[-1].score
     agent.restore(selection.networks)

@@ -70,7 +70,8 @@ class TestAccuracy:
             Pendulum.true(), np.random.default_rng(4), rollouts=3, steps=20
         )
         measured = accuracy_along(corrected, states, actions, horizons=(1.0,))
-        reached = np.stack([corrected.rollout(s[0], a)[-1] for s, a in zip(states, actions)])
+        pairs = zip(states, actions, strict=True)
+        reached = np.stack([corrected.rollout(s[0], a)[-1] for s, a in pairs])
         expected = np.sqrt(np.mean((reached - states[:, -1]) ** 2, axis=0))
         np.testing.assert_allclose(
             list(measured.multi_step_error["1 s"].values()), expected, rtol=1e-12

@@ -112,3 +112,14 @@ def test_few_rows_and_wide_batches_work():
     model = DropoutNet(hidden=(8,), epochs=3, batch_size=1000, random_state=0).fit(X, y)
     mean, std = model.predict(X, return_std=True)
     assert np.isfinite(mean).all() and np.all(std > 0)
+
+
+def test_rescaling_removes_the_shrinkage_that_dropout_leaves():
+    X, y = wave(800)
+    options = {"hidden": (100, 100), "epochs": 100, "batch_size": 64, "random_state": 0}
+    plain = DropoutNet(**options).fit(X, y)
+    rescaled = DropoutNet(rescale=True, **options).fit(X, y)
+    probe, truth = wave(500, seed=1)
+    assert np.all(relative_error(rescaled, probe, truth) < relative_error(plain, probe, truth))
+    slopes = [np.polyfit(rescaled.predict(X)[:, k], y[:, k], 1)[0] for k in range(2)]
+    assert np.allclose(slopes, 1, atol=0.05)

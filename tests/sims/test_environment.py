@@ -1,6 +1,7 @@
 """The registered environments behave as Gymnasium and its users expect."""
 
 import warnings
+from types import MappingProxyType
 
 import gymnasium
 import numpy as np
@@ -102,7 +103,7 @@ def test_memory_channels_are_hidden_from_the_policy():
             Channel("past", "N", "memory"),
         )
         action_channels = (Channel("force", "N", "input", low=-1, high=1),)
-        parameters = {}
+        parameters = MappingProxyType({})
 
         def step(self, states, actions):
             return np.asarray(states)

@@ -152,7 +152,7 @@ def test_an_estimator_of_ones_own_needs_no_registration(tmp_path):
         "        return self.scale * self.y_[distance.argmin(1)]\n"
     )
     arguments = [*TINY, "--estimator", "mine.Nearest", "--estimator.scale", "0.5"]
-    code, out, err = run([*arguments, "--output", tmp_path / "run"], tmp_path)
+    code, _, err = run([*arguments, "--output", tmp_path / "run"], tmp_path)
     assert code == 0, err
     found = results(tmp_path / "run")
     assert found["estimator"] == "mine.Nearest"
@@ -175,7 +175,7 @@ def test_an_estimator_of_ones_own_needs_no_registration(tmp_path):
     ],
 )
 def test_a_wrong_argument_gets_one_line_and_exit_code_2(arguments, names, tmp_path):
-    code, out, err = run([*arguments, "--output", tmp_path / "run"], tmp_path)
+    code, _, err = run([*arguments, "--output", tmp_path / "run"], tmp_path)
     assert code == 2
     assert len(err.strip().splitlines()) == 1 and names in err
     assert not (tmp_path / "run").exists()
@@ -200,7 +200,7 @@ def test_a_grid_runs_every_trial_and_reports_failed_ones(tmp_path):
         "        return X\n"
     )
     command = ["--config", "grid.yaml", "--jobs", "2", "--output", "out"]
-    code, out, err = run(command, tmp_path)
+    code, _, err = run(command, tmp_path)
     assert code == 1 and "deliberate" in err
     rows = (tmp_path / "out" / "results.csv").read_text().splitlines()
     assert len(rows) == 1 + 4 * 2

@@ -1,0 +1,158 @@
+"""What is claimed of each chosen effect: numbers, intervals, rivals, and what stays hidden."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from residual.gap.adequacy import Remainder
+from residual.gap.candidates import Candidate
+from residual.gap.checks import integration
+from residual.gap.intervals import covariance
+from residual.gap.result import Blind, Number, Rival
+from residual.gap.search import Found
+from residual.gap.verdicts import Claim
+from sims.effects.base import Effect
+from sims.effects.library import exact_aliases
+from sims.host import HostSimulator
+
+#: Score difference beyond which a rival is excluded: a rival that is true loses by more than this
+#: with probability below 1e-3, however far apart the two predictions are.
+TIE = 9.55
+
+
+def aliases(
+    simulator: HostSimulator, offered: Sequence[Effect]
+) -> tuple[dict[str, tuple[str, ...]], tuple[tuple[str, ...], ...]]:
+    """Exact aliases among the offered effects: twins by name, and dependent sets."""
+    names = {str(effect) for effect in offered}
+    groups: dict[str, tuple[str, ...]] = {}
+    sets = []
+    for alias in exact_aliases(simulator):
+        inside = tuple(name for name in alias.effects if name in names)
+        if len(inside) < 2:
+            continue
+        if "combination" in alias.says:
+            if len(inside) == len(alias.effects):
+                sets.append(inside)
+        else:
+            groups.update({name: inside for name in inside})
+    return groups, tuple(sets)
+
+
+def claim(found: Found, left: Remainder, groups: dict[str, tuple[str, ...]]) -> list[Claim]:
+    """Numbers, intervals, rivals and numerics of every chosen effect, strongest first."""
+    arena, best = found.arena, found.fit
+    if not found.key:
+        return []
+    spread = covariance(best, arena.windows, arena.size)
+    half = 1.96 * np.sqrt(np.diag(spread))
+    numerics = integration(found, most_windows=60)
+    freedom = max(arena.size - best.basis.shape[2] * len(arena.windows), 1)
+    excess = max(1.0, float(best.costs.sum()) / freedom)
+    claims = []
+    for position, number in enumerate(found.key):
+        candidate = arena.candidates[number]
+        own = np.flatnonzero(best.model.owner == position)
+        numbers, artefact = {}, False
+        for j in own:
+            knob = best.model.knobs[j]
+            value, fine = float(best.theta[j]), float(numerics.fine[j])
+            low, high = value - half[j], value + half[j]
+            shift = abs(fine - value)
+            if knob.strength and shift > half[j]:
+                artefact |= shift > 0.3 * abs(value)
+                # Half the step is nearer to the truth, so the interval moves there.
+                low, high = min(low, fine - half[j]), max(high, fine + half[j])
+            numbers[knob.field] = Number(value, max(low, knob.low), min(high, knob.high), knob.unit)
+        if numerics.nominal_held_merit < best.merit + TIE * excess:
+            artefact = True
+        smaller = tuple(i for i in found.key if i != number)
+        alone = arena.score(smaller) if smaller in arena.tried else np.inf
+        ties = []
+        for other in arena.tried:
+            if len(other) != len(found.key) or len(set(other) - set(found.key)) != 1:
+                continue
+            (gone,) = set(found.key) - set(other)
+            if gone != number:
+                continue
+            (rival,) = set(other) - set(found.key)
+            label = arena.candidates[rival].label
+            difference = arena.score(other) - arena.score(found.key)
+            ratio = arena.tried[other].merit / best.merit
+            if label not in ties and not excluded(difference, ratio, excess, left.adequate):
+                ties.append(label)
+        twins = groups.get(candidate.label, ())
+        claims.append(
+            Claim(
+                candidate.name, candidate.effect.where, candidate.label, numbers,
+                tuple(ties), tuple(n for n in twins if n != candidate.label),
+                alone - arena.score(found.key), artefact, candidate.effect.sentence,
+            )
+        )  # fmt: skip
+    return sorted(claims, key=lambda c: -c.gain)
+
+
+def excluded(difference: float, ratio: float, excess: float, adequate: bool) -> bool:
+    """Whether a rival is out: beyond chance, and, while a remainder is left, clearly worse."""
+    if adequate:
+        return difference > TIE * excess
+    return difference > TIE * excess and ratio > 1.5**2
+
+
+def evidence(found: Found) -> tuple[Rival, ...]:
+    """Chosen set, nominal and runners-up on the training windows."""
+    arena = found.arena
+    freedom = max(arena.size - found.fit.basis.shape[2] * len(arena.windows), 1)
+    base = arena.score(found.key)
+    rows = []
+    trial = found.trial
+    share = trial.size / arena.size
+    trial_base = trial.score(found.key) if found.key in trial.tried else None
+    for key in {**arena.tried, **trial.tried}:
+        if key in arena.tried:
+            difference = arena.score(key) - base
+            ratio = float(np.sqrt(arena.tried[key].costs.sum() / freedom))
+        elif trial_base is not None:
+            # Tried on some of the runs only: scaled to all.
+            difference = (trial.score(key) - trial_base) / share
+            near = trial.tried[key].costs.sum() / trial.tried[found.key].costs.sum()
+            ratio = float(np.sqrt(near * found.fit.costs.sum() / freedom))
+        else:
+            continue
+        rows.append(
+            Rival(
+                tuple(arena.candidates[i].label for i in key), float(difference), ratio,
+                key == found.key, bool(key != found.key and difference > TIE),
+            )
+        )  # fmt: skip
+    return tuple(sorted(rows, key=lambda r: (not r.chosen, r.excess)))
+
+
+def hidden(found: Found, pool: Sequence[Candidate]) -> tuple[Blind, ...]:
+    """Effects that could be there at a size that matters without this log showing it."""
+    trial = found.trial
+    key = found.key if found.key in trial.tried else ()
+    around = trial.signatures(key)
+    # The tournament saw some of the runs only.
+    share = trial.size / found.arena.size
+    smallest: dict[int, tuple[float, str, float]] = {}
+    for variant in around.variants:
+        candidate = pool[variant.candidate]
+        if candidate.fixed_level or variant.candidate in found.key:
+            continue
+        for row, column in enumerate(variant.columns):
+            knob = next(i for i in np.flatnonzero(variant.linear) if variant.trial.values[row, i])
+            size = variant.trial.values[row, knob]
+            strength = max(around.strengths[column] / share, 1e-300)
+            visible = float(size * np.sqrt(found.arena.threshold / strength))
+            limit = 10 * candidate.knobs[knob].step
+            known = smallest.get(variant.candidate)
+            if known is None or visible < known[0]:
+                smallest[variant.candidate] = (visible, candidate.knobs[knob].unit, limit)
+    return tuple(
+        Blind(pool[number].label, visible, unit, pool[number].effect.needs)
+        for number, (visible, unit, limit) in smallest.items()
+        if visible > limit
+    )

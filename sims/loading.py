@@ -1,0 +1,177 @@
+"""Simulators and effects by name: from import paths and YAML files, and back."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import jsonargparse
+import yaml
+
+from sims.effects.base import Effect
+from sims.effects.library import library
+from sims.host import HostSimulator
+from sims.simulator import Simulator
+
+#: In a list of effects: all that the simulator can host.
+LIBRARY = "library"
+
+
+def load_simulator(source: str | Path | Mapping[str, Any]) -> Simulator:
+    """A simulator by its import path, its YAML file, or its ``class_path`` and ``init_args``.
+
+    Args:
+        source: ``"sims.pendulum.Pendulum"``, a file such as ``"corrected.yaml"``, or what such a
+            file holds.
+
+    Raises:
+        ValueError: There is no such class or file, it is no simulator, or the settings are wrong.
+    """
+    return _parser().instantiate(_parsed(source)).simulator
+
+
+def simulator_settings(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
+    """``class_path`` and ``init_args`` of what ``load_simulator`` makes, defaults filled in."""
+    text = _parser().dump(_parsed(source), format="yaml", skip_unset=False)
+    return yaml.safe_load(text)["simulator"]
+
+
+def with_effects(simulator: HostSimulator, effects: list[Effect]) -> HostSimulator:
+    """A copy with these effects beside its own; for YAML, if a class takes no ``effects``."""
+    return simulator.with_effects([*simulator.effects, *effects])
+
+
+def corrected_settings(
+    settings: Mapping[str, Any], effects: Sequence[Effect]
+) -> dict[str, Any]:
+    """Settings of a simulator with effects beside its own, for ``load_simulator``.
+
+    Args:
+        settings: Of the simulator without them, see ``simulator_settings``.
+        effects: With scalar values; they come back bit for bit.
+    """
+    added = [effect_settings(effect) for effect in effects]
+    arguments = dict(settings.get("init_args") or {})
+    # A function that makes the simulator, such as with_effects, may have effects of its own.
+    if isinstance(arguments.get("effects"), list):
+        arguments["effects"] = [*arguments["effects"], *added]
+        return {"class_path": settings["class_path"], "init_args": arguments}
+    if not added:
+        return dict(settings)
+    return {
+        "class_path": f"{__name__}.{with_effects.__name__}",
+        "init_args": {"simulator": dict(settings), "effects": added},
+    }
+
+
+def effect_settings(effect: Effect) -> dict[str, Any]:
+    """``class_path`` and ``init_args`` of an effect."""
+    kind = type(effect)
+    # The shortest path that is public: sims.effects.Delay rather than the module behind it.
+    module = "sims.effects" if kind.__module__.startswith("sims.effects.") else kind.__module__
+    values = {name: getattr(effect, name) for name in inspect.signature(kind).parameters}
+    numbers = {name: float(value) for name, value in values.items() if name in kind.numbers()}
+    return {"class_path": f"{module}.{kind.__qualname__}", "init_args": values | numbers}
+
+
+def chosen_effects(
+    simulator: HostSimulator, wanted: Sequence[str | Mapping[str, Any]]
+) -> tuple[Effect, ...]:
+    """The effects that a list names.
+
+    Args:
+        simulator: What hosts them.
+        wanted: ``"library"``; effects of the library by name, ``"viscous_friction"`` or, at one
+            place, ``"viscous_friction@pivot"``, parameters as ``"mass"``; a class of your own by
+            import path, ``"my_file.FanTorque"``, at every place that can host it or at one; or
+            ``class_path`` and ``init_args``.
+
+    Raises:
+        ValueError: Something is not known, or cannot act in this simulator.
+    """
+    known = {str(effect): effect for effect in library(simulator)}
+    found: dict[str, Effect] = {}
+    for entry in wanted:
+        if isinstance(entry, Mapping):
+            own = [_effect(entry)]
+            own[0].measures(simulator)
+        elif entry == LIBRARY:
+            own = list(known.values())
+        else:
+            name, _, where = entry.partition("@")
+            own = [e for e in known.values() if entry in (e.name, str(e))]
+            if not own and "." in name:
+                own = _placed(simulator, name, where)
+        if not own:
+            there = ", ".join(known)
+            raise ValueError(
+                f"no effect {entry!r} for {simulator.name}: give one of {there}, or the import "
+                "path of a class of your own"
+            )
+        found.update({str(effect): effect for effect in own})
+    return tuple(found.values())
+
+
+def _placed(simulator: HostSimulator, path: str, where: str) -> list[Effect]:
+    """An effect class at one place, or at every place that can host it."""
+    if where:
+        places = [where]
+    else:
+        places = [joint.name for joint in simulator.joints]
+        places += [channel.name for channel in simulator.action_channels]
+        places += [channel.name for channel in simulator.physical_channels]
+    kind = _class(path)
+    found, refused = [], ""
+    for place in dict.fromkeys(places):
+        effect = kind(place)  # type: ignore[call-arg]
+        try:
+            effect.quantities(simulator)
+        except ValueError as error:
+            refused = str(error)
+            continue
+        found.append(effect)
+    if not found:
+        raise ValueError(f"effect {path!r} cannot act in {simulator.name}: {refused}")
+    return found
+
+
+def _class(path: str) -> type[Effect]:
+    module, _, name = path.rpartition(".")
+    try:
+        kind = getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"no effect {path!r}: {error}") from None
+    if not (isinstance(kind, type) and issubclass(kind, Effect)):
+        raise ValueError(f"{path!r} is no effect; derive it from a class of sims.effects")
+    return kind
+
+
+def _effect(settings: Mapping[str, Any]) -> Effect:
+    parser = jsonargparse.ArgumentParser(exit_on_error=False)
+    parser.add_argument("--effect", type=Effect)
+    try:
+        chosen = parser.parse_object({"effect": dict(settings)})
+        return parser.instantiate(chosen).effect
+    except jsonargparse.ArgumentError as error:
+        raise ValueError(f"effect {settings}: {_one_line(error)}") from None
+
+
+def _parser() -> jsonargparse.ArgumentParser:
+    parser = jsonargparse.ArgumentParser(exit_on_error=False)
+    parser.add_argument("--simulator", type=Simulator, enable_path=True, required=True)
+    return parser
+
+
+def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
+    value = dict(source) if isinstance(source, Mapping) else str(source)
+    try:
+        return _parser().parse_object({"simulator": value})
+    except (jsonargparse.ArgumentError, TypeError) as error:
+        raise ValueError(f"simulator {source}: {_one_line(error)}") from None
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())

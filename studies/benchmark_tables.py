@@ -1,0 +1,241 @@
+"""What the benchmarks measured, as tables of ours beside the peer a user would reach for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+PEERS = {"GaussianProcess": "GaussianProcessRegressor", "DropoutNet": "MLPRegressor"}
+OURS = ("Linear", "GaussianProcess", "DropoutNet")
+NOTHING = "-"
+
+# What the project asks of itself; every other figure is for information.
+LEAST_TIMES_DDPG = 2.0
+GOAL_SHARE_OF_PEAK = 0.75
+LEAST_TIMES_GP = 10.0
+MOST_ONE_ROW = 0.2e-3
+LEAST_CONTROL_STEPS = 8000.0
+
+Record = dict[str, Any]
+
+
+def records(data: Mapping[str, Any]) -> list[Record]:
+    """What the benchmarks in the JSON of pytest-benchmark found, flat; failed ones are left out.
+
+    Args:
+        data: The content of a file that ``pytest --benchmark-json`` wrote.
+
+    Returns:
+        One dict per benchmark: ``test`` (the function's name), its parameters, its
+        ``extra_info`` and ``seconds``, the median time of a round.
+
+    Raises:
+        ValueError: It is no such file, or it holds no benchmarks.
+    """
+    found = data.get("benchmarks") if isinstance(data, Mapping) else None
+    if not found:
+        raise ValueError("no benchmarks in it: expected a file that --benchmark-json wrote")
+    try:
+        return [
+            {"test": re.sub(r"\[.*", "", entry["name"])}
+            | (entry.get("params") or {})
+            | entry["extra_info"]
+            | {"seconds": entry["stats"]["median"]}
+            for entry in found
+            if entry["extra_info"]  # empty if the benchmark failed
+        ]
+    except (KeyError, TypeError) as problem:
+        raise ValueError(
+            f"a benchmark in it lacks {problem}: expected a file that --benchmark-json wrote"
+        ) from None
+
+
+def tables(data: Mapping[str, Any]) -> str:
+    """Every table, in Markdown, with the machine and the versions.
+
+    Args:
+        data: The content of a file that ``pytest --benchmark-json`` wrote. What is not in it
+            is ``-`` in the tables or, where nothing is left, a table fewer.
+
+    Raises:
+        ValueError: See ``records``.
+    """
+    found = records(data)
+    parts = [
+        ("Machine", _machine(data)),
+        ("What the project asks of itself", _targets(found)),
+        ("DDPG", _ddpg(found)),
+        ("Fitting", _fits(found)),
+        ("Predicting", _predictions(found)),
+        ("Simulators", _simulators(found)),
+    ]
+    return "\n\n".join(f"## {title}\n\n{text}" for title, text in parts if text) + "\n"
+
+
+def _machine(data: Mapping[str, Any]) -> str:
+    info = data.get("machine_info", {})
+    cpu = info.get("cpu", {})
+    packages = ", ".join(f"{name} {v}" for name, v in info.get("packages", {}).items())
+    lines = [
+        f"{cpu.get('brand_raw', 'unknown processor')}, {cpu.get('count', '?')} cores, "
+        f"{info.get('system', '?')}; Python {info.get('python_version', '?')}; {packages}.",
+        f"Measured {data.get('datetime', '')[:10]}, one thread.",
+    ]
+    if "load_at_start" in info:
+        # Beside whom it ran decides how far to trust the figures.
+        lines.append(f"Load of the machine at the start: {info['load_at_start']:.1f}.")
+    if "seconds" in data:
+        wall, processor = data["seconds"] / 60, data["processor_seconds"] / 60
+        lines.append(
+            f"The suite took {wall:.1f} minutes, {processor:.1f} of them processor time."
+        )
+    return " ".join(lines)
+
+
+def _targets(found: Sequence[Record]) -> str:
+    rows: list[list[str]] = []
+
+    def add(what: str, value: float, form: str, limit: float, at_least: bool = True) -> None:
+        met = value >= limit if at_least else value <= limit
+        sign = "at least" if at_least else "at most"
+        verdict = "yes" if met else f"no: {value / limit:.2f} times that"
+        rows.append([what, format(value, form), f"{sign} {limit:{form}}", verdict])
+
+    for record in _of(found, "test_learn_against_stable_baselines3"):
+        what = f"DDPG, {record['env']}: times stable-baselines3's updates per second"
+        add(what, record["times_stable_baselines3"], ".2f", LEAST_TIMES_DDPG)
+    for record in _of(found, "test_update_against_its_products"):
+        what = f"DDPG, {record['env']}: share of the matrix-multiply peak (goal)"
+        add(what, record["share_of_peak"], ".2f", GOAL_SHARE_OF_PEAK)
+    own = _one(found, "test_fit_time", estimator="GaussianProcess", points=3750)
+    peer = _one(found, "test_fit_time", estimator=PEERS["GaussianProcess"], points=3750)
+    if own and peer:
+        what = "Gaussian process, fit at 3750 points: times faster than scikit-learn's"
+        add(what, peer["seconds"] / own["seconds"], ".1f", LEAST_TIMES_GP)
+        what = "the same: held-out error"
+        add(what, own["held_out_error"], ".2g", peer["held_out_error"], at_least=False)
+    for name in OURS:
+        if own := _one(found, "test_prediction_latency", estimator=name, rows=1):
+            what = f"{name}: prediction of one row, ms"
+            add(what, 1e3 * own["seconds"], ".3f", 1e3 * MOST_ONE_ROW, at_least=False)
+    if own := _one(found, "test_simulator_speed", simulator="Pendulum", rows=1):
+        what = "Pendulum: control steps per second, one row"
+        add(what, own["control_steps_per_second"], ".0f", LEAST_CONTROL_STEPS)
+    return markdown(["figure", "measured", "wanted", "met"], rows)
+
+
+def _ddpg(found: Sequence[Record]) -> str:
+    learn = [
+        [
+            record["env"],
+            f"{record['steps_per_second']:.0f}",
+            f"{record['stable_baselines3_steps_per_second']:.0f}",
+            f"**{record['times_stable_baselines3']:.2f}**",
+        ]
+        for record in _of(found, "test_learn_against_stable_baselines3")
+    ]
+    update = [
+        [
+            record["env"],
+            f"{record['updates_per_second']:.0f}",
+            f"{record['share_of_products']:.2f}",
+            f"{record['matrix_peak_gflop_per_second']:.0f}",
+            f"**{record['share_of_peak']:.2f}**",
+        ]
+        for record in _of(found, "test_update_against_its_products")
+    ]
+    act = [
+        [record["env"], f"{record['microseconds']:.0f}"]
+        for record in _of(found, "test_act_one_row")
+    ]
+    return _join(
+        markdown(["sizes", "ours, steps/s", "stable-baselines3, steps/s", "times"], learn),
+        markdown(
+            [
+                "sizes",
+                "updates/s alone",
+                "share of its own matrix products",
+                "sgemm peak, Gflop/s",
+                "share of peak",
+            ],
+            update,
+        ),
+        markdown(["sizes", "one action, µs"], act),
+    )
+
+
+def _fits(found: Sequence[Record]) -> str:
+    return _beside_peers(found, "test_fit_time", "points", ("s", 1.0))
+
+
+def _predictions(found: Sequence[Record]) -> str:
+    return _beside_peers(found, "test_prediction_latency", "rows", ("ms", 1e3))
+
+
+def _beside_peers(
+    found: Sequence[Record], test: str, size: str, unit: tuple[str, float]
+) -> str:
+    rows = []
+    sizes = sorted({record[size] for record in _of(found, test)})
+    for name in OURS:
+        for n in sizes:
+            own = _one(found, test, estimator=name, **{size: n})
+            if own is None:
+                continue
+            peer = _one(found, test, estimator=PEERS.get(name), **{size: n})
+            ratio = f"**{peer['seconds'] / own['seconds']:.3g}**" if peer else NOTHING
+            ours, theirs = _timed(own, unit[1]), _timed(peer, unit[1])
+            rows.append([name, str(n), *ours, PEERS.get(name, "no peer"), *theirs, ratio])
+    head = ["ours", size, unit[0], "held-out error", "peer", unit[0], "held-out error", "times"]
+    return markdown(head, rows)
+
+
+def _timed(record: Record | None, unit: float) -> list[str]:
+    if record is None:
+        return [NOTHING, NOTHING]
+    return [f"{unit * record['seconds']:.3g}", f"{record['held_out_error']:.2g}"]
+
+
+def _simulators(found: Sequence[Record]) -> str:
+    speeds = [*_of(found, "test_simulator_speed"), *_of(found, "test_environment_speed")]
+    rows = [
+        [
+            record["simulator"],
+            str(record["rows"]),
+            f"{record['control_steps_per_second']:.0f}",
+            f"{record['gymnasium_steps_per_second']:.0f}",
+            f"**{record['times_gymnasium']:.3g}**",
+            f"{record['error_angle']:.1g}" if "error_angle" in record else NOTHING,
+            f"{record['error_rate']:.1g}" if "error_rate" in record else NOTHING,
+        ]
+        for record in speeds
+    ]
+    head = ["simulator", "rows", "control steps/s", "Gymnasium Pendulum-v1, steps/s", "times"]
+    return markdown([*head, "one-step error, rad", "rad/s"], rows)
+
+
+def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table; nothing if there are no rows."""
+    body = [" | ".join(row) for row in rows]
+    if not body:
+        return ""
+    lines = [" | ".join(head), " | ".join("---" for _ in head), *body]
+    return "\n".join(f"| {line} |" for line in lines)
+
+
+def _of(found: Sequence[Record], test: str) -> list[Record]:
+    return [record for record in found if record["test"] == test]
+
+
+def _one(found: Sequence[Record], test: str, **values: Any) -> Record | None:
+    matching = (
+        record
+        for record in _of(found, test)
+        if all(record.get(key) == value for key, value in values.items())
+    )
+    return next(matching, None)
+
+
+def _join(*parts: str) -> str:
+    return "\n\n".join(part for part in parts if part)

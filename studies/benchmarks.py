@@ -1,0 +1,141 @@
+"""Run the benchmarks and print how many times faster than their peers ours are.
+
+``python -m studies.benchmarks`` runs ``tests/benchmarks`` on one thread and prints the tables of
+``docs/benchmarks.md``; it needs a checkout of the project and its extras ``test`` and ``bench``.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from studies.benchmark_tables import tables
+from studies.command import Parser, fail
+from studies.files import atomic_write_json, atomic_write_text, read_json
+
+ROOT = Path(__file__).resolve().parents[1]
+SUITE = Path("tests", "benchmarks")
+ONE_THREAD = {
+    name: "1"
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
+}
+# What takes most of the time: large fits, and the second problem size of DDPG.
+QUICK = "not leo and not 15000 and not (3750 and GaussianProcessRegressor)"
+
+NOTES = """\
+- One thread for BLAS and PyTorch, one process. `times` is ours over the peer's in speed: above 1
+  ours is faster. Trust the ratios more than the absolute figures, which follow the machine.
+- DDPG and simulators: processor time, median of 10 rounds, and the peer runs in turns with ours,
+  so that other programs on the machine hit both alike. Fits: processor time, median of 3 rounds
+  (of 1 for GaussianProcessRegressor). Predictions: wall time, median over about one second.
+- DDPG: every step of the environment comes with one update of batch 64; networks 400 and 300
+  wide, float32. Sizes: `pendulum` has 3 observations and 1 action, `leo` 15 and 6. The environment
+  costs next to nothing. "Share of its own matrix products": time of the bare products of an
+  update over the time of the update. "Peak" is this machine's own sgemm of 1024 x 1024, measured
+  in the same rounds.
+- Fits learn the difference of two pendulums, without noise; held-out error is RMS error over RMS
+  difference at 2000 other states, up to a quarter faster than those learnt from.
+  GaussianProcessRegressor has the same kernel and its default optimizer, MLPRegressor the layers
+  of DropoutNet and its defaults otherwise. Linear has no peer: it is a closed form.
+- GaussianProcessRegressor is left out at 15000 points: every step of its optimizer factors and
+  differentiates a matrix of 15000 x 15000 (hours, and more than 10 GB).
+- Predictions are means, fitted on 3750 points, reached through `DifferenceModel` as the corrected
+  simulator reaches them; features and checks of the input are part of the time, for peers too.
+  The length scales of GaussianProcessRegressor are given here, they do not change the time.
+- Gymnasium's Pendulum-v1 is no like-for-like peer of the simulators: it has no motor and takes
+  one Euler step per control period; it stands for what a step of a plain environment costs.
+  Wrappers are left off. The one-step error is that against an adaptive method of order 8; for
+  `Pendulum + Linear` against the true pendulum that it was fitted to."""
+
+
+def build_parser() -> Parser:
+    """The command line."""
+    parser = Parser(prog="python -m studies.benchmarks", description=__doc__)
+    parser.add_argument(
+        "--quick", action="store_true",
+        help="leave out what takes longest: 15000 points, scikit-learn's Gaussian process at 3750",
+    )  # fmt: skip
+    parser.add_argument("--read", type=str | None, help="tables of this JSON; measure nothing")
+    parser.add_argument("--json", type=str | None, help="keep what was measured in this file")
+    parser.add_argument("--output", type=str | None, help="write the Markdown to this file too")
+    return parser
+
+
+def run_suite(target: Path, quick: bool) -> bool:
+    """Run the benchmarks in a process of their own; progress goes to stderr.
+
+    Args:
+        target: JSON file to write.
+        quick: Leave out what takes longest.
+
+    Returns:
+        Whether every benchmark passed.
+
+    Raises:
+        FileNotFoundError: This is no checkout of the project: the suite is not there.
+        ChildProcessError: Nothing was measured.
+    """
+    if not (ROOT / SUITE).is_dir():
+        raise FileNotFoundError(
+            f"{ROOT / SUITE} does not exist: run the benchmarks in a checkout of the project"
+        )
+    command = [sys.executable, "-m", "pytest", str(SUITE), "-o", "addopts=", "--benchmark-only"]
+    command += ["--benchmark-json", str(target), "-q", "-rs", "-p", "no:cacheprovider"]
+    command += ["-k", QUICK] if quick else []
+    done = subprocess.run(command, cwd=ROOT, env=os.environ | ONE_THREAD, stdout=sys.stderr)
+    if not target.is_file() or not target.stat().st_size:
+        raise ChildProcessError(
+            "nothing was measured, see above; the benchmarks need the extras: "
+            "pip install 'simgap[test,bench]'"
+        )
+    return done.returncode == 0
+
+
+def document(data: Mapping[str, Any]) -> str:
+    """The page: the command that measured it, the tables, and how to read them."""
+    found = tables(data)  # an error if the data are none
+    command = data.get("command", f"pytest {SUITE} -o addopts= --benchmark-only")
+    return (
+        f"# Benchmarks\n\nMeasured by `{command}`; nothing here is written by hand.\n\n"
+        f"{found}\n## How it was measured\n\n{NOTES}\n"
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command; its exit code is 1 if a benchmark failed."""
+    given = build_parser().parse_args(arguments)
+    try:
+        data, complete = measure(given.quick) if not given.read else (read_json(given.read), True)
+        page = document(data)
+    except ValueError as problem:
+        fail(f"{given.read}: {problem}" if given.read else str(problem))
+    except OSError as problem:
+        fail(str(problem))
+    print(page)
+    if given.json:
+        atomic_write_json(given.json, data)
+    if given.output:
+        atomic_write_text(given.output, page)
+    if not complete:
+        sys.stderr.write("error: some benchmarks failed: the tables hold the others\n")
+        raise SystemExit(1)
+
+
+def measure(quick: bool) -> tuple[dict[str, Any], bool]:
+    """Run the suite: what it measured, and whether every benchmark passed; see ``run_suite``."""
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder, "benchmarks.json")
+        complete = run_suite(target, quick)
+        data = read_json(target)
+    # What decides the figures; where they are written to does not.
+    data["command"] = "python -m studies.benchmarks" + (" --quick" if quick else "")
+    return data, complete
+
+
+if __name__ == "__main__":
+    main()

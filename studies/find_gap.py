@@ -1,0 +1,200 @@
+"""Find where a simulator and measured logs disagree, and name the effect that is missing.
+
+The command reads the logs, asks whether there is a gap above the noise, looks for the named
+physical effect that explains it, adds it, and confirms it on held-out data. The answer is
+printed; gap.json, report.html and corrected.yaml go into the output folder.
+
+  python -m studies.find_gap --simulator sims.pendulum.Pendulum --logs run.csv --output results/gap
+  python -m studies.find_gap --simulator my_file.MyArm --logs a.csv b.parquet --output results/gap
+  python -m studies.find_gap --simulator my_arm.yaml --columns columns.yaml --logs a.csv --output g
+  python -m studies.find_gap ... --effects library my_file.FanTorque --tolerance 0.01
+
+No log at hand? `python -m studies.make_log --output logs` measures a pendulum whose mass the
+simulator does not know.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import time
+from argparse import RawDescriptionHelpFormatter
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from jsonargparse import DefaultHelpFormatter
+from jsonargparse.typing import PositiveFloat, PositiveInt
+
+from residual.gap import GapResult, find_gap
+from residual.logs import LogData, LogFormat, read_logs
+from sims.host import HostSimulator
+from sims.loading import LIBRARY, chosen_effects
+from sims.simulator import Simulator
+from studies.command import Parser, fail
+from studies.gap_files import CORRECTED, REPORT, write_gap
+from studies.gap_words import summary
+
+
+@dataclasses.dataclass(frozen=True)
+class GapStudy:
+    """What the answer depends on.
+
+    Args:
+        simulator: The nominal simulator: an import path, or a YAML file with class_path and
+            init_args.
+        columns: Which column of the logs holds what: settings, or a YAML file of them. By
+            default columns are named like the simulator's channels.
+        tolerance: Forecast error that does not matter, in the unit of the first measured
+            position.
+        hold: How inputs run between samples: held ("zero"), as commands are, or straight to
+            the next ("linear"), as most measured inputs are.
+        horizon: Forecast length in s; by default 20 control periods.
+        seed: Of everything random.
+    """
+
+    simulator: Simulator
+    columns: LogFormat = dataclasses.field(default_factory=LogFormat)
+    tolerance: PositiveFloat | None = None
+    hold: Literal["zero", "linear"] = "zero"
+    horizon: PositiveFloat | None = None
+    seed: int = 0
+
+
+def build_parser() -> Parser:
+    """The command line of this study."""
+    first, _, rest = __doc__.partition("\n\n")
+    parser = Parser(
+        prog="python -m studies.find_gap",
+        description=f"{first}\n\n{rest}",
+        formatter_class=_HelpFormatter,
+    )
+    parser.add_argument("--config", action="config", help="YAML file with any of the settings.")
+    parser.add_argument(
+        "--logs",
+        type=str,
+        nargs="+",
+        required=True,
+        help="Log files: CSV and other text, Parquet, NPZ.",
+    )
+    parser.add_argument(
+        "--output", type=Path, required=True, help="Folder for the report and the numbers."
+    )
+    parser.add_argument(
+        "--effects",
+        type=str | dict[str, Any],
+        nargs="+",
+        default=[LIBRARY],
+        help="What may be missing: 'library' for all that the simulator can host, effects by "
+        "name (viscous_friction, delay@voltage, mass), or a class of your own by import path.",
+    )
+    parser.add_argument(
+        "--jobs", type=PositiveInt, default=1, help="Processes, for a simulator that is slow."
+    )
+    parser.add_class_arguments(GapStudy, sub_configs=True)
+    return parser
+
+
+def run(
+    settings: Mapping[str, Any],
+    output: str | Path,
+    jobs: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> GapResult:
+    """Read logs, find the gap and write everything into ``output``; as the command does.
+
+    Args:
+        settings: As in a config file: ``simulator`` and ``logs``, and whatever else is not to be
+            at its default.
+        output: Folder for the report and the numbers.
+        jobs: Processes, for a simulator that is slow.
+        progress: Called with a line of text now and then.
+
+    Returns:
+        What was found.
+
+    Raises:
+        ValueError: A log, the simulator or an effect cannot be used; the message is one line.
+        SystemExit: A setting is wrong; one line on stderr says which.
+    """
+    begin = time.perf_counter()
+    tell = progress or (lambda _: None)
+    parser = build_parser()
+    chosen = parser.parse_object({**settings, "output": str(output), "jobs": jobs})
+    plain = yaml.safe_load(parser.dump(chosen, format="yaml", skip_unset=False))
+    config = {key: plain[key] for key in (*_FIELDS, "logs", "effects")}
+    made = parser.instantiate(chosen)
+    study = GapStudy(**{name: made[name] for name in _FIELDS})
+    simulator = hosting(study.simulator)
+    effects = chosen_effects(simulator, chosen.effects)
+    if Path(output).exists() and not Path(output).is_dir():
+        raise ValueError(f"--output {output} is a file, expected a folder")
+    tell("reading the logs")
+    data = read(simulator, chosen.logs, study.columns)
+    rows = sum(len(run.times) for run in data.trajectories)
+    tell(f"{len(data.trajectories)} trajectories, {rows} samples")
+    result = find_gap(
+        simulator,
+        data.trajectories,
+        tolerance=study.tolerance,
+        effects=effects,
+        hold=study.hold,
+        horizon=study.horizon,
+        rng=study.seed,
+        n_jobs=jobs,
+        progress=tell,
+    )
+    tell("writing the report")
+    write_gap(result, output, config, data.findings, time.perf_counter() - begin)
+    return result
+
+
+def hosting(simulator: Simulator) -> HostSimulator:
+    """The simulator, if effects can be added to it.
+
+    Raises:
+        ValueError: It hosts none.
+    """
+    if isinstance(simulator, HostSimulator):
+        return simulator
+    raise ValueError(
+        f"{type(simulator).__name__} cannot host effects: derive it from EquationOfMotion or "
+        "FirstOrderSystem (sims.equations), or from HostSimulator (sims.host)"
+    )
+
+
+def read(simulator: HostSimulator, logs: Sequence[str], columns: LogFormat) -> LogData:
+    """The logs, by the simulator's channels; see ``read_logs``."""
+    return read_logs(logs, simulator.physical_channels, simulator.action_channels, columns)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command."""
+    begin = time.perf_counter()
+
+    def tell(text: str) -> None:
+        print(f"{time.perf_counter() - begin:6.1f} s  {text}", file=sys.stderr, flush=True)
+
+    parser = build_parser()
+    given = parser.parse_args(arguments)
+    settings = yaml.safe_load(parser.dump(given, format="yaml", skip_unset=False))
+    output, jobs = Path(settings.pop("output")), settings.pop("jobs")
+    settings.pop("config", None)
+    try:
+        result = run(settings, output, jobs, tell)
+    except (ValueError, OSError) as error:
+        fail(str(error))
+    print(f"\n{summary(result)}\n\nreport:              {output / REPORT}")
+    print(f"corrected simulator: {output / CORRECTED}")
+
+
+_FIELDS = tuple(field.name for field in dataclasses.fields(GapStudy))
+
+
+class _HelpFormatter(DefaultHelpFormatter, RawDescriptionHelpFormatter):
+    """Keeps the line breaks of the description."""
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+"""The pictures of find_gap's report; each is saved as PNG with its numbers as CSV."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
+
+from residual.gap import GapResult
+from residual.gap.result import Profile, Rollout
+from studies.gap_words import CEILING, FLOOR, gap_rows, quantity_text
+from studies.reporting.figures import (
+    AMBER,
+    BLUE,
+    GREEN,
+    INK,
+    MUTED,
+    ORANGE,
+    new_figure,
+    save_figure,
+    styled,
+)
+
+NARROW = 4.0
+
+
+@styled()
+def shrinking(result: GapResult, path: Path) -> Drawing:
+    """One bar per step from the nominal simulator on, one for the ceiling, a line for the noise."""
+    gap = result.gap
+    rows = [row for row in gap_rows(result) if row[0] != FLOOR]
+    figure, axes = new_figure(height=1.15 + 0.42 * len(rows))
+    axis: Axes = axes[0, 0]
+    top = max(span.high for _, span in rows)
+    for place, (name, span) in enumerate(rows):
+        nominal, ceiling = place == 0, name == CEILING
+        colour = ORANGE if nominal else MUTED if ceiling else BLUE
+        axis.barh(place, span.value, height=0.6, color=colour, alpha=0.55 if ceiling else 1.0)
+        axis.hlines(place, span.low, span.high, color=INK, linewidth=1.3)
+        times = span.value / max(gap.noise_floor.value, 1e-300)
+        text = f"{quantity_text(span.value, gap.unit)}, {times:.3g} × noise"
+        inside = span.low > 0.5 * top
+        axis.annotate(
+            text, (0 if inside else span.high, place), xytext=(7, 0), textcoords="offset points",
+            va="center", color="white" if inside else INK, fontsize=9,
+        )  # fmt: skip
+    axis.axvline(gap.noise_floor.value, color=GREEN, linestyle=(0, (4, 3)), label="noise floor")
+    axis.set_yticks(range(len(rows)), [name for name, _ in rows])
+    axis.set(ylim=(len(rows) - 0.5, -0.5), xlim=(0, 1.06 * top))
+    axis.set_xlabel(f"error of {gap.channel}" + (f" ({gap.unit})" if gap.unit else ""))
+    axis.grid(axis="y", visible=False)
+    axis.tick_params(axis="y", length=0)
+    figure.legend(loc="outside upper left", handlelength=1.8)
+    data = pd.DataFrame(
+        [{"step": name, "value": s.value, "low": s.low, "high": s.high}
+         for name, s in gap_rows(result)]
+    )  # fmt: skip
+    save_figure(figure, path, data)
+    return figure
+
+
+@styled()
+def rollout(result: GapResult, shown: Rollout, path: Path) -> Drawing:
+    """One held-out forecast: measured dots, nominal and corrected, noise band around the latter."""
+    count = len(result.channels)
+    figure, axes = new_figure(count, 1, width=NARROW, height=0.7 + 1.55 * count, share_x=True)
+    time = shown.times - shown.times[0]
+    data: dict[str, np.ndarray] = {"time_s": time}
+    for column, (name, unit) in enumerate(result.channels):
+        axis: Axes = axes[column, 0]
+        seen, before, after = (a[:, column] for a in (shown.seen, shown.before, shown.after))
+        sigma = result.noise[name][0]
+        axis.fill_between(time, after - 2 * sigma, after + 2 * sigma, color=BLUE, alpha=0.18,
+                          linewidth=0, label="± 2 × noise" if column == 0 else None)  # fmt: skip
+        first = column == 0
+        if result.effects:
+            axis.plot(time, before, color=ORANGE, label="nominal" if first else None)
+        own = "corrected" if result.effects else "simulator"
+        axis.plot(time, after, color=BLUE, label=own if first else None)
+        axis.plot(time, seen, "o", color=INK, markersize=3 if len(time) < 80 else 1.6,
+                  label="measured" if first else None)  # fmt: skip
+        axis.set_ylabel(name + (f" ({unit})" if unit else ""))
+        # A nominal forecast that runs away must not flatten all else.
+        good = seen[np.isfinite(seen)]
+        if len(good):
+            span = max(float(np.ptp(good)), 6 * sigma)
+            floor, top = good.min() - 0.8 * span, good.max() + 0.8 * span
+            bounds = np.nan_to_num(np.array([before.min(), before.max()]))
+            axis.set_ylim(
+                max(floor, min(bounds[0], good.min(), after.min()) - 0.05 * span),
+                min(top, max(bounds[1], good.max(), after.max()) + 0.05 * span),
+            )
+        data |= {f"{name} measured": seen, f"{name} nominal": before, f"{name} corrected": after}
+    axes[-1, 0].set_xlabel("time (s)")
+    figure.align_ylabels()
+    figure.legend(loc="outside upper left", ncols=2, handlelength=1.2, columnspacing=1.2)
+    save_figure(figure, path, data)
+    return figure
+
+
+@styled()
+def profile(found: Profile, path: Path) -> Drawing:
+    """Missing acceleration against one state or input."""
+    figure, axes = new_figure(width=NARROW, height=2.5)
+    axis: Axes = axes[0, 0]
+    axis.axhline(0, color=MUTED, linewidth=0.9)
+    axis.fill_between(found.centres, found.low, found.high, color=BLUE, alpha=0.2, linewidth=0)
+    axis.plot(found.centres, found.mean, "o-", color=BLUE, markersize=4.5)
+    axis.set_xlabel(f"{found.variable}" + (f" ({found.unit})" if found.unit else ""))
+    unit = found.target_unit.replace("/s/s", "/s²")
+    axis.set_ylabel(f"missing change of\n{found.target} ({unit})")
+    save_figure(
+        figure, path,
+        {"centre": found.centres, "mean": found.mean, "low": found.low, "high": found.high},
+    )  # fmt: skip
+    return figure
+
+
+@styled()
+def lags(result: GapResult, path: Path) -> Drawing | None:
+    """Correlation of what is missing with the inputs of some time ago."""
+    where = result.where
+    if not where.lag_correlation:
+        return None
+    figure, axes = new_figure(width=NARROW, height=2.5)
+    axis: Axes = axes[0, 0]
+    axis.axhline(0, color=MUTED, linewidth=0.9)
+    colours = (BLUE, ORANGE, GREEN, AMBER)
+    for number, (name, values) in enumerate(where.lag_correlation.items()):
+        axis.plot(where.lags_s, values, "o-", color=colours[number % 4], markersize=4.5, label=name)
+    axis.set(xlabel="lag of the input (s)", ylabel="correlation", ylim=(-1.05, 1.05))
+    if len(where.lag_correlation) > 1:
+        figure.legend(loc="outside upper left", ncols=2)
+    save_figure(figure, path, {"lag_s": where.lags_s, **where.lag_correlation})
+    return figure

@@ -1,0 +1,117 @@
+"""What find_gap leaves in its folder: gap.json, corrected.yaml, and the report beside them."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from residual.gap import GapResult
+from residual.logs import Finding
+from sims.loading import corrected_settings
+from studies.command import versions
+from studies.files import atomic_write_json, atomic_write_text
+from studies.gap_report import write_report
+
+JSON, CORRECTED, REPORT = "gap.json", "corrected.yaml", "report.html"
+
+
+def write_gap(
+    result: GapResult,
+    folder: str | Path,
+    config: Mapping[str, Any],
+    findings: Sequence[Finding] = (),
+    seconds: float | None = None,
+) -> Path:
+    """Write ``gap.json``, ``corrected.yaml``, ``report.html`` and ``figures/``: all or nothing.
+
+    Args:
+        result: What was found.
+        folder: Made if missing; files of the same names are replaced, others stay.
+        config: The settings as plain values; ``config["simulator"]`` holds ``class_path`` and
+            ``init_args`` of the nominal simulator (``sims.loading.simulator_settings``).
+        findings: What the reader of the logs had to say.
+        seconds: Wall time; by default the sum over the stages.
+
+    Returns:
+        The folder.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    record = gap_record(result, config, findings, seconds)
+    with staged(Path(folder)) as stage:
+        corrected = corrected_settings(config["simulator"], result.effects)
+        about = "# The simulator with what find_gap added; loadable as --simulator corrected.yaml\n"
+        text = yaml.safe_dump(corrected, sort_keys=False)
+        atomic_write_text(stage / CORRECTED, about + text)
+        write_report(result, record, stage)
+        atomic_write_json(stage / JSON, record)
+    return Path(folder)
+
+
+def gap_record(
+    result: GapResult,
+    config: Mapping[str, Any],
+    findings: Sequence[Finding] = (),
+    seconds: float | None = None,
+) -> dict[str, Any]:
+    """What ``gap.json`` holds (docs/find-gap.md)."""
+    gap = result.gap
+    total = sum(result.seconds.values()) if seconds is None else seconds
+    return {
+        "verdicts": [
+            {
+                "kind": verdict.kind,
+                "effect": verdict.effect,
+                "where": verdict.where,
+                "parameters": verdict.parameters,
+                "alternatives": verdict.alternatives,
+                "says": verdict.says,
+            }
+            for verdict in result.verdicts
+        ],
+        "gap": {
+            "channel": gap.channel,
+            "unit": gap.unit,
+            "horizon_s": gap.horizon_s,
+            "before": gap.before,
+            "after": gap.after,
+            "noise_floor": gap.noise_floor,
+            "ceiling": gap.ceiling,
+            "steps": gap.steps,
+            "by_channel": gap.by_channel,
+        },
+        "noise": {
+            name: {"value": sigma, "error": error} for name, (sigma, error) in result.noise.items()
+        },
+        "quality": [
+            *({"kind": f.kind, "where": f.where, "says": f.says} for f in findings),
+            *({"kind": "engine", "where": "", "says": says} for says in result.quality),
+        ],
+        "seconds": {"total": total, **result.seconds},
+        "versions": versions(),
+        "config": config,
+    }
+
+
+@contextlib.contextmanager
+def staged(folder: Path) -> Iterator[Path]:
+    """A temporary folder beside ``folder``; its files move there when the block ends well."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    stage = folder.parent / f".partial-{secrets.token_hex(4)}-{folder.name}"
+    stage.mkdir()
+    try:
+        yield stage
+        for source in sorted(path for path in stage.rglob("*") if path.is_file()):
+            target = folder / source.relative_to(stage)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(source, target)
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)

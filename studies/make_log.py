@@ -1,0 +1,89 @@
+"""Measure a pendulum that hides something, for a first try of find_gap without a log of your own.
+
+SciPy integrates the written-out equation of a pendulum with 0.090 kg instead of the 0.055 kg
+that sims.pendulum.Pendulum believes in, and noise is added as sensors do. One CSV file per run.
+
+  python -m studies.make_log --output logs
+  python -m studies.find_gap --simulator sims.pendulum.Pendulum --logs logs/*.csv --output gap
+  python -m studies.make_log --output logs --truth.mass 0 --truth.viscous_friction 1e-4
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jsonargparse.typing import PositiveInt
+
+from sims.pendulum import IDEALISED_MASS, TRUE_MASS
+from studies.command import Parser
+from studies.files import atomic_write_text
+from studies.find_gap import _HelpFormatter
+from studies.hidden_data import Truth, make_logs
+
+HIDDEN = Truth(mass=TRUE_MASS / IDEALISED_MASS - 1)
+
+
+def build_parser() -> Parser:
+    """The command line."""
+    parser = Parser(
+        prog="python -m studies.make_log", description=__doc__, formatter_class=_HelpFormatter
+    )
+    parser.add_argument("--output", type=Path, required=True, help="Folder for the CSV files.")
+    parser.add_function_arguments(write_logs, skip={"folder"})
+    return parser
+
+
+def write_logs(
+    folder: Path,
+    truth: Truth = HIDDEN,
+    noise: Literal["A", "B", "C"] = "A",
+    excitation: Literal["strong", "weak", "policy"] = "strong",
+    runs: PositiveInt = 15,
+    steps: PositiveInt = 250,
+    seed: int = 0,
+) -> list[Path]:
+    """Write the measured runs as CSV files with columns time, angle, rate and voltage.
+
+    Args:
+        folder: Where to.
+        truth: What is hidden; mass, inertia, length and actuator_gain are relative changes.
+        noise: A: 0.01 rad and 0.2 rad/s; B: angle rounded to 0.002 rad, no rate; C: 0.01 rad, no
+            rate.
+        excitation: Random voltages up to 3 V, up to 0.8 V, or a swing-up controller.
+        runs: Number of files.
+        steps: Control steps of 0.05 s in each.
+        seed: Of motion and noise.
+
+    Returns:
+        The files.
+    """
+    paths = []
+    for number, run in enumerate(make_logs(truth, seed, excitation, noise, runs, steps), start=1):
+        names = ["time", "angle", "rate", "voltage"]
+        # The last command is never applied; a log holds it all the same.
+        volts = np.vstack([run.actions, run.actions[-1:]])
+        table = np.column_stack([run.times, run.states, volts])
+        if not np.isfinite(run.states[:, 1]).any():
+            table, names = np.delete(table, 2, axis=1), [n for n in names if n != "rate"]
+        text = io.StringIO()
+        np.savetxt(text, table, "%.9g", ",", header=",".join(names), comments="")
+        paths.append(folder / f"run-{number:02d}.csv")
+        atomic_write_text(paths[-1], text.getvalue())
+    return paths
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command."""
+    parser = build_parser()
+    given = parser.instantiate(parser.parse_args(arguments))
+    folder = given.pop("output")
+    paths = write_logs(folder, **vars(given))
+    print(f"{len(paths)} runs: {paths[0]} to {paths[-1].name}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,133 @@
+"""Control steps per second of the pendulum's simulators, beside Gymnasium's Pendulum-v1.
+
+Run with ``OMP_NUM_THREADS=1 pytest tests/benchmarks/test_simulator_speed.py --benchmark-only``.
+Simulator and peer run in turns. The peer is Gymnasium's environment without its wrappers: per
+step one semi-implicit Euler step of a pendulum without a motor, reward and observation; ours
+solve the control period to the error in ``extra_info`` (RMS over random states, against an
+adaptive Runge-Kutta method of order 8).
+"""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable
+from typing import Any
+
+import estimator_data as data
+import gymnasium
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from residual.corrected import CorrectedSimulator
+from residual.difference import DifferenceModel
+from residual.linear import Linear
+from sims.environment import SimulatorEnv
+from sims.pendulum import Pendulum
+from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Simulator
+from sims.tasks import SwingUp
+
+# Processor time of this one thread: another program on the core then does not count.
+TIMER = time.thread_time
+pytestmark = pytest.mark.benchmark(timer=TIMER)
+STEPS = 500
+
+
+@functools.cache
+def corrected() -> CorrectedSimulator:
+    """The idealised pendulum with a linear model of what it lacks."""
+    rows, difference = data.observed(3750, seed=0, reach=12.0)
+    model = DifferenceModel(Linear(), Pendulum())
+    return CorrectedSimulator(
+        Pendulum(), model.fit_difference(rows[:, :2], rows[:, 2:], difference)
+    )
+
+
+SIMULATORS: dict[str, Callable[[], Simulator]] = {
+    "Pendulum": Pendulum,
+    "PendulumEquation": PendulumEquation,
+    "Pendulum + Linear": corrected,
+}
+WANTED = {"Pendulum": Pendulum, "PendulumEquation": Pendulum, "Pendulum + Linear": Pendulum.true}
+
+
+def exact(simulator: Pendulum, states: np.ndarray, voltages: np.ndarray) -> np.ndarray:
+    """The states one control period later, from the paper's equation of motion."""
+    p = simulator.parameter_values()
+    drive = p["torque_constant"] / p["resistance"]
+    weight = p["mass"] * p["gravity"] * p["length"]
+    friction = p["damping"] + drive * p["torque_constant"]
+
+    def rates(_: float, y: np.ndarray) -> np.ndarray:
+        angle, rate = y.reshape(2, -1)
+        torque = weight * np.sin(angle) - friction * rate + drive * voltages
+        return np.concatenate([rate, torque / p["inertia"]])
+
+    span = (0.0, simulator.dt)
+    solution = solve_ivp(rates, span, states.T.ravel(), "DOP853", rtol=1e-12, atol=1e-12)
+    return solution.y[:, -1].reshape(2, -1).T
+
+
+def measure(benchmark: Any, work: Callable[[], object], steps: int) -> None:
+    """Time ``work``, and before each round as many steps of Gymnasium's pendulum as it has."""
+    peer: Any = gymnasium.make("Pendulum-v1").unwrapped
+    peer.reset(seed=0)
+    inputs = np.random.default_rng(0).uniform(-2, 2, (STEPS, 1)).astype(np.float32)
+    times = []
+
+    def run_peer() -> None:
+        start = TIMER()
+        for action in inputs:
+            peer.step(action)
+        times.append(TIMER() - start)
+
+    work()
+    benchmark.pedantic(work, setup=run_peer, rounds=10)
+    own = steps / benchmark.stats.stats.median
+    other = STEPS / float(np.median(times[1:]))
+    benchmark.extra_info.update(
+        control_steps_per_second=own,
+        gymnasium_steps_per_second=other,
+        times_gymnasium=own / other,
+    )
+
+
+@pytest.mark.parametrize("rows", [1, 1024])
+@pytest.mark.parametrize("name", SIMULATORS)
+def test_simulator_speed(benchmark: Any, name: str, rows: int) -> None:
+    simulator = SIMULATORS[name]()
+    inputs, _ = data.observed(1024, seed=2, reach=12.0)
+    states, actions = inputs[:, :2].copy(), inputs[:, 2:].copy()
+    if rows == 1:
+        pairs = [(states[i : i + 1], actions[i : i + 1]) for i in range(STEPS)]
+
+        def work() -> object:
+            return [simulator.step(*pair) for pair in pairs]
+    else:
+
+        def work() -> object:
+            return simulator.step(states, actions)
+
+    measure(benchmark, work, STEPS if rows == 1 else rows)
+    error = simulator.step(states, actions) - exact(WANTED[name](), states, actions[:, 0])
+    rms = np.sqrt(np.mean(error**2, axis=0))
+    benchmark.extra_info.update(
+        simulator=name, rows=rows, error_angle=float(rms[0]), error_rate=float(rms[1])
+    )
+    assert np.isfinite(rms).all()
+
+
+@pytest.mark.parametrize("name", SIMULATORS)
+def test_environment_speed(benchmark: Any, name: str) -> None:
+    env = SimulatorEnv(SIMULATORS[name](), SwingUp(horizon=STEPS))
+    actions = np.random.default_rng(0).uniform(-3, 3, (STEPS, 1))
+
+    def work() -> None:
+        env.reset(seed=0)
+        for action in actions:
+            env.step(action)
+
+    measure(benchmark, work, STEPS)
+    benchmark.extra_info.update(simulator=f"SimulatorEnv({name})", rows=1)

@@ -1,0 +1,185 @@
+"""The tables hold what was measured, and say what was not."""
+
+import copy
+import json
+
+import pytest
+
+from studies import benchmarks
+from studies.benchmark_tables import markdown, tables
+from studies.benchmarks import main
+
+
+def entry(name, seconds, **extra):
+    return {"name": name, "params": None, "extra_info": extra, "stats": {"median": seconds}}
+
+
+def fit(name, points, seconds, error):
+    info = {"estimator": name, "points": points, "held_out_error": error}
+    return entry(f"test_fit_time[{name}-{points}]", seconds, **info)
+
+
+def one_row(name, seconds):
+    info = {"estimator": name, "rows": 1, "points": 3750, "held_out_error": 0.01}
+    return entry(f"test_prediction_latency[{name}-1]", seconds, **info)
+
+
+@pytest.fixture
+def measured():
+    learn = entry(
+        "test_learn_against_stable_baselines3[pendulum]", 0.5,
+        steps_per_second=400.0, stable_baselines3_steps_per_second=160.0,
+        times_stable_baselines3=2.5,
+    )  # fmt: skip
+    update = entry(
+        "test_update_against_its_products[pendulum]", 0.4,
+        updates_per_second=500.0, share_of_products=0.8,
+        matrix_peak_gflop_per_second=90.0, share_of_peak=0.6,
+    )  # fmt: skip
+    learn["params"] = update["params"] = {"env": "pendulum"}
+    speed = {"control_steps_per_second": 9000.0, "gymnasium_steps_per_second": 90000.0}
+    speed |= {"times_gymnasium": 0.1, "simulator": "Pendulum", "rows": 1}
+    return {
+        "datetime": "2030-05-06T07:08:09",
+        "machine_info": {
+            "cpu": {"brand_raw": "Abacus", "count": 2},
+            "packages": {"torch": "9.9"},
+            "load_at_start": 0.5,
+        },
+        "seconds": 300.0,
+        "processor_seconds": 240.0,
+        "benchmarks": [
+            learn,
+            update,
+            fit("GaussianProcess", 3750, 4.0, 0.001),
+            fit("GaussianProcessRegressor", 3750, 80.0, 0.002),
+            fit("GaussianProcess", 15000, 9.0, 0.001),
+            one_row("Linear", 3e-5),
+            one_row("DropoutNet", 3e-4),
+            one_row("MLPRegressor", 6e-4),
+            entry("test_simulator_speed[Pendulum-1]", 0.1, **speed, error_angle=1e-8,
+                  error_rate=2e-7),
+            entry("test_environment_speed[Pendulum]", 0.1, **speed),
+        ],
+    }  # fmt: skip
+
+
+def rows(page, start):
+    """The cells of the table rows that begin with this cell."""
+    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("|")]
+    return [cells for cells in lines if cells[0].startswith(start)]
+
+
+def without(measured, part):
+    kept = copy.deepcopy(measured)
+    kept["benchmarks"] = [e for e in measured["benchmarks"] if part not in e["name"]]
+    return kept
+
+
+def test_ours_stands_beside_its_peer(measured):
+    page = tables(measured)
+    small, large = (r for r in rows(page, "GaussianProcess") if len(r) == 8)
+    assert small == ["GaussianProcess", "3750", "4", "0.001", "GaussianProcessRegressor",
+                     "80", "0.002", "**20**"]  # fmt: skip
+    assert large[4:] == ["GaussianProcessRegressor", "-", "-", "-"]
+    (net,) = (r for r in rows(page, "DropoutNet") if len(r) == 8)
+    assert net[2] == "0.3" and net[-1] == "**2**"
+    (linear,) = (r for r in rows(page, "Linear") if len(r) == 8)
+    assert linear[4:] == ["no peer", "-", "-", "-"]
+    assert ["pendulum", "400", "160", "**2.50**"] in rows(page, "pendulum")
+    assert [r[-2:] for r in rows(page, "Pendulum") if len(r) == 7] == [
+        ["1e-08", "2e-07"],
+        ["-", "-"],
+    ]
+
+
+def test_every_row_of_a_table_is_as_wide_as_its_head(measured):
+    blocks = tables(measured).split("\n\n")
+    found = [block.splitlines() for block in blocks if block.startswith("|")]
+    assert len(found) == 6
+    for lines in found:
+        assert len({line.count(" | ") for line in lines}) == 1
+
+
+def test_targets_are_judged_in_both_directions(measured):
+    def verdicts(page):
+        return {r[0]: r[3] for r in rows(page, "") if len(r) == 4 and r[3][:2] in ("ye", "no")}
+
+    found = verdicts(tables(measured))
+    assert len(found) == 7
+    assert found["DDPG, pendulum: times stable-baselines3's updates per second"] == "yes"
+    assert found["DDPG, pendulum: share of the matrix-multiply peak (goal)"].startswith("no: 0.80")
+    assert found["Linear: prediction of one row, ms"] == "yes"
+    assert found["DropoutNet: prediction of one row, ms"].startswith("no: 1.50")
+    assert found["the same: held-out error"] == "yes"
+    measured["benchmarks"][3]["extra_info"]["held_out_error"] = 0.0005
+    assert verdicts(tables(measured))["the same: held-out error"].startswith("no: 2.00")
+
+
+def test_machine_versions_and_time_are_said(measured):
+    page = tables(measured)
+    for words in ("Abacus, 2 cores", "torch 9.9", "2030-05-06", "start: 0.5", "took 5.0 minutes"):
+        assert words in page
+
+
+@pytest.mark.parametrize("missing", ["Regressor", "stable_baselines3", "latency", "Gauss", "["])
+def test_what_was_not_run_is_left_out(measured, missing):
+    kept = without(measured, missing)
+    if not kept["benchmarks"]:
+        with pytest.raises(ValueError, match="no benchmarks"):
+            tables(kept)
+        return
+    page = tables(kept)
+    assert "None" not in page
+    assert ("## Predicting" in page) == (missing != "latency")
+    assert ("2.50" in page) == (missing != "stable_baselines3")
+
+
+def test_a_benchmark_that_failed_is_left_out(measured):
+    measured["benchmarks"][0]["extra_info"] = {}
+    page = tables(measured)
+    assert "2.50" not in page and "## Fitting" in page
+
+
+def test_nothing_measured_is_one_line_and_exit_code_2(tmp_path, capfd, monkeypatch):
+    # A suite without benchmarks stands for one that cannot start.
+    (tmp_path / benchmarks.SUITE).mkdir(parents=True)
+    monkeypatch.setattr(benchmarks, "ROOT", tmp_path)
+    with pytest.raises(SystemExit) as stopped:
+        main([])
+    assert stopped.value.code == 2
+    assert capfd.readouterr().err.splitlines()[-1].startswith("error: nothing was measured")
+
+
+def test_without_the_suite_the_folder_is_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(benchmarks, "ROOT", tmp_path)
+    with pytest.raises(SystemExit):
+        main([])
+    assert str(tmp_path / benchmarks.SUITE) in capsys.readouterr().err
+
+
+def test_a_table_without_rows_is_nothing():
+    assert markdown(["a", "b"], []) == ""
+
+
+def test_the_command_reads_prints_and_writes(measured, tmp_path, capsys):
+    source, target = tmp_path / "measured.json", tmp_path / "new" / "page.md"
+    source.write_text(json.dumps(measured | {"command": "what was typed"}))
+    main(["--read", str(source), "--output", str(target)])
+    printed = capsys.readouterr().out
+    assert target.read_text() == printed[:-1]
+    assert tables(measured) in printed
+    assert "`what was typed`" in printed
+
+
+@pytest.mark.parametrize("content", [None, "not json", "{}", "[]", '{"benchmarks": [{}]}'])
+def test_a_wrong_file_is_one_line_and_exit_code_2(tmp_path, capsys, content):
+    source, target = tmp_path / "measured.json", tmp_path / "page.md"
+    if content is not None:
+        source.write_text(content)
+    with pytest.raises(SystemExit) as stopped:
+        main(["--read", str(source), "--output", str(target)])
+    assert stopped.value.code == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: ") and str(source) in said and said.count("\n") == 1
+    assert not target.exists()
