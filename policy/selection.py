@@ -119,9 +119,7 @@ def learn_and_select(
         if agent.updates == scored_at:
             return False
         scored_at = agent.updates
-        point = Point(
-            step, *score(agent.policy, evaluation_env, noisy, sigma, c.noise_theta, seed)
-        )
+        point = Point(step, *score(agent.policy, evaluation_env, noisy, sigma, c.noise_theta, seed))
         curve.append(point)
         if not kept or point.score > kept[0][2].score:
             kept[:] = [(agent.policy.copy(), agent.networks(), point)]

@@ -33,9 +33,7 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
 
-    def __init__(
-        self, simulator: Simulator, task: Task, render_mode: str | None = None
-    ) -> None:
+    def __init__(self, simulator: Simulator, task: Task, render_mode: str | None = None) -> None:
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode {render_mode!r} is not supported; use 'rgb_array'")
         self.simulator = simulator
@@ -72,9 +70,7 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._steps = 0
         return self._observe(), {"state": self._state.copy()}
 
-    def step(
-        self, action: np.ndarray
-    ) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Hold ``action`` for one control period; a time-out is ``truncated``."""
         states = self._state[None]
         actions = np.clip(np.asarray(action, float)[None], *self._bounds)

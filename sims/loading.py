@@ -44,9 +44,7 @@ def with_effects(simulator: HostSimulator, effects: list[Effect]) -> HostSimulat
     return simulator.with_effects([*simulator.effects, *effects])
 
 
-def corrected_settings(
-    settings: Mapping[str, Any], effects: Sequence[Effect]
-) -> dict[str, Any]:
+def corrected_settings(settings: Mapping[str, Any], effects: Sequence[Effect]) -> dict[str, Any]:
     """Settings of a simulator with effects beside its own, for ``load_simulator``.
 
     Args:
@@ -161,7 +159,7 @@ def _effect(settings: Mapping[str, Any]) -> Effect:
 
 def _parser() -> jsonargparse.ArgumentParser:
     parser = jsonargparse.ArgumentParser(exit_on_error=False)
-    parser.add_argument("--simulator", type=Simulator, enable_path=True, required=True)
+    parser.add_argument("--simulator", type=Simulator, sub_configs=True, required=True)
     return parser
 
 

@@ -87,9 +87,7 @@ def _machine(data: Mapping[str, Any]) -> str:
         lines.append(f"Load of the machine at the start: {info['load_at_start']:.1f}.")
     if "seconds" in data:
         wall, processor = data["seconds"] / 60, data["processor_seconds"] / 60
-        lines.append(
-            f"The suite took {wall:.1f} minutes, {processor:.1f} of them processor time."
-        )
+        lines.append(f"The suite took {wall:.1f} minutes, {processor:.1f} of them processor time.")
     return " ".join(lines)
 
 
@@ -173,9 +171,7 @@ def _predictions(found: Sequence[Record]) -> str:
     return _beside_peers(found, "test_prediction_latency", "rows", ("ms", 1e3))
 
 
-def _beside_peers(
-    found: Sequence[Record], test: str, size: str, unit: tuple[str, float]
-) -> str:
+def _beside_peers(found: Sequence[Record], test: str, size: str, unit: tuple[str, float]) -> str:
     rows = []
     sizes = sorted({record[size] for record in _of(found, test)})
     for name in OURS:

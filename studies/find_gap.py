@@ -130,7 +130,6 @@ def run(
     effects = chosen_effects(simulator, chosen.effects)
     if Path(output).exists() and not Path(output).is_dir():
         raise ValueError(f"--output {output} is a file, expected a folder")
-    tell("reading the logs")
     data = read(simulator, chosen.logs, study.columns)
     rows = sum(len(run.times) for run in data.trajectories)
     tell(f"{len(data.trajectories)} trajectories, {rows} samples")

@@ -332,5 +332,3 @@ def footer(record: Mapping[str, Any]) -> str:
     stages = ", ".join(f"{stage} {value:.1f}" for stage, value in seconds.items())
     versions = ", ".join(f"{name} {version}" for name, version in record["versions"].items())
     return f"Found in {total:.0f} s ({stages}). {versions[:1].upper()}{versions[1:]}."
-
-

@@ -225,9 +225,7 @@ class LearningSteps:
             )
         seconds = time.perf_counter() - begin
         agent.restore(selection.networks)
-        true = rollout(
-            selection.policy, self.problem.environment(self.problem.true), self.seed
-        )
+        true = rollout(selection.policy, self.problem.environment(self.problem.true), self.seed)
         agent.save(folder / "agent.safetensors")
         np.savez_compressed(
             folder / "rollout.npz", states=visited(true), actions=true.actions, rewards=true.rewards
@@ -253,9 +251,7 @@ class LearningSteps:
     def _noise(self, seed: int) -> OrnsteinUhlenbeck:
         size = len(self.problem.true.action_channels)
         c = self.ddpg
-        return OrnsteinUhlenbeck(
-            size, c.noise_sigma, c.noise_theta, np.random.default_rng(seed)
-        )
+        return OrnsteinUhlenbeck(size, c.noise_sigma, c.noise_theta, np.random.default_rng(seed))
 
 
 def transitions(rollouts: Sequence[Rollout]) -> Transitions:

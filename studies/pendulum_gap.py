@@ -98,7 +98,7 @@ def build_parser() -> Parser:
         help="For config files: blocks of settings and the values they take; one trial for each "
         "combination within a block.",
     )
-    parser.add_class_arguments(PendulumTrial)
+    parser.add_class_arguments(PendulumTrial, sub_configs=True)
     parser.set_defaults(estimator={"class_path": "residual.DropoutNet"})
     return parser
 

@@ -187,9 +187,7 @@ def headline(rows: pd.DataFrame, optimum: float) -> Verdict:
     works = learnt.groupby(["true_samples", "estimator"])["return_true"].agg(["min", "mean"])
     works = works[works["min"] >= TARGET].sort_index()
     if works.empty:
-        return Verdict(
-            "No difference model controls the true pendulum on every seed.", tone="bad"
-        )
+        return Verdict("No difference model controls the true pendulum on every seed.", tone="bad")
     least = works.index[0][0]
     best = works.loc[least].sort_values("mean").iloc[-1]
     return Verdict(
@@ -202,9 +200,7 @@ def headline(rows: pd.DataFrame, optimum: float) -> Verdict:
     )
 
 
-def complexity_sections(
-    rows: pd.DataFrame, results: Sequence[Mapping[str, Any]]
-) -> list[Section]:
+def complexity_sections(rows: pd.DataFrame, results: Sequence[Mapping[str, Any]]) -> list[Section]:
     """The paper's Table II beside ours: fixed budget and fixed return."""
     needed = {
         name: [n for n in samples_to_target(results, name).values() if n is not None]
@@ -253,9 +249,7 @@ def complexity_sections(
     return [fixed, budget, *([Prose(note)] if note else [])]
 
 
-def samples_to_target(
-    results: Sequence[Mapping[str, Any]], name: str
-) -> dict[int, int | None]:
+def samples_to_target(results: Sequence[Mapping[str, Any]], name: str) -> dict[int, int | None]:
     """By seed, the true samples at which a baseline first tested at or above the target."""
     reached: dict[int, int | None] = {}
     for trial in results:
@@ -271,17 +265,13 @@ def difference_samples_to_target(rows: pd.DataFrame) -> dict[str, list[int]]:
     first = rows[(rows["name"] == "difference") & (rows["iteration"] == 1)]
     reached = first[first["return_true"] >= TARGET]
     return {
-        f"difference model, {estimator}": list(
-            part.groupby("seed")["true_samples"].min()
-        )
+        f"difference model, {estimator}": list(part.groupby("seed")["true_samples"].min())
         for estimator, part in reached.groupby("estimator")
     }
 
 
 @styled()
-def budget_figure(
-    rows: pd.DataFrame, errors: pd.DataFrame, optimum: float, path: Path
-) -> Drawing:
+def budget_figure(rows: pd.DataFrame, errors: pd.DataFrame, optimum: float, path: Path) -> Drawing:
     """Minus the return, and the one-step error, against the budget by estimator."""
     figure, axes = new_figure(2, 1, height=6.4, share_x=True)
     first = rows[(rows["name"] == "difference") & (rows["iteration"] == 1)]

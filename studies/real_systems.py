@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.host import Joint
 from sims.simulator import Array, Channel, Parameter
+from studies.files import atomic_write_text
 
 GRAVITY = 9.81
 
@@ -105,30 +108,43 @@ class Heater(FirstOrderSystem):
 
 
 class FallingPhone(EquationOfMotion):
-    """A phone in free flight that records its own accelerometer, per unit of mass.
+    """A phone in free flight, per unit of mass: v' = -9.8 m/s^2.
 
-    An accelerometer feels every force but gravity, and free fall reads zero. Measured is thus an
-    output, not a state; the sensor's own bandwidth makes it one: a' = (felt - a) / response.
-    Height and velocity are not measured, and every window has a start speed of its own.
+    Its accelerometer feels every force but gravity. What was measured is thus no state; summed
+    up from rest it gives the velocity but for the start speed (docs/find-gap.md).
     """
 
     name = "falling phone"
     dt = 0.005
-    substeps = 4
+    substeps = 1
     state_channels = (
         Channel("height", "m", "position"),
         Channel("velocity", "m/s", "rate", rate_of="height", scale=5.0),
-        Channel("sum", "m/s", "position"),
-        Channel("acceleration", "m/s^2", "rate", rate_of="sum", scale=1.0),
     )
     action_channels = ()
-    joints = (
-        Joint("phone", "height", "velocity", "N/kg", scale=10.0),
-        Joint("sensor", "sum", "acceleration", "m/s^2", scale=1.0),
-    )
-    response = 0.005
+    joints = (Joint("phone", "height", "velocity", "N/kg", scale=10.0),)
 
     def acceleration(self, q: Array, v: Array, u: Array, force: Array, p: Any) -> Array:
-        """Free fall with a force on the phone, and the sensor that feels it."""
-        felt = force[:, 0] + force[:, 1]
-        return np.stack([force[:, 0] - 9.8, (felt - v[:, 1]) / self.response], axis=1)
+        """Free fall with a force."""
+        return force - 9.8
+
+
+def sum_accelerations(source: str | Path, target: str | Path) -> None:
+    """Sum an accelerometer's log up to velocities, for ``FallingPhone``.
+
+    The start speed of a trial is not in the log; it is taken as zero, which is nearly true for a
+    phone that was dropped and wrong for one that was thrown.
+
+    Args:
+        source: CSV with columns kind, trial, t in s and az in m/s^2, zero in free fall.
+        target: CSV to write, with the column velocity in m/s in place of az.
+    """
+    table = pd.read_csv(source)
+    trials = []
+    for _, trial in table.groupby(["kind", "trial"], sort=False):
+        steps = np.diff(trial["t"])
+        middle = 0.5 * (trial["az"].to_numpy()[1:] + trial["az"].to_numpy()[:-1])
+        felt = np.concatenate([[0.0], np.cumsum(steps * middle)])
+        trials.append(trial.assign(velocity=felt - 9.8 * (trial["t"] - trial["t"].iloc[0])))
+    columns = ["kind", "trial", "t", "velocity"]
+    atomic_write_text(target, pd.concat(trials)[columns].to_csv(index=False))

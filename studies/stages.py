@@ -31,9 +31,7 @@ class Stages:
         self.root = root
         root.mkdir(parents=True, exist_ok=True)
 
-    def run(
-        self, name: str, config: Mapping[str, Any], compute: Callable[[Path], None]
-    ) -> Path:
+    def run(self, name: str, config: Mapping[str, Any], compute: Callable[[Path], None]) -> Path:
         """The folder of a stage, computed now if no finished one exists.
 
         Args:

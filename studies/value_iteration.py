@@ -100,9 +100,7 @@ def value_iteration(
         weight = np.stack(weights)[best, everyone]
         for _ in range(60):
             values = reward + gamma * (values[row] * weight).sum(1)
-    return GridPolicy(
-        simulator, task, angle_grid, rate_grid, values.reshape(angles, rates), gamma
-    )
+    return GridPolicy(simulator, task, angle_grid, rate_grid, values.reshape(angles, rates), gamma)
 
 
 def episode_return(policy: GridPolicy, system: Simulator, start: Array) -> float:

@@ -89,7 +89,7 @@ def test_the_folder_holds_all_that_was_made(undisturbed):
     }  # fmt: skip
     page = (folder / "report.html").read_text()
     assert "<img" in page or "<svg" in page
-    assert "http://" not in page.replace("http://www.w3.org", "") and "src=\"/" not in page
+    assert "http://" not in page.replace("http://www.w3.org", "") and 'src="/' not in page
 
 
 def test_saved_policies_and_models_can_be_used(undisturbed):

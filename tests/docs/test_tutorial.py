@@ -1,0 +1,62 @@
+"""The tutorial runs as it is written, and finds what it hides."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial-equation-of-motion.md"
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", TUTORIAL.read_text(), re.DOTALL)
+
+
+def run(command, folder):
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def worked(tmp_path_factory):
+    """A folder in which the tutorial's files were written and its steps 2 to 4 run."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    for code in blocks("python"):
+        name = code.splitlines()[0].removeprefix("# ")
+        (folder / name).write_text(code)
+    run([sys.executable, "measure.py"], folder)
+    (command,) = blocks("bash")
+    words = command.split()
+    assert words[0] == "python"
+    at = words.index("logs/*.csv")
+    words[at : at + 1] = sorted(f"logs/{path.name}" for path in (folder / "logs").glob("*.csv"))
+    told = run([sys.executable, *words[1:]], folder)
+    used = run([sys.executable, "use.py"], folder)
+    return json.loads((folder / "gap" / "gap.json").read_text()), told, used
+
+
+@pytest.mark.parametrize(
+    ("effect", "where", "truth"),
+    [("coulomb_friction", "cart", 0.8), ("viscous_friction", "hinge", 0.01)],
+)
+def test_both_frictions_are_named_within_their_intervals(worked, effect, where, truth):
+    found = {(v["effect"], v["where"]): v for v in worked[0]["verdicts"] if v["effect"]}
+    assert (effect, where) in found
+    (number,) = found[effect, where]["parameters"].values()
+    assert number["low"] <= truth <= number["high"]
+
+
+def test_nothing_else_is_claimed_and_the_gap_closes(worked):
+    gap, told, used = worked
+    assert len([v for v in gap["verdicts"] if v["effect"]]) == 2
+    assert gap["gap"]["after"]["value"] <= 1.1 * gap["gap"]["noise_floor"]["value"]
+    assert "Coulomb friction at cart" in told and "Viscous friction at hinge" in told
+    assert used.count("[") == 2
