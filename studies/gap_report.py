@@ -37,6 +37,7 @@ from studies.reporting import (
     Table,
     Verdict,
 )
+from studies.reporting.sections import Cell
 
 Tone = Literal["good", "warning", "bad", "neutral"]
 TONES: dict[str, Tone] = {
@@ -184,7 +185,7 @@ def bars(result: GapResult, folder: Path) -> Figure:
 def where(result: GapResult, folder: Path) -> list[Section]:
     """Channel, region and lag."""
     gap = result.gap
-    rows = []
+    rows: list[list[Cell]] = []
     for name, ratio in result.where.by_channel.items():
         of = gap.by_channel[name]
         rows.append([
@@ -235,7 +236,7 @@ def where(result: GapResult, folder: Path) -> list[Section]:
 
 def evidence(result: GapResult) -> Table:
     """What was tried, best first."""
-    rows = []
+    rows: list[list[Cell]] = []
     for rival in result.evidence[:RIVALS]:
         judged = "chosen" if rival.chosen else "excluded" if rival.excluded else "not excluded"
         rows.append([set_name(rival.effects), float(rival.ratio), float(rival.excess), judged])

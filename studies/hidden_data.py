@@ -234,5 +234,5 @@ def make_logs(
     motion, sensor = np.random.default_rng(seed).spawn(2)
     path, volts = simulate(truth, motion, excitation, runs, steps)
     seen = measure(truth, path, NOISES[noise], sensor)
-    times = DT * np.arange(steps + 1)
+    times = DT * np.arange(steps + 1, dtype=float)
     return [Trajectory(f"run {i}", times, seen[i], volts[i][:, None]) for i in range(runs)]
