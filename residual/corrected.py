@@ -47,6 +47,10 @@ class CorrectedSimulator(Simulator):
             next_states[:, column].clip(-limit, limit, out=next_states[:, column])
         return next_states
 
+    def augment(self, states: ArrayLike, actions: ArrayLike | None = None) -> Array:
+        """As the simulator below fills its memory."""
+        return self.simulator.augment(states, actions)
+
     def renderer(self) -> object:
         """Looks like the simulator below."""
         return self.simulator.renderer()  # type: ignore[attr-defined]

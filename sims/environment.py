@@ -64,9 +64,10 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         start = self.task.start(self.np_random)
         if options and "state" in options:
             start = options["state"]
-        # Effects with memory append channels that start at rest.
-        self._state = np.zeros(len(self.simulator.state_channels))
-        self._state[: len(start)] = start
+        state = np.asarray(start, float)[None]
+        if state.shape[1] < len(self.simulator.state_channels):
+            state = self.simulator.augment(state)
+        self._state = state[0]
         self._steps = 0
         return self._observe(), {"state": self._state.copy()}
 

@@ -95,6 +95,20 @@ class Simulator(abc.ABC):
         """A copy with some parameters changed; ``KeyError`` names an unknown one."""
         raise NotImplementedError(f"{type(self).__name__} has no parameters to change")
 
+    def augment(self, states: ArrayLike, actions: ArrayLike | None = None) -> Array:
+        """States with the memory channels that they lack appended, at rest.
+
+        Args:
+            states: shape (n, m), the leading channels.
+            actions: shape (n, n_a), the last actions before; zero by default.
+
+        Returns:
+            shape (n, n_s).
+        """
+        states = np.asarray(states, float)
+        lacking = len(self.state_channels) - states.shape[1]
+        return np.pad(states, ((0, 0), (0, lacking)))
+
     def rollout(self, start: ArrayLike, actions: ArrayLike) -> Array:
         """Step through a sequence of actions, open loop.
 

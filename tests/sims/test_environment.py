@@ -118,3 +118,15 @@ def test_a_simulator_without_pictures_says_so():
 
     with pytest.raises(ValueError, match="renderer"):
         SimulatorEnv(Bare(), SwingUp(), render_mode="rgb_array")
+
+
+def test_effects_with_memory_start_at_rest_and_can_be_set():
+    from sims.effects import Delay
+
+    env = SimulatorEnv(Pendulum(effects=[Delay("voltage", 0.05)]), SwingUp())
+    _, info = env.reset(seed=0)
+    assert len(info["state"]) == len(env.simulator.state_channels) > 2
+    env.step(np.array([2.0]))
+    later = env.step(np.array([0.0]))[4]["state"]
+    env.reset(options={"state": later})
+    np.testing.assert_array_equal(env._state, later)
