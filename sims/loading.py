@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import importlib
 import inspect
 from collections.abc import Mapping, Sequence
@@ -151,7 +152,7 @@ def _effect(settings: Mapping[str, Any]) -> Effect:
     parser = jsonargparse.ArgumentParser(exit_on_error=False)
     parser.add_argument("--effect", type=Effect)
     try:
-        chosen = parser.parse_object({"effect": dict(settings)})
+        chosen = parser.parse_object({"effect": copy.deepcopy(dict(settings))})
         return parser.instantiate(chosen).effect
     except jsonargparse.ArgumentError as error:
         raise ValueError(f"effect {settings}: {_one_line(error)}") from None
@@ -164,7 +165,8 @@ def _parser() -> jsonargparse.ArgumentParser:
 
 
 def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
-    value = dict(source) if isinstance(source, Mapping) else str(source)
+    # A copy, since the parser changes nested lists of what it is given.
+    value = copy.deepcopy(dict(source)) if isinstance(source, Mapping) else str(source)
     try:
         return _parser().parse_object({"simulator": value})
     except (jsonargparse.ArgumentError, TypeError) as error:

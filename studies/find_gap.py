@@ -15,6 +15,7 @@ simulator does not know.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import sys
 import time
@@ -121,7 +122,9 @@ def run(
     begin = time.perf_counter()
     tell = progress or (lambda _: None)
     parser = build_parser()
-    chosen = parser.parse_object({**settings, "output": str(output), "jobs": jobs})
+    chosen = parser.parse_object(
+        {**copy.deepcopy(dict(settings)), "output": str(output), "jobs": jobs}
+    )
     plain = yaml.safe_load(parser.dump(chosen, format="yaml", skip_unset=False))
     config = {key: plain[key] for key in (*_FIELDS, "logs", "effects")}
     made = parser.instantiate(chosen)

@@ -17,6 +17,7 @@ continues where it stopped when the same command is given again.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import json
@@ -162,7 +163,8 @@ def run_trial(
 def instantiate(config: Mapping[str, Any]) -> PendulumTrial:
     """The trial that plain settings describe; exits with one line if they are wrong."""
     parser = build_parser()
-    chosen = parser.instantiate(parser.parse_object(dict(config)))
+    # The parser changes nested lists of what it is given.
+    chosen = parser.instantiate(parser.parse_object(copy.deepcopy(dict(config))))
     names = [field.name for field in dataclasses.fields(PendulumTrial)]
     return PendulumTrial(**{name: chosen[name] for name in names})
 
@@ -181,7 +183,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     settings.pop("config", None)
     # Runs in the default place share their finished steps; a folder given holds all of its own.
     stages = (Path(output) if output else RESULTS) / "stages"
-    instantiate(settings)  # a wrong value is reported before anything is written
+    # A wrong value is reported before anything is written.
+    try:
+        instantiate(settings)
+    except ValueError as error:
+        fail(str(error))
     if grid:
         name = Path(str(given.config[0])).stem if given.config else "grid"
         target = Path(output) if output else RESULTS / name
@@ -213,6 +219,8 @@ def run_grid(
     """Many trials, a table over all of them and a report."""
     try:
         configs = [resolve(config) for config in expand_grid(settings, grid)]
+        for config in configs:
+            instantiate(config)
     except ValueError as error:
         fail(str(error))
     trials = {trial_folder(output, trial_label(config), config): config for config in configs}
@@ -230,7 +238,7 @@ def run_grid(
 def resolve(config: Mapping[str, Any]) -> dict[str, Any]:
     """``config`` with every default filled in, checked by the parser."""
     parser = build_parser()
-    chosen = parser.parse_object(dict(config))
+    chosen = parser.parse_object(copy.deepcopy(dict(config)))
     settings = json.loads(parser.dump(chosen, format="json", skip_unset=False))
     return {field.name: settings[field.name] for field in dataclasses.fields(PendulumTrial)}
 

@@ -102,6 +102,13 @@ def test_the_difference_study_takes_a_corrected_simulator(tmp_path):
     assert chosen.effects == tuple(effects)
     mine, plain = (SimulatorEnv(s, SwingUp()) for s in (chosen, Pendulum()))
     assert mine.observation_space == plain.observation_space
+    arguments = [
+        "--simulator", str(path), "--budget.iterations", "0", "--budget.idealised_steps", "1100",
+        "--ddpg.hidden", "[16, 16]", "--output", str(tmp_path / "policy"),
+    ]  # fmt: skip
+    pendulum_gap.main(arguments)
+    config = json.loads((tmp_path / "policy" / "results.json").read_text())["config"]
+    assert config["simulator"] == json.loads(path.read_text())
     observation, _ = mine.reset(seed=0)
     assert mine.observation_space.contains(observation)
     assert mine.observation_space.contains(mine.step(np.array([1.0]))[0])
