@@ -88,7 +88,7 @@ def write_grid_report(
         f"{len(results)} trials, {len(set(rows['seed']))} seeds",
         sections,
     ).write(folder / "report.html")
-    return summary.to_string(index=False)
+    return summary.to_string(index=False, na_rep="")
 
 
 @functools.cache
@@ -136,10 +136,11 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
     for _, part in shared.groupby(["name", "true_samples"], sort=False):
         first = part.iloc[0]
         words = POLICY_WORDS[first["name"]]
-        table.append(_row("", words, int(first["true_samples"]), returns(part)))
+        table.append(_row(words, int(first["true_samples"]), returns(part)))
     learnt = rows[rows["name"] == "difference"]
     keys = ["estimator", "samples_per_update", "iteration"]
-    for _, part in learnt.groupby(keys, sort=False):
+    # Trials that differ in their baselines only share the policies of the loop.
+    for _, part in learnt.drop_duplicates([*keys, "seed"]).groupby(keys, sort=False):
         estimator, samples, iteration = part.iloc[0][keys]
         seen = errors[
             (errors["estimator"] == estimator)
@@ -150,8 +151,7 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
         one_step = seen.filter(like="one_step").mean().mean()
         table.append(
             _row(
-                estimator,
-                POLICY_WORDS["difference"].format(iteration=iteration),
+                f"{estimator}, update {iteration}",
                 int(samples * iteration),
                 returns(part),
             )
@@ -169,9 +169,8 @@ def returns(rows: pd.DataFrame) -> Mean:
     return mean(rows["return_true"].tolist())
 
 
-def _row(estimator: str, policy: str, samples: int, value: Mean) -> dict[str, Any]:
+def _row(policy: str, samples: int, value: Mean) -> dict[str, Any]:
     return {
-        "estimator": estimator,
         "policy": policy,
         "true samples": samples,
         "return": str(value),
@@ -280,6 +279,7 @@ def budget_figure(rows: pd.DataFrame, errors: pd.DataFrame, optimum: float, path
     for colour, (estimator, part) in zip(
         PALETTE * 2, first.groupby("estimator", sort=False), strict=False
     ):
+        part = part.drop_duplicates(["true_samples", "seed"])
         means = {n: returns(group) for n, group in part.groupby("true_samples")}
         budgets = list(means)
         axes[0, 0].plot(budgets, [-m.value for m in means.values()], "o-", color=colour,
