@@ -15,7 +15,7 @@ from sklearn.utils import get_tags
 
 from residual.estimator import Array, ChannelFeatures, spread
 from residual.trajectories import Transitions
-from sims.simulator import Channel, Simulator, state_difference
+from sims.simulator import Channel, Simulator, as_rows, state_difference
 
 
 class DifferenceModel:
@@ -208,17 +208,7 @@ class DifferenceModel:
         return np.asarray(values, float).reshape(-1, len(self.state_channels))
 
     def _inputs(self, states: ArrayLike, actions: ArrayLike) -> Array:
-        states, actions = np.asarray(states, float), np.asarray(actions, float)
-        for what, rows, channels in (
-            ("states", states, self.state_channels),
-            ("actions", actions, self.action_channels),
-        ):
-            if rows.ndim != 2 or rows.shape[1] != len(channels):
-                names = ", ".join(channel.name for channel in channels)
-                raise ValueError(
-                    f"{what} has shape {rows.shape}, expected (n, {len(channels)}): "
-                    f"one column for each of {names}"
-                )
+        states, actions = as_rows(self.state_channels, self.action_channels, states, actions)
         actions = np.minimum(np.maximum(actions, self._low), self._high)
         rows = np.concatenate([states, actions], axis=1)
         return rows if self.raw else self.features.transform(rows)

@@ -135,22 +135,37 @@ class Simulator(abc.ABC):
         Raises:
             ValueError: A shape does not fit; the message names the channels expected.
         """
-        states, actions = np.asarray(states, float), np.asarray(actions, float)
-        for what, rows, channels in (
-            ("states", states, self.state_channels),
-            ("actions", actions, self.action_channels),
-        ):
-            if rows.ndim != 2 or rows.shape[1] != len(channels):
-                names = ", ".join(channel.name for channel in channels)
-                raise ValueError(
-                    f"{what} has shape {rows.shape}, expected (n, {len(channels)}): "
-                    f"one column for each of {names}"
-                )
-        if len(states) != len(actions):
-            raise ValueError(f"{len(states)} states but {len(actions)} actions")
+        states, actions = as_rows(self.state_channels, self.action_channels, states, actions)
         low = [channel.low for channel in self.action_channels]
         high = [channel.high for channel in self.action_channels]
         return states, np.clip(actions, low, high)
+
+
+def as_rows(
+    state_channels: tuple[Channel, ...],
+    action_channels: tuple[Channel, ...],
+    states: ArrayLike,
+    actions: ArrayLike,
+) -> tuple[Array, Array]:
+    """Both as float arrays of shape (n, n_s) and (n, n_a).
+
+    Raises:
+        ValueError: A shape does not fit; the message names the channels expected.
+    """
+    states, actions = np.asarray(states, float), np.asarray(actions, float)
+    for what, rows, channels in (
+        ("states", states, state_channels),
+        ("actions", actions, action_channels),
+    ):
+        if rows.ndim != 2 or rows.shape[1] != len(channels):
+            names = ", ".join(channel.name for channel in channels)
+            raise ValueError(
+                f"{what} has shape {rows.shape}, expected (n, {len(channels)}): "
+                f"one column for each of {names}"
+            )
+    if len(states) != len(actions):
+        raise ValueError(f"{len(states)} states but {len(actions)} actions")
+    return states, actions
 
 
 def wrap(angle: ArrayLike) -> Array:

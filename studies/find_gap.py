@@ -69,7 +69,7 @@ def build_parser() -> Parser:
     parser = Parser(
         prog="python -m studies.find_gap",
         description=f"{first}\n\n{rest}",
-        formatter_class=_HelpFormatter,
+        formatter_class=HelpFormatter,
     )
     parser.add_argument("--config", action="config", help="YAML file with any of the settings.")
     parser.add_argument(
@@ -194,7 +194,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 _FIELDS = tuple(field.name for field in dataclasses.fields(GapStudy))
 
 
-class _HelpFormatter(DefaultHelpFormatter, RawDescriptionHelpFormatter):
+class HelpFormatter(DefaultHelpFormatter, RawDescriptionHelpFormatter):
     """Keeps the line breaks of the description."""
 
 

@@ -21,7 +21,7 @@ from jsonargparse.typing import PositiveInt
 from sims.pendulum import IDEALISED_MASS, TRUE_MASS
 from studies.command import Parser
 from studies.files import atomic_write_text
-from studies.find_gap import _HelpFormatter
+from studies.find_gap import HelpFormatter
 from studies.hidden_data import Truth, make_logs
 
 HIDDEN = Truth(mass=TRUE_MASS / IDEALISED_MASS - 1)
@@ -30,7 +30,7 @@ HIDDEN = Truth(mass=TRUE_MASS / IDEALISED_MASS - 1)
 def build_parser() -> Parser:
     """The command line."""
     parser = Parser(
-        prog="python -m studies.make_log", description=__doc__, formatter_class=_HelpFormatter
+        prog="python -m studies.make_log", description=__doc__, formatter_class=HelpFormatter
     )
     parser.add_argument("--output", type=Path, required=True, help="Folder for the CSV files.")
     parser.add_function_arguments(write_logs, skip={"folder"})

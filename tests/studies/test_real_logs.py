@@ -61,12 +61,14 @@ def test_the_falling_phone_meets_drag(tmp_path):
     assert 0.03 < drag.parameters["coefficient"].value < 0.07
 
 
+@pytest.mark.long
 def test_the_second_pendulum_may_carry_more_mass(tmp_path):
     result = ask("pendulum_pair", [DATA / "pendulum-pair" / "run_b.csv"], tmp_path / "gap")
     assert "payload" in named(result)
     assert result.gap.after.value < 0.5 * result.gap.before.value
 
 
+@pytest.mark.long
 def test_the_swing_ups_are_not_blamed_on_friction_alone(tmp_path):
     logs = [DATA / "pendulum-swingup" / name for name in ("run_ddp.csv", "run_dircol.csv")]
     result = ask("pendulum_swingup", logs, tmp_path / "gap")
