@@ -299,21 +299,26 @@ def blind(result: GapResult) -> list[Section]:
 
 def quality(result: GapResult, record: Mapping[str, Any]) -> list[Section]:
     """Findings about the data, and the noise."""
-    findings = record["quality"]
-    rows = [[f["kind"], f["where"] and Path(f["where"]).name, f["says"]]
-            for f in findings[:FINDINGS]]  # fmt: skip
+    places: dict[tuple[str, str], list[str]] = {}
+    for found in record["quality"]:
+        place = Path(found["where"]).name
+        places.setdefault((found["kind"], found["says"]), []).append(place)
+    rows = [
+        [kind, where[0] + (f" and {len(where) - 1} more" if len(where) > 1 else ""), says]
+        for (kind, says), where in places.items()
+    ]
     noise = ", ".join(
         f"{name} {sigma:.3g} ± {error:.2g} {dict(result.channels)[name]}".strip()
         for name, (sigma, error) in result.noise.items()
     )
     text = f"Noise found (standard deviation): {noise}."
-    if len(findings) > FINDINGS:
-        text += f" {len(findings) - FINDINGS} more findings are in `gap.json`."
+    if len(rows) > FINDINGS:
+        text += f" {len(rows) - FINDINGS} more findings are in `gap.json`."
     if not rows:
         text += " Nothing else stood out in the logs."
     sections: list[Section] = [Prose(text, heading="Data quality")]
     if rows:
-        sections.append(Table(["finding", "where", "what"], rows))
+        sections.append(Table(["finding", "where", "what"], rows[:FINDINGS]))
     return sections
 
 
