@@ -10,6 +10,7 @@ import json
 import platform
 import re
 import sys
+from argparse import RawDescriptionHelpFormatter
 from collections.abc import Mapping, Sequence
 from importlib import metadata
 from typing import Any, NoReturn
@@ -17,6 +18,10 @@ from typing import Any, NoReturn
 import jsonargparse
 
 _PACKAGES = ("torch", "scikit-learn", "gpytorch", "pymunk", "numpy", "scipy", "gymnasium")
+
+
+class HelpFormatter(jsonargparse.DefaultHelpFormatter, RawDescriptionHelpFormatter):
+    """Keeps the line breaks of the description."""
 
 
 class Parser(jsonargparse.ArgumentParser):

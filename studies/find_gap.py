@@ -19,13 +19,11 @@ import copy
 import dataclasses
 import sys
 import time
-from argparse import RawDescriptionHelpFormatter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 import yaml
-from jsonargparse import DefaultHelpFormatter
 from jsonargparse.typing import PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
@@ -33,7 +31,7 @@ from residual.logs import LogData, LogFormat, read_logs
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Simulator
-from studies.command import Parser, fail
+from studies.command import HelpFormatter, Parser, fail
 from studies.gap_files import CORRECTED, REPORT, write_gap
 from studies.gap_words import summary
 
@@ -192,10 +190,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 _FIELDS = tuple(field.name for field in dataclasses.fields(GapStudy))
-
-
-class HelpFormatter(DefaultHelpFormatter, RawDescriptionHelpFormatter):
-    """Keeps the line breaks of the description."""
 
 
 if __name__ == "__main__":

@@ -19,9 +19,8 @@ import numpy as np
 from jsonargparse.typing import PositiveInt
 
 from sims.pendulum import IDEALISED_MASS, TRUE_MASS
-from studies.command import Parser
+from studies.command import HelpFormatter, Parser
 from studies.files import atomic_write_text
-from studies.find_gap import HelpFormatter
 from studies.hidden_data import Truth, make_logs
 
 HIDDEN = Truth(mass=TRUE_MASS / IDEALISED_MASS - 1)

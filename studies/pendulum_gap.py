@@ -23,7 +23,6 @@ import functools
 import json
 import sys
 import time
-from argparse import RawDescriptionHelpFormatter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,6 @@ from typing import Any
 import threadpoolctl
 import torch
 import yaml
-from jsonargparse import DefaultHelpFormatter
 from jsonargparse.typing import PositiveInt
 from sklearn.base import BaseEstimator
 
@@ -40,7 +38,7 @@ from residual import DropoutNet
 from sims.pendulum import Pendulum
 from sims.simulator import Simulator
 from sims.tasks import SwingUp
-from studies.command import Parser, class_label, expand_grid, fail, versions
+from studies.command import HelpFormatter, Parser, class_label, expand_grid, fail, versions
 from studies.difference_learning import Budget, learn_by_difference
 from studies.files import atomic_write_json, atomic_write_text, copy_file
 from studies.learning_steps import Problem
@@ -82,7 +80,7 @@ def build_parser() -> Parser:
     parser = Parser(
         prog="python -m studies.pendulum_gap",
         description=f"{summary}\n\n{examples}",
-        formatter_class=_HelpFormatter,
+        formatter_class=HelpFormatter,
     )
     parser.add_argument("--config", action="config", help="YAML file with any of the settings.")
     parser.add_argument(
@@ -247,10 +245,6 @@ def trial_label(config: Mapping[str, Any]) -> str:
     """A readable name for a trial's folder."""
     estimator = config["estimator"]["class_path"].rsplit(".", 1)[-1]
     return f"{estimator}-{config['budget']['true_samples']}-seed{config['seed']}"
-
-
-class _HelpFormatter(DefaultHelpFormatter, RawDescriptionHelpFormatter):
-    """Keeps the line breaks of the description."""
 
 
 if __name__ == "__main__":
