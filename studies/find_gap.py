@@ -63,10 +63,9 @@ class GapStudy:
 
 def build_parser() -> Parser:
     """The command line of this study."""
-    first, _, rest = __doc__.partition("\n\n")
     parser = Parser(
         prog="python -m studies.find_gap",
-        description=f"{first}\n\n{rest}",
+        description=__doc__,
         formatter_class=HelpFormatter,
     )
     parser.add_argument("--config", action="config", help="YAML file with any of the settings.")

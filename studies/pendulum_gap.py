@@ -76,10 +76,9 @@ class PendulumTrial:
 
 def build_parser() -> Parser:
     """The command line of this study."""
-    summary, _, examples = __doc__.partition("\n\n")
     parser = Parser(
         prog="python -m studies.pendulum_gap",
-        description=f"{summary}\n\n{examples}",
+        description=__doc__,
         formatter_class=HelpFormatter,
     )
     parser.add_argument("--config", action="config", help="YAML file with any of the settings.")
