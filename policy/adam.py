@@ -28,12 +28,13 @@ class Adam:
         self.mean = torch.zeros_like(parameters)
         self.square = torch.zeros_like(parameters)
         self.steps = torch.zeros(())
+        self._one = torch.ones(())  # adding a Python number would make a tensor of it each time
         self._parameters = parameters
         self._gradient = gradient
 
     def step(self) -> None:
         """Move the parameters once against the gradient."""
-        self.steps += 1
+        self.steps.add_(self._one)
         torch._fused_adam_(
             [self._parameters],
             [self._gradient],
