@@ -2,8 +2,9 @@
 
 Returns oscillate by hundreds from one evaluation to the next, so the last policy is a poor
 choice. The one with the best single rollout is also risky: on a corrected simulator it may
-live from an error of the correction. The rule here averages one rollout without noise and a
-few with a little noise, all in the environment that the agent learns in.
+live from an error of the correction. The rule here averages one rollout without noise, or a
+few from different starts, and a few with a little noise, all in the environment that the agent
+learns in.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class Point:
     Args:
         step: Environment steps learnt in this call before the evaluation.
         score: What the rule judges by: mean return of the rollouts with and without noise.
-        deterministic: Return of the rollout without noise.
+        deterministic: Mean return of the rollouts without noise.
     """
 
     step: int
@@ -61,18 +62,19 @@ def score(
     sigma: float,
     theta: float,
     seed: int,
+    episodes: int = 1,
 ) -> tuple[float, float]:
-    """Mean return of one rollout without noise and ``noisy`` with it, and the former's return.
+    """Mean return of ``episodes`` rollouts without noise and ``noisy`` with it; and of the former.
 
     Policies scored with one seed see the same start states and the same noise.
     """
-    deterministic = evaluate(policy, env, 1, seed)
+    deterministic = evaluate(policy, env, episodes, seed)
     if not noisy:
-        return float(deterministic[0]), float(deterministic[0])
+        return float(deterministic.mean()), float(deterministic.mean())
     size = int(np.prod(env.action_space.shape or ()))
     noise = OrnsteinUhlenbeck(size, sigma, theta, np.random.default_rng(seed))
-    disturbed = evaluate(policy, env, noisy, seed + 1, noise)
-    return float(np.concatenate([deterministic, disturbed]).mean()), float(deterministic[0])
+    disturbed = evaluate(policy, env, noisy, seed + episodes, noise)
+    return float(np.concatenate([deterministic, disturbed]).mean()), float(deterministic.mean())
 
 
 def learn_and_select(
@@ -86,6 +88,7 @@ def learn_and_select(
     seed: int = 0,
     callback: Callable[[Point], bool | None] | None = None,
     random_steps: int = 0,
+    episodes: int = 1,
 ) -> Selection:
     """Learn, score the policy now and then, and keep the best.
 
@@ -106,6 +109,7 @@ def learn_and_select(
         seed: Seed of the evaluations' start states and noise.
         callback: Called with every evaluation; learning stops if it returns True.
         random_steps: As in ``DDPG.learn``.
+        episodes: Rollouts without noise per evaluation, each from its own start state.
     """
     if env.unwrapped is evaluation_env.unwrapped:
         raise ValueError("env and evaluation_env are one object: make the environment twice")
@@ -119,7 +123,8 @@ def learn_and_select(
         if agent.updates == scored_at:
             return False
         scored_at = agent.updates
-        point = Point(step, *score(agent.policy, evaluation_env, noisy, sigma, c.noise_theta, seed))
+        scores = score(agent.policy, evaluation_env, noisy, sigma, c.noise_theta, seed, episodes)
+        point = Point(step, *scores)
         curve.append(point)
         if not kept or point.score > kept[0][2].score:
             kept[:] = [(agent.policy.copy(), agent.networks(), point)]

@@ -6,7 +6,8 @@
              train     DDPG on f + d, from the last policy, with the first update's replay
              measure   on the true system: the return, and d's accuracy where the policy goes
 
-(paper, section III-B and figure 2). The baselines learn on the true system itself: from
+(paper, section III-B and figure 2). The control trains on as long without d: what it gains is
+not the difference model's doing. The baselines learn on the true system itself: from
 nothing (cold) or from the idealised policy (warm); a cold start with a generous budget is the
 reference (true).
 
@@ -41,6 +42,7 @@ class Budget:
         difference_steps: Simulated steps on the corrected simulator after each update.
         true_steps: True steps that train the reference policy on the true system; 0 skips it.
         baseline_steps: True steps given to the cold and to the warm start; 0 skips them.
+        control_steps: Simulated steps of the control for each update; 0 skips it.
     """
 
     true_samples: int = 3750
@@ -49,6 +51,7 @@ class Budget:
     difference_steps: int = 20_000
     true_steps: int = 0
     baseline_steps: int = 0
+    control_steps: int = 0
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -82,6 +85,7 @@ def learn_by_difference(
     seed: int,
     stages: Stages,
     progress: Progress,
+    caution: float = 0.0,
 ) -> Outcome:
     """The loop of the paper, then the baselines that the budget asks for.
 
@@ -93,6 +97,8 @@ def learn_by_difference(
         seed: Everything follows from it.
         stages: Where finished steps are kept and found again.
         progress: Told what is going on.
+        caution: Reward lost per step for each multiple of the typical spread of the difference
+            model; 0 learns as in the paper.
 
     Returns:
         Records, and the folders that hold the policies and the models.
@@ -129,13 +135,20 @@ def learn_by_difference(
         models.append(model)
         policy = stages.run(
             "train",
-            {**common, "model": model, "policy": policy, "steps": budget.difference_steps},
+            {
+                **common,
+                "model": model,
+                "policy": policy,
+                "steps": budget.difference_steps,
+                **({"caution": caution} if caution else {}),
+            },
             lambda folder: steps.train_corrected(
                 folder,
                 model,  # noqa: B023
                 policy,  # noqa: B023
                 first,  # noqa: B023
                 budget.difference_steps,
+                caution,
             ),
         )
         first = first or policy
@@ -149,6 +162,17 @@ def learn_by_difference(
         policies.append(steps.record(policy, "difference") | seen)
         errors = read_json(measured / "accuracy.json")
         accuracy.append(seen | errors | read_json(model / "fit.json"))
+
+    policy, first = idealised, None
+    for iteration in range(1, budget.iterations + 1 if budget.control_steps else 1):
+        policy = stages.run(
+            "control",
+            {**common, "policy": policy, "round": iteration, "steps": budget.control_steps},
+            lambda folder: steps.train_control(folder, policy, first, budget.control_steps),  # noqa: B023
+        )
+        first = first or policy
+        folders[f"control-{iteration}"] = policy
+        policies.append(steps.record(policy, "control") | {"iteration": iteration})
 
     # The reference and the cold start are one experiment, read at two budgets.
     if longest := max(budget.true_steps, budget.baseline_steps):

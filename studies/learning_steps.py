@@ -12,7 +12,7 @@ import contextlib
 import dataclasses
 import time
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +21,11 @@ from sklearn.base import BaseEstimator, clone
 
 from policy.ddpg import DDPG, DDPGConfig
 from policy.evaluate import Rollout, collect, rollout
+from policy.mlp import MlpPolicy
 from policy.noise import OrnsteinUhlenbeck
 from policy.selection import Point, learn_and_select
 from residual.accuracy import accuracy_along, uniform_rollouts
+from residual.caution import CautiousTask
 from residual.corrected import CorrectedSimulator
 from residual.difference import DifferenceModel
 from residual.persistence import load, save
@@ -34,14 +36,6 @@ from sims.tasks import Task
 from studies.files import atomic_write_json, read_json
 from studies.progress import Progress
 
-# Tests of the policy while it learns. On a simulator they are free, on the true system they
-# are measurement and not counted, as in the paper.
-EVALUATE_EVERY = 500
-EVALUATE_TRUE_EVERY = 250
-# Accuracy is measured over the first seconds of fresh rollouts: after that a good policy
-# balances, where there is next to nothing to predict.
-VISITED_SECONDS = 2.0
-VISITED_ROLLOUTS = 5
 # Policies learnt from nothing explore more (paper, section IV-C: "slightly higher"; 0.20 in the
 # authors' scripts) and begin with random actions; the same for the baselines.
 COLD_SIGMA = 0.20
@@ -49,20 +43,50 @@ RANDOM_STEPS = 1000
 
 
 @dataclasses.dataclass(frozen=True)
+class Tests:
+    """How policies are tested while they learn and afterwards, and where accuracy is measured.
+
+    On a simulator tests are free; on the true system they are measurement and not counted, as
+    in the paper.
+
+    Args:
+        every: Steps of learning on a simulator between tests.
+        every_true: The same on the true system.
+        episodes: Rollouts without noise per test, each from its own start state.
+        noisy: Rollouts with a little noise per test on a model; they keep a policy from being
+            chosen for one lucky path through the model's errors.
+        visited_seconds: Accuracy is measured over the first seconds of fresh rollouts.
+        visited_rollouts: How many of those.
+    """
+
+    every: int = 500
+    every_true: int = 250
+    episodes: int = 1
+    noisy: int = 3
+    # Later a good policy balances, where there is next to nothing to predict.
+    visited_seconds: float = 2.0
+    visited_rollouts: int = 5
+
+
+@dataclasses.dataclass(frozen=True)
 class Problem:
     """A system to control and the simulator at hand.
 
     Attributes:
-        description: What identifies both: plain values only.
+        description: What identifies all that follows: plain values only.
         idealised: The simulator that one has.
         true: The system that one wants to control; it is only ever sampled.
         task: Reward, start states, horizon.
+        tests: How policies are tested.
+        measures: What is reported of a rollout on the true system beside its return, by name.
     """
 
     description: Mapping[str, Any]
     idealised: Simulator
     true: Simulator
     task: Task
+    tests: Tests = Tests()
+    measures: Callable[[Rollout], dict[str, float]] | None = None
 
     def environment(self, simulator: Simulator) -> SimulatorEnv:
         """The task on ``simulator``."""
@@ -82,8 +106,8 @@ class LearningSteps:
     def train_idealised(self, folder: Path, steps: int) -> None:
         """The policy that one gets from the idealised simulator alone."""
         agent = self._agent(COLD_SIGMA)
-        title = "train on the idealised model"
-        self._train(folder, agent, self.problem.idealised, steps, title, RANDOM_STEPS)
+        env = self._environments(self.problem.idealised)
+        self._train(folder, agent, env, steps, "train on the idealised model", RANDOM_STEPS)
 
     def collect(self, folder: Path, policy: Path, samples: int, iteration: int) -> None:
         """True transitions under a policy with exploration noise."""
@@ -112,17 +136,34 @@ class LearningSteps:
         atomic_write_json(folder / "fit.json", {"fit_seconds": seconds})
 
     def train_corrected(
-        self, folder: Path, model: Path, policy: Path, first: Path | None, steps: int
+        self,
+        folder: Path,
+        model: Path,
+        policy: Path,
+        first: Path | None,
+        steps: int,
+        caution: float = 0.0,
     ) -> None:
         """DDPG on the corrected simulator, from the last policy's networks.
 
         From the second update on, the replay begins with the first update's transitions
-        (paper, section III-C).
+        (paper, section III-C). With ``caution`` the reward is less where the difference model
+        is unsure; see ``residual.caution``.
         """
-        agent = DDPG.load(first / "agent.safetensors") if first else self._agent()
-        agent.restore(DDPG.load(policy / "agent.safetensors").networks())
         corrected = self.corrected(model)
-        self._train(folder, agent, corrected, steps, "train on the corrected model")
+        task = self.problem.task
+        if caution:
+            data = Transitions.load(model / "transitions.npz")
+            task = CautiousTask.around(task, corrected.difference, data, caution)
+        env = SimulatorEnv(corrected, task), SimulatorEnv(corrected, task)
+        agent = self._continued(policy, first)
+        self._train(folder, agent, env, steps, "train on the corrected model")
+
+    def train_control(self, folder: Path, policy: Path, first: Path | None, steps: int) -> None:
+        """As ``train_corrected``, without a difference model: what more training alone brings."""
+        agent = self._continued(policy, first)
+        env = self._environments(self.problem.idealised)
+        self._train(folder, agent, env, steps, "train on, no difference model")
 
     def train_on_true(self, folder: Path, start: Path | None, steps: int) -> None:
         """A baseline: DDPG on the true system, from nothing or from a policy's networks."""
@@ -132,7 +173,8 @@ class LearningSteps:
             agent, title, random_steps = self._agent(), "warm start", 0
             agent.restore(DDPG.load(start / "agent.safetensors").networks())
         title += " on the true system"
-        self._train(folder, agent, self.problem.true, steps, title, random_steps)
+        env = self._environments(self.problem.true)
+        self._train(folder, agent, env, steps, title, random_steps)
 
     def measure(self, folder: Path, model: Path, policy: Path) -> None:
         """Accuracy of the model along fresh true rollouts of the policy trained on it."""
@@ -140,11 +182,12 @@ class LearningSteps:
         corrected = self.corrected(model)
         learnt = DDPG.load(policy / "agent.safetensors").policy
         env = self.problem.environment(self.problem.true)
-        steps = round(VISITED_SECONDS / corrected.dt)
+        tests = self.problem.tests
+        steps = round(tests.visited_seconds / corrected.dt)
         runs = [rollout(learnt, env, seed, max_steps=steps)]
         runs += [
             rollout(learnt, env, seed + k, self._noise(seed + k), steps)
-            for k in range(1, VISITED_ROLLOUTS)
+            for k in range(1, tests.visited_rollouts)
         ]
         # A run that fell ends early; all are cut to the shortest so that they stack.
         shortest = min(len(run.rewards) for run in runs)
@@ -183,12 +226,15 @@ class LearningSteps:
         curve = [point for point in read_json(folder / "curve.json") if point["step"] <= within]
         best = max(curve, key=lambda point: point["score"])["deterministic"]
         share = within / summary["simulated_steps"]
+        # At the full length the policy itself is there, and was tested as all others.
+        whole = {k: summary[k] for k in ("return_true", "tests") if k in summary and share == 1}
         return {
             "name": name,
             "iteration": 0,
             "true_samples": within,
             "simulated_steps": 0,
             "return_true": best,
+            **whole,
             "return_model": best,
             "seconds": summary["seconds"] * share,
             "curve": [[point["step"], point["deterministic"]] for point in curve],
@@ -198,12 +244,14 @@ class LearningSteps:
         self,
         folder: Path,
         agent: DDPG,
-        simulator: Simulator,
+        environments: tuple[SimulatorEnv, SimulatorEnv],
         steps: int,
         title: str,
         random_steps: int = 0,
     ) -> None:
-        on_true = simulator is self.problem.true
+        env, tested = environments
+        on_true = env.simulator is self.problem.true
+        tests = self.problem.tests
         begin = time.perf_counter()
         with self.progress.task(title, steps) as tell:
 
@@ -212,36 +260,55 @@ class LearningSteps:
 
             selection = learn_and_select(
                 agent,
-                self.problem.environment(simulator),
-                self.problem.environment(simulator),
+                env,
+                tested,
                 steps,
-                every=EVALUATE_TRUE_EVERY if on_true else EVALUATE_EVERY,
-                # On the true system the test is the measure itself; on a model, rollouts with
-                # noise keep a policy from being chosen for one lucky path through its errors.
-                noisy=0 if on_true else 3,
+                every=tests.every_true if on_true else tests.every,
+                # On the true system the test is the measure itself.
+                noisy=0 if on_true else tests.noisy,
                 seed=derived_seed(self.seed, "select"),
                 callback=report,
                 random_steps=random_steps,
+                episodes=tests.episodes,
             )
         seconds = time.perf_counter() - begin
         agent.restore(selection.networks)
-        true = rollout(selection.policy, self.problem.environment(self.problem.true), self.seed)
         agent.save(folder / "agent.safetensors")
-        np.savez_compressed(
-            folder / "rollout.npz", states=visited(true), actions=true.actions, rewards=true.rewards
-        )
         atomic_write_json(
             folder / "curve.json", [dataclasses.asdict(point) for point in selection.curve]
         )
-        atomic_write_json(
-            folder / "summary.json",
-            {
-                "simulated_steps": steps,
-                "return_true": true.total,
-                "return_model": selection.best.deterministic,
-                "seconds": seconds,
-            },
+        outcome = {
+            "simulated_steps": steps,
+            "return_model": selection.best.deterministic,
+            "seconds": seconds,
+        }
+        atomic_write_json(folder / "summary.json", outcome | self._test(folder, selection.policy))
+
+    def _test(self, folder: Path, policy: MlpPolicy) -> dict[str, Any]:
+        """Rollouts on the true system, the first of them kept: the mean return and measures."""
+        env = self.problem.environment(self.problem.true)
+        runs = [rollout(policy, env, self.seed + k) for k in range(self.problem.tests.episodes)]
+        first = runs[0]
+        np.savez_compressed(
+            folder / "rollout.npz",
+            states=visited(first),
+            actions=first.actions,
+            rewards=first.rewards,
         )
+        result: dict[str, Any] = {"return_true": float(np.mean([run.total for run in runs]))}
+        if self.problem.measures:
+            result["tests"] = [{"return": run.total, **self.problem.measures(run)} for run in runs]
+        return result
+
+    def _environments(self, simulator: Simulator) -> tuple[SimulatorEnv, SimulatorEnv]:
+        """One to learn in and one to be tested in."""
+        return self.problem.environment(simulator), self.problem.environment(simulator)
+
+    def _continued(self, policy: Path, first: Path | None) -> DDPG:
+        """An agent with a policy's networks and, if there is one, the first update's replay."""
+        agent = DDPG.load(first / "agent.safetensors") if first else self._agent()
+        agent.restore(DDPG.load(policy / "agent.safetensors").networks())
+        return agent
 
     def _agent(self, sigma: float | None = None) -> DDPG:
         env = self.problem.environment(self.problem.idealised)

@@ -1,0 +1,61 @@
+"""The loop itself: the control arm, tests from several starts, and what is reported of them."""
+
+import numpy as np
+import pytest
+
+from policy.ddpg import DDPGConfig
+from residual import Linear
+from sims.pendulum_equation import PendulumEquation
+from sims.tasks import SwingUp
+from studies.difference_learning import Budget, learn_by_difference
+from studies.learning_steps import Problem, Tests
+from studies.progress import Silent
+from studies.stages import Stages
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory):
+    problem = Problem(
+        description={"system": "short pendulum"},
+        idealised=PendulumEquation(),
+        true=PendulumEquation.true(),
+        task=SwingUp(horizon=30, start_at="anywhere"),
+        tests=Tests(every=60, every_true=60, episodes=3, noisy=1, visited_seconds=1.0),
+        measures=lambda run: {"turned": float(np.ptp(run.states[:, 0]))},
+    )
+    budget = Budget(
+        true_samples=40,
+        iterations=2,
+        idealised_steps=120,
+        difference_steps=60,
+        true_steps=120,
+        baseline_steps=60,
+        control_steps=60,
+    )
+    ddpg = DDPGConfig(hidden=(8, 8), warm_up=50, batch=8)
+    stages = Stages(tmp_path_factory.mktemp("stages"))
+    return learn_by_difference(problem, Linear(), budget, ddpg, 0, stages, Silent())
+
+
+def test_the_control_gets_the_same_training_and_no_true_samples(outcome):
+    records = {(p["name"], p["iteration"]): p for p in outcome.policies}
+    for iteration in (1, 2):
+        difference, control = records["difference", iteration], records["control", iteration]
+        assert control["simulated_steps"] == difference["simulated_steps"] == 60
+        assert control["true_samples"] == 0
+        assert difference["true_samples"] == 40 * iteration
+        assert f"control-{iteration}" in outcome.folders
+
+
+def test_policies_are_tested_from_several_starts_with_the_measures_asked_for(outcome):
+    for policy in outcome.policies:
+        if policy["name"] in ("idealised", "difference", "control", "true"):
+            returns = [test["return"] for test in policy["tests"]]
+            assert len(set(returns)) == 3
+            assert policy["return_true"] == pytest.approx(np.mean(returns))
+            assert all(test["turned"] > 0 for test in policy["tests"])
+
+
+def test_the_reference_read_at_a_smaller_budget_is_the_cold_start(outcome):
+    cold = next(p for p in outcome.policies if p["name"] == "cold")
+    assert cold["true_samples"] == 60 and max(step for step, _ in cold["curve"]) <= 60
