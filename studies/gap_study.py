@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import functools
+import importlib.util
 import json
 import sys
 import time
@@ -19,18 +20,26 @@ from typing import Any
 import threadpoolctl
 import torch
 import yaml
-from jsonargparse.typing import PositiveInt
+from jsonargparse.typing import NonNegativeFloat, PositiveInt
 from sklearn.base import BaseEstimator
 
 from policy.ddpg import DDPGConfig
 from residual import DropoutNet
 from studies.command import HelpFormatter, Parser, class_label, expand_grid, fail, versions
+from studies.curves import Curves
 from studies.difference_learning import Budget, learn_by_difference
-from studies.files import atomic_write_json, atomic_write_text, copy_file
+from studies.files import (
+    atomic_write_json,
+    atomic_write_text,
+    copy_file,
+    read_json,
+    remove_partial_files,
+)
 from studies.learning_steps import Problem
-from studies.progress import Bars, Progress, Silent
+from studies.progress import Bars, Progress, Several
 from studies.stages import Stages
-from studies.trials import run_trials, trial_folder
+from studies.trials import Execution, Failures, read_trials, run_trials, trial_folder
+from studies.workers import Backend, WorkersError
 
 Config = Mapping[str, Any]
 Results = Mapping[str, Any]
@@ -45,12 +54,15 @@ class GapTrial:
         seed: Everything random follows from it.
         budget: Samples and training steps.
         ddpg: Settings of DDPG, the same for every policy.
+        caution: Reward lost per step, on the corrected simulator, for each multiple of the
+            difference model's typical standard deviation; 0 learns as in the paper.
     """
 
     estimator: BaseEstimator = dataclasses.field(default_factory=DropoutNet)
     seed: int = 0
     budget: Budget = dataclasses.field(default_factory=Budget)
     ddpg: DDPGConfig = dataclasses.field(default_factory=DDPGConfig)
+    caution: NonNegativeFloat = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,8 +72,8 @@ class GapStudy:
     Its functions must be importable by name, since worker processes run them.
 
     Attributes:
-        name: Of the study's file, such as ``"pendulum_gap"``.
-        system: Of the system, in ``results.json`` and in what names a stage.
+        system: Its name in ``results.json`` and in the hashes of stages; the study's file is
+            ``studies/<system>_gap.py``.
         description: Help text of the command.
         trial: Settings of one trial, a dataclass that extends ``GapTrial``.
         problem: The systems and the task of a trial; its second argument is the description to
@@ -73,7 +85,6 @@ class GapStudy:
         estimator: Class path of the default estimator.
     """
 
-    name: str
     system: str
     description: str | None
     trial: type[GapTrial]
@@ -82,6 +93,11 @@ class GapStudy:
     report: Callable[[Results, Path], object]
     grid_report: Callable[[Sequence[Results], Mapping[Path, str], Path], str]
     estimator: str = "residual.DropoutNet"
+
+    @property
+    def name(self) -> str:
+        """Of the study's file and of its folder of results."""
+        return f"{self.system}_gap"
 
     @property
     def settings(self) -> list[str]:
@@ -111,6 +127,24 @@ def build_parser(study: GapStudy) -> Parser:
     )
     parser.add_argument("--jobs", type=PositiveInt, default=1, help="Processes for many trials.")
     parser.add_argument(
+        "--backend",
+        type=Backend,
+        default="local",
+        help="Where many trials run: in local processes or on a cluster (docs/scaling.md).",
+    )
+    parser.add_argument(
+        "--scheduler",
+        type=str | None,
+        default=None,
+        help="Address of the cluster's scheduler, such as tcp://host:8786.",
+    )
+    parser.add_argument(
+        "--tensorboard",
+        type=Path | None,
+        default=None,
+        help="Folder for training curves; tensorboard --logdir shows them.",
+    )
+    parser.add_argument(
         "--grid",
         type=list[dict[str, list[Any]]] | None,
         default=None,
@@ -127,7 +161,11 @@ def run_command(study: GapStudy, arguments: Sequence[str] | None = None) -> None
     parser = build_parser(study)
     given = parser.parse_args(arguments)
     settings = json.loads(parser.dump(given, format="json", skip_unset=False))
-    output, jobs, grid = (settings.pop(name) for name in ("output", "jobs", "grid"))
+    output, grid = settings.pop("output"), settings.pop("grid")
+    execution = Execution(
+        **{name: settings.pop(name) for name in ("backend", "jobs", "scheduler")},
+        tensorboard=_curves_folder(settings.pop("tensorboard")),
+    )
     settings.pop("config", None)
     home = Path("results", study.name)
     # Runs in the default place share their finished steps; a folder given holds all of its own.
@@ -139,16 +177,28 @@ def run_command(study: GapStudy, arguments: Sequence[str] | None = None) -> None
         fail(str(error))
     if grid:
         name = Path(str(given.config[0])).stem if given.config else "grid"
-        run_grid(study, settings, grid, Path(output) if output else home / name, stages, jobs)
+        target = Path(output) if output else home / name
+        run_grid(study, settings, grid, target, stages, execution)
     else:
         folder = trial_folder(home, trial_label(settings), settings)
-        run_single(study, settings, Path(output) if output else folder, stages)
+        target = Path(output) if output else folder
+        run_single(study, settings, target, stages, execution)
 
 
-def run_single(study: GapStudy, settings: dict[str, Any], output: Path, stages: Path) -> None:
-    """One trial with progress bars, a table on the terminal and a report."""
+def _curves_folder(folder: str | None) -> Path | None:
+    if folder and importlib.util.find_spec("tensorboard") is None:
+        fail("TensorBoard is not installed: pip install 'simgap[tensorboard]'")
+    return Path(folder).resolve() if folder else None
+
+
+def run_single(
+    study: GapStudy, settings: dict[str, Any], output: Path, stages: Path, execution: Execution
+) -> None:
+    """One trial in this process with progress bars, a table on the terminal and a report."""
     begin = time.perf_counter()
-    results = run_trial(study, settings, output, Stages(stages), Bars())
+    remove_partial_files(output)
+    curves = [Curves(execution.tensorboard / output.name)] if execution.tensorboard else []
+    results = run_trial(study, settings, output, Stages(stages), Several(Bars(), *curves))
     results["seconds"] = time.perf_counter() - begin
     atomic_write_text(output / "config.yaml", yaml.safe_dump(settings, sort_keys=False))
     study.report(results, output)
@@ -162,7 +212,7 @@ def run_grid(
     grid: list[dict[str, list[Any]]],
     output: Path,
     stages: Path,
-    jobs: int,
+    execution: Execution,
 ) -> None:
     """Many trials, a table over all of them and a report."""
     try:
@@ -171,17 +221,45 @@ def run_grid(
             instantiate(study, config)
     except ValueError as error:
         fail(str(error))
+    remove_partial_files(output)
     trials = {trial_folder(output, trial_label(config), config): config for config in configs}
-    work = functools.partial(quiet_trial, study, stages)
-    results, failures = run_trials(trials, work, jobs, Bars())
-    if results:
-        print(f"\n{study.grid_report(results, failures, output)}")
-        print(f"\nreport: {output / 'report.html'}")
-    for folder, failure in failures.items():
-        reason = failure.strip().splitlines()[-1]
-        print(f"failed: {folder}: {reason} (see error.txt there)", file=sys.stderr)
+    work = functools.partial(grid_trial, study, stages.resolve())
+    try:
+        run_trials(study.name, trials, work, execution)
+    except WorkersError as error:
+        fail(str(error))
+    failures = report_grid(study, output)
     if failures:
         raise SystemExit(1)
+
+
+def report_grid(study: GapStudy, folder: Path) -> Failures:
+    """Tables and report of a grid from the trials in its folder; returns the failed ones."""
+    results, failures = read_trials(folder)
+    if results:
+        print(f"\n{study.grid_report(results, failures, folder)}")
+        print(f"\nreport: {folder / 'report.html'}")
+    for path, failure in failures.items():
+        reason = failure.strip().splitlines()[-1]
+        print(f"failed: {path}: {reason} (see error.txt there)", file=sys.stderr)
+    return failures
+
+
+def rebuild(study: GapStudy, folder: Path) -> None:
+    """Tables, figures and report of a finished or unfinished run, without computing trials.
+
+    Raises:
+        FileNotFoundError: Nothing in the folder is finished.
+    """
+    path = folder / "results.json"
+    results = read_json(path) if path.exists() else {}
+    if "policies" in results:
+        study.report(results, folder)
+        print(f"\n{study.table(results)}\n\nreport: {folder / 'report.html'}")
+    elif not read_trials(folder)[0]:
+        raise FileNotFoundError(f"{folder}: no trial in it is finished")
+    else:
+        report_grid(study, folder)
 
 
 def run_trial(
@@ -211,6 +289,7 @@ def run_trial(
         trial.seed,
         stages,
         progress,
+        trial.caution,
     )
     for name, source in outcome.folders.items():
         copy_file(source / "agent.safetensors", folder / "policies" / f"{name}.safetensors")
@@ -230,9 +309,11 @@ def run_trial(
     }
 
 
-def quiet_trial(study: GapStudy, stages: Path, config: Config, folder: Path) -> dict[str, Any]:
-    """``run_trial`` without progress, for worker processes."""
-    return run_trial(study, config, folder, Stages(stages), Silent())
+def grid_trial(
+    study: GapStudy, stages: Path, config: Config, folder: Path, progress: Progress
+) -> dict[str, Any]:
+    """``run_trial`` as one of many."""
+    return run_trial(study, config, folder, Stages(stages), progress)
 
 
 def instantiate(study: GapStudy, config: Config) -> GapTrial:

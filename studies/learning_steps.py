@@ -43,7 +43,7 @@ RANDOM_STEPS = 1000
 
 
 @dataclasses.dataclass(frozen=True)
-class Tests:
+class PolicyTests:
     """How policies are tested while they learn and afterwards, and where accuracy is measured.
 
     On a simulator tests are free; on the true system they are measurement and not counted, as
@@ -85,7 +85,7 @@ class Problem:
     idealised: Simulator
     true: Simulator
     task: Task
-    tests: Tests = Tests()
+    tests: PolicyTests = PolicyTests()
     measures: Callable[[Rollout], dict[str, float]] | None = None
 
     def environment(self, simulator: Simulator) -> SimulatorEnv:

@@ -8,7 +8,7 @@ from residual import Linear
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
 from studies.difference_learning import Budget, learn_by_difference
-from studies.learning_steps import Problem, Tests
+from studies.learning_steps import Problem, PolicyTests
 from studies.progress import Silent
 from studies.stages import Stages
 
@@ -20,7 +20,7 @@ def outcome(tmp_path_factory):
         idealised=PendulumEquation(),
         true=PendulumEquation.true(),
         task=SwingUp(horizon=30, start_at="anywhere"),
-        tests=Tests(every=60, every_true=60, episodes=3, noisy=1, visited_seconds=1.0),
+        tests=PolicyTests(every=60, every_true=60, episodes=3, noisy=1, visited_seconds=1.0),
         measures=lambda run: {"turned": float(np.ptp(run.states[:, 0]))},
     )
     budget = Budget(
