@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import yaml
 from matplotlib.figure import Figure as Drawing
 
 from sims.render import PendulumRenderer
+from studies.policy_records import (
+    Results,
+    last_difference,
+    load_rollout,
+    policies_section,
+    policy_name,
+    provenance,
+    record_key,
+)
 from studies.reporting import (
     Animation,
-    Code,
     Figure,
     KeyValues,
     Prose,
@@ -27,22 +33,8 @@ from studies.reporting import (
 from studies.reporting.figures import draw_lines, new_figure, save_figure, styled
 from studies.reporting.media import encode_gif
 
-Results = Mapping[str, Any]
-
 CONTROL_PERIOD = 0.05
 TARGET = -1000.0  # the paper's fixed return (Table II)
-POLICY_WORDS = {
-    "idealised": "idealised policy",
-    "difference": "difference model, update {iteration}",
-    "true": "trained on the true system",
-    "cold": "cold start",
-    "warm": "warm start",
-}
-
-
-def policy_name(record: Mapping[str, Any]) -> str:
-    """A policy in words."""
-    return POLICY_WORDS[record["name"]].format(**record)
 
 
 def policy_table(results: Results) -> str:
@@ -126,24 +118,6 @@ def write_report(results: Results, folder: Path) -> Path:
 
 
 FILM_SECONDS = 6.0
-
-
-def record_key(record: Mapping[str, Any]) -> str:
-    """Name of a policy's files."""
-    name = record["name"]
-    return f"difference-{record['iteration']}" if name == "difference" else name
-
-
-def load_rollout(path: Path) -> dict[str, np.ndarray]:
-    """States (T + 1, n_s), actions (T, n_a) and rewards (T,) of an episode."""
-    with np.load(path, allow_pickle=False) as data:
-        return dict(data)
-
-
-def last_difference(results: Results) -> Mapping[str, Any] | None:
-    """The policy after the last update, if there was one."""
-    learnt = [record for record in results["policies"] if record["name"] == "difference"]
-    return learnt[-1] if learnt else None
 
 
 def verdict(results: Results) -> Verdict:
@@ -300,27 +274,6 @@ def returns_figure(results: Results, path: Path) -> Drawing:
     return figure
 
 
-def policies_section(results: Results) -> Table:
-    """All policies."""
-    return Table(
-        ["policy", "true samples", "simulated steps", "return on its model", "return on the truth",
-         "seconds"],
-        [
-            [
-                policy_name(record),
-                record["true_samples"],
-                record["simulated_steps"],
-                round(record["return_model"], 1),
-                round(record["return_true"], 1),
-                round(record["seconds"], 1),
-            ]
-            for record in results["policies"]
-        ],
-        digits=5,
-        heading="Policies",
-    )  # fmt: skip
-
-
 def accuracy_section(results: Results) -> Table | Prose:
     """All accuracy figures."""
     if not results["accuracy"]:
@@ -344,13 +297,3 @@ def accuracy_section(results: Results) -> Table | Prose:
         "interval.",
         heading="Accuracy",
     )
-
-
-def provenance(results: Results) -> list[Section]:
-    """What made the numbers."""
-    settings = io.StringIO()
-    yaml.safe_dump(results["config"], settings, sort_keys=False)
-    return [
-        KeyValues(dict(results["versions"]), heading="Versions"),
-        Code(settings.getvalue(), summary="The resolved configuration", heading="Configuration"),
-    ]

@@ -1,0 +1,78 @@
+"""The policies of a trial in words, tables and files: what the reports of gap studies share."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from studies.reporting import Code, KeyValues, Section, Table
+
+Results = Mapping[str, Any]
+
+POLICY_WORDS = {
+    "idealised": "idealised policy",
+    "difference": "difference model, update {iteration}",
+    "control": "no difference model, update {iteration}",
+    "true": "trained on the true system",
+    "cold": "cold start",
+    "warm": "warm start",
+}
+
+
+def policy_name(record: Mapping[str, Any]) -> str:
+    """A policy in words."""
+    return POLICY_WORDS[record["name"]].format(**record)
+
+
+def record_key(record: Mapping[str, Any]) -> str:
+    """Name of a policy's files."""
+    name = record["name"]
+    return f"{name}-{record['iteration']}" if name in ("difference", "control") else name
+
+
+def load_rollout(path: Path) -> dict[str, np.ndarray]:
+    """States (T + 1, n_s), actions (T, n_a) and rewards (T,) of an episode."""
+    with np.load(path, allow_pickle=False) as data:
+        return dict(data)
+
+
+def last_difference(results: Results) -> Mapping[str, Any] | None:
+    """The policy after the last update, if there was one."""
+    learnt = [record for record in results["policies"] if record["name"] == "difference"]
+    return learnt[-1] if learnt else None
+
+
+def policies_section(results: Results) -> Table:
+    """All policies."""
+    return Table(
+        ["policy", "true samples", "simulated steps", "return on its model", "return on the truth",
+         "seconds"],
+        [
+            [
+                policy_name(record),
+                record["true_samples"],
+                record["simulated_steps"],
+                round(record["return_model"], 1),
+                round(record["return_true"], 1),
+                round(record["seconds"], 1),
+            ]
+            for record in results["policies"]
+        ],
+        digits=5,
+        heading="Policies",
+    )  # fmt: skip
+
+
+def provenance(results: Results) -> list[Section]:
+    """What made the numbers."""
+    settings = io.StringIO()
+    yaml.safe_dump(results["config"], settings, sort_keys=False)
+    return [
+        KeyValues(dict(results["versions"]), heading="Versions"),
+        Code(settings.getvalue(), summary="The resolved configuration", heading="Configuration"),
+    ]
