@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from residual.dropout_net import DropoutNet
     from residual.gaussian_process import GaussianProcess
     from residual.linear import Linear
+    from residual.named_effects import NamedEffects
     from residual.persistence import load, save
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "DropoutNet",
     "GaussianProcess",
     "Linear",
+    "NamedEffects",
     "accuracy_along",
     "load",
     "save",
@@ -38,6 +40,7 @@ _HOMES = {
     "DropoutNet": "dropout_net",
     "GaussianProcess": "gaussian_process",
     "Linear": "linear",
+    "NamedEffects": "named_effects",
     "Accuracy": "accuracy",
     "accuracy_along": "accuracy",
     "load": "persistence",

@@ -21,6 +21,7 @@ from safetensors.numpy import save as to_bytes
 
 from residual.difference import DifferenceModel
 from residual.estimator import Estimator
+from residual.named_effects import NamedEffects
 from sims.simulator import Channel, Simulator
 
 VERSION = 1
@@ -28,6 +29,7 @@ _CLASSES = {
     "DropoutNet": "residual.dropout_net",
     "GaussianProcess": "residual.gaussian_process",
     "Linear": "residual.linear",
+    "NamedEffects": "residual.named_effects",
 }
 _KEY = "simgap"
 
@@ -38,8 +40,8 @@ def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
     The file appears complete or not at all.
 
     Args:
-        model: A ``DropoutNet``, ``GaussianProcess`` or ``Linear``, or a ``DifferenceModel`` of
-            one.
+        model: A ``DropoutNet``, ``GaussianProcess``, ``Linear`` or ``NamedEffects``, or a
+            ``DifferenceModel`` of one. The simulator of ``NamedEffects`` is not written.
         path: The file; by convention it ends in ``.safetensors``.
 
     Raises:
@@ -67,8 +69,12 @@ def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
         )
     header["class"] = name
     header["params"] = {
-        key: _plain(f"{name}.{key}", value) for key, value in estimator.get_params().items()
+        key: _plain(f"{name}.{key}", value)
+        for key, value in estimator.get_params(deep=False).items()
+        if key != "simulator"
     }
+    if isinstance(estimator, NamedEffects):
+        header["values"] = estimator.state_values()
     names = getattr(estimator, "feature_names_in_", None)
     header["feature_names"] = None if names is None else [str(name) for name in names]
     arrays = {key: np.array(value, order="C") for key, value in estimator.state_arrays().items()}
@@ -82,7 +88,8 @@ def load(path: str | Path, simulator: Simulator | None = None) -> Any:
     Args:
         path: The file.
         simulator: For a difference model, the simulator to fit on again and to check against;
-            without it the model predicts but cannot be fitted.
+            without it the model predicts but cannot be fitted. ``NamedEffects`` need it to
+            predict.
 
     Returns:
         The fitted ``DifferenceModel`` or estimator.
@@ -97,7 +104,7 @@ def load(path: str | Path, simulator: Simulator | None = None) -> Any:
         raise FileNotFoundError(f"there is no file {path}")
     try:
         header, arrays = _read(path)
-        model = _restore(header, arrays)
+        model = _restore(header, arrays, simulator)
     except _Unusable as error:
         raise ValueError(f"{path}: {error}") from None
     except (SafetensorError, OSError, ArithmeticError, AttributeError, LookupError, TypeError,
@@ -133,7 +140,9 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray]]:
     return header, arrays
 
 
-def _restore(header: dict[str, Any], arrays: dict[str, NDArray]) -> DifferenceModel | Estimator:
+def _restore(
+    header: dict[str, Any], arrays: dict[str, NDArray], simulator: Simulator | None
+) -> DifferenceModel | Estimator:
     name = header["class"]
     if name not in _CLASSES:
         raise _Unusable(f"holds a {name!r}; only {', '.join(_CLASSES)} can be loaded")
@@ -142,6 +151,10 @@ def _restore(header: dict[str, Any], arrays: dict[str, NDArray]) -> DifferenceMo
     params = {key: _tuples(value) for key, value in header["params"].items()}
     kind: type[Estimator] = getattr(importlib.import_module(_CLASSES[name]), name)
     estimator = kind.from_state(params, arrays)
+    if isinstance(estimator, NamedEffects):
+        if simulator is None:
+            raise _Unusable("holds NamedEffects, which step the simulator: load(path, simulator)")
+        estimator.restore(header["values"], simulator)
     names = header["feature_names"]
     # Arrays that do not fit together show here, not in the middle of a study.
     mean, std = estimator.predict(np.zeros((1, estimator.n_features_in_)), return_std=True)

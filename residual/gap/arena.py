@@ -36,6 +36,8 @@ class Settings:
         first_turns, more_turns: The same of all rivals, and of the close ones.
         runs: Training runs that the tournament sees; the final fit sees all.
         close: Rivals refitted on all training runs.
+        finest: Smallest noise that is believed, as a share of each state's typical variation:
+            below it integrators differ, not physics.
     """
 
     singles: int = 5
@@ -49,6 +51,7 @@ class Settings:
     more_turns: int = 5
     runs: int = 6
     close: int = 4
+    finest: float = 1e-5
 
 
 class Arena:

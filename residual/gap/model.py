@@ -11,6 +11,7 @@ from residual.gap.candidates import Candidate
 from residual.gap.samples import Samples
 from residual.gap.workers import integrate
 from sims.effects.backlash import Backlash
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -29,6 +30,7 @@ class Model:
         physical: Number of physical state channels, the first columns of a state.
         width: Number of state columns: physical, then the play of each backlash.
         free: Columns whose start value is free in every window.
+        batched: Whether the simulator advances all rows at once, each with its own numbers.
     """
 
     def __init__(self, simulator: HostSimulator, chosen: Sequence[Candidate] = ()) -> None:
@@ -43,6 +45,7 @@ class Model:
         self.physical = len(simulator.physical_channels)
         self.width = len(simulator.integrated_channels) + plays
         self.free = list(range(self.physical))
+        self.batched = isinstance(simulator, EquationOfMotion | FirstOrderSystem)
         enters = [c.effect.enters for c in self.chosen]
         self._actuator = np.array(
             [enters[i] == "actuator" and not isinstance(self.chosen[i].effect, Backlash)
@@ -152,6 +155,10 @@ class Model:
         durations = samples.durations
         if rows is not None:
             driven, durations = driven[:, rows], durations[rows]
+        if not self.batched:
+            return np.stack(
+                [self._rowwise(*v, durations) for v in zip(states, driven, theta, strict=True)]
+            )
         host = self.bind(theta, each=n)
         own = len(host.integrated_channels)
         after = np.array(states.reshape(variants * n, width))
@@ -162,6 +169,14 @@ class Model:
             np.tile(durations, variants),
         )
         return after.reshape(variants, n, width)
+
+    def _rowwise(self, states: Array, driven: Array, theta: Array, durations: Array) -> Array:
+        """One interval with the same numbers in all rows, which spares a bind for each row."""
+        host = self.bind(theta)
+        own = len(host.integrated_channels)
+        after = np.array(states)
+        after[:, :own] = integrate(host, after[:, :own], driven, durations)
+        return after
 
     def sense(self, states: Array, theta: Array) -> Array:
         """What the sensors show of states (V, n, n_s) under unknowns (V, p)."""

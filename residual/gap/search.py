@@ -56,15 +56,16 @@ class Found:
 
 
 def survey(
-    model: Model, samples: Samples, theta: Array, nodes: Array | None, sigma: Array | None
+    model: Model, samples: Samples, theta: Array, sigma: Array | None, finest: float
 ) -> tuple[noise.Floor, Array]:
     """Noise and smooth path around a model, and the typical variation of the states."""
-    if nodes is None:
-        nodes = noise.first_path(model, samples, theta)
+    nodes = noise.first_path(model, samples, theta)
     if sigma is None:
         sigma = noise.local_noise(samples)
     scale = noise.variation(samples, nodes)
-    return noise.estimate(model, samples, nodes, theta, sigma, scale), scale
+    floor = noise.estimate(model, samples, nodes, theta, sigma, scale)
+    least = finest * scale[samples.measured]
+    return dataclasses.replace(floor, sigma=np.maximum(floor.sigma, least)), scale
 
 
 def search(
@@ -89,7 +90,7 @@ def search(
     """
     some = sorted(rng.permutation(len(samples.runs))[: settings.runs].tolist())
     part, rows = samples.pick(some)
-    nominal_floor, scale = survey(Model(simulator), samples, np.zeros(0), None, None)
+    nominal_floor, scale = survey(Model(simulator), samples, np.zeros(0), None, settings.finest)
     physical = len(simulator.physical_channels)
     scale = scale[:physical]
     floor, theta = nominal_floor, np.zeros(0)
@@ -111,7 +112,7 @@ def search(
         theta = trial.tried[key].theta
         if key:
             model = Model(simulator, [candidates[i] for i in key])
-            floor, _ = survey(model, samples, theta, None, floor.sigma)
+            floor, _ = survey(model, samples, theta, floor.sigma, settings.finest)
         full = arena(samples, np.arange(len(samples)))
         sets = {key: [theta]} if key else {}
         sets.update({rival: [trial.tried[rival].theta] for rival in rivals(trial, key)})

@@ -217,9 +217,9 @@ def backward(arena: Arena, best: Key) -> Key:
         arena.polish(best)
         smaller = {}
         for drop in best:
+            # Also if tried before: from another start it may have ended in a worse place.
             key, theta = arena.merged(best, [], drop=(drop,))
-            if key not in arena.tried:
-                smaller[key] = [theta]
+            smaller[key] = [theta]
         arena.refit(arena.tried[best], smaller, most=True)
         options = [tuple(i for i in best if i != drop) for drop in best]
         least = min(options, key=arena.score)

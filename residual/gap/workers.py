@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import contextvars
 import itertools
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -19,6 +20,9 @@ _POOL: contextvars.ContextVar[Parallel | None] = contextvars.ContextVar("pool", 
 
 #: Fewer rows than this are not worth sending.
 WORTH = 300
+
+#: Where a state is put that ran away.
+AWAY = 1e6
 
 
 @contextlib.contextmanager
@@ -51,6 +55,27 @@ def integrate(host: HostSimulator, states: Array, inputs: Array, durations: Arra
 
 def _rows(host: HostSimulator, states: Array, inputs: Array, durations: Array) -> Array:
     # A trial that runs away is a number like any other here: it loses.
-    with np.errstate(all="ignore"):
-        after = host.integrate(states, inputs, durations)
-    return np.nan_to_num(after, nan=1e6, posinf=1e6, neginf=-1e6)
+    try:
+        with np.errstate(all="ignore"):
+            after = host.integrate(states, inputs, durations)
+    except ArithmeticError:
+        after = _survivors(host, states, inputs, durations)
+    except ValueError as error:
+        # What the math module says of the sine of infinity, before and from Python 3.14.
+        if not re.search("math domain|finite", str(error)):
+            raise
+        after = _survivors(host, states, inputs, durations)
+    return np.nan_to_num(after, nan=AWAY, posinf=AWAY, neginf=-AWAY)
+
+
+def _survivors(host: HostSimulator, states: Array, inputs: Array, durations: Array) -> Array:
+    """Rows of a simulator that raises where a row overflows; such a row is put far away."""
+    if len(states) == 1:
+        return np.full_like(states, AWAY)
+    half = len(states) // 2
+    return np.concatenate(
+        [
+            _rows(host.take(part), states[part], inputs[part], durations[part])
+            for part in (np.s_[:half], np.s_[half:])
+        ]
+    )

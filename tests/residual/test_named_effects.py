@@ -1,0 +1,130 @@
+"""Effects found in exact rows: named, measured, predicted, saved."""
+
+import numpy as np
+import pytest
+
+from residual import DifferenceModel, NamedEffects, load, save
+from residual.named_effects import SHORTEST
+from residual.trajectories import Transitions
+from sims.effects import CoulombFriction, Delay
+from sims.pendulum import Pendulum
+from sims.pendulum_equation import PendulumEquation
+
+
+def rows(true, count=40, seed=0, noise=0.0):
+    """Consecutive transitions from rest under random levels of voltage."""
+    rng = np.random.default_rng(seed)
+    volts = np.repeat(rng.uniform(-3, 3, (count // 4 + 1, 1)), 4, axis=0)[:count]
+    path = true.augment(np.array([[np.pi, 0.0]]))[0]
+    path = true.rollout(path, volts)[:, :2]
+    path = path + noise * rng.standard_normal(path.shape) * [1, 20]
+    return Transitions(path[:-1], volts, path[1:], np.zeros(count, int))
+
+
+@pytest.fixture(scope="module")
+def model():
+    return DifferenceModel(NamedEffects(), Pendulum()).fit(rows(Pendulum.true()))
+
+
+@pytest.fixture(scope="module")
+def probe():
+    rng = np.random.default_rng(9)
+    return rng.uniform([-4, -12], [4, 12], (20, 2)), rng.uniform(-3, 3, (20, 1))
+
+
+def test_forty_exact_rows_name_the_mass_and_predict_everywhere(model, probe):
+    estimator = model.fitted()
+    (effect,) = estimator.effects_
+    assert effect.name == "mass"
+    assert effect.change == pytest.approx(0.035, abs=1e-5)
+    assert "mass" in estimator.says_
+    wanted = Pendulum.true().step(*probe) - Pendulum().step(*probe)
+    np.testing.assert_allclose(model.predict(*probe), wanted, atol=1e-4)
+
+
+def test_spread_is_small_where_the_name_is_certain(model, probe):
+    mean, std = model.predict(*probe, return_std=True)
+    assert (std > 0).all()
+    assert (std < 0.01 * np.abs(mean).max(axis=0)).all()
+
+
+def test_a_row_has_the_same_bits_alone_and_in_a_batch(model, probe):
+    states, actions = probe
+    batch = model.predict(states, actions, return_std=True)
+    alone = [model.predict(states[i : i + 1], actions[i : i + 1], return_std=True) for i in (0, 7)]
+    for which in (0, 1):
+        assert np.array_equal(batch[which][[0, 7]], np.vstack([one[which] for one in alone]))
+
+
+def test_saved_and_loaded_without_code(model, probe, tmp_path):
+    save(model, tmp_path / "model.safetensors")
+    with pytest.raises(ValueError, match=r"load\(path, simulator\)"):
+        load(tmp_path / "model.safetensors")
+    back = load(tmp_path / "model.safetensors", Pendulum())
+    assert back.fitted().effects_ == model.fitted().effects_
+    assert back.fitted().says_ == model.fitted().says_
+    for ours, theirs in zip(
+        back.predict(*probe, return_std=True), model.predict(*probe, return_std=True), strict=True
+    ):
+        assert np.array_equal(ours, theirs)
+    with pytest.raises(ValueError, match="damaged"):
+        load(tmp_path / "model.safetensors", PendulumWithoutMass())
+
+
+class PendulumWithoutMass(Pendulum):
+    """The same channels, but no parameter to change."""
+
+    def __init__(self):
+        super().__init__()
+        self.parameters = {}
+
+
+def test_two_effects_from_forty_rows():
+    true = PendulumEquation.true().with_effects([CoulombFriction("pivot", 5e-4)])
+    found = DifferenceModel(NamedEffects(), PendulumEquation()).fit(rows(true, seed=7)).fitted()
+    assert {e.name for e in found.effects_} == {"mass", "coulomb_friction"}
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_nothing_is_predicted_where_nothing_is_missing(noise, probe):
+    simulator = PendulumEquation()
+    model = DifferenceModel(NamedEffects(), simulator).fit(rows(simulator, 200, 3, noise))
+    mean, std = model.predict(*probe, return_std=True)
+    assert model.fitted().effects_ == ()
+    assert "no effect found" in model.fitted().says_
+    assert (mean == 0).all()
+    # One row differs by the noise of its own state and of the next.
+    wanted = np.sqrt(2) * noise * np.array([1, 20])
+    assert np.all(np.abs(std - wanted) < 0.8 * wanted + 1e-12)
+
+
+def test_noisy_rows_still_tell_the_mass():
+    model = DifferenceModel(NamedEffects(), PendulumEquation())
+    found = model.fit(rows(PendulumEquation.true(), 200, 4, 0.01)).fitted()
+    (effect,) = found.effects_
+    half = 1.96 * np.sqrt(found.covariance_[0, 0])
+    assert effect.name == "mass"
+    assert abs(effect.change - 0.035) < 2 * half < 0.01
+
+
+def test_what_a_difference_cannot_hold_stays_unexplained():
+    simulator = PendulumEquation()
+    late = simulator.with_effects([Delay("voltage", 0.02)])
+    found = DifferenceModel(NamedEffects(), simulator).fit(rows(late, 100, 5)).fitted()
+    assert "unexplained" in found.says_ or not found.effects_
+    assert (found.residual_ > 0).all()
+
+
+def test_shuffled_rows_get_one_clear_error():
+    data = rows(PendulumEquation.true())
+    order = np.random.default_rng(0).permutation(len(data))
+    mixed = Transitions(
+        data.states[order], data.actions[order], data.next_states[order], data.episodes
+    )
+    with pytest.raises(ValueError, match=f"at least {SHORTEST} rows that follow each other"):
+        DifferenceModel(NamedEffects(), PendulumEquation()).fit(mixed)
+
+
+def test_it_says_so_without_a_simulator():
+    with pytest.raises(ValueError, match="has no simulator"):
+        NamedEffects().fit(np.zeros((20, 3)), np.zeros((20, 2)))
