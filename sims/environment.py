@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import gymnasium
 import numpy as np
 
 from sims.render import Renderer, renderer_for
-from sims.simulator import Array, Simulator
+from sims.simulator import Array, Channel, Simulator
 from sims.tasks import Task
 
 # A state can leave any bound that is written down for it, and Gymnasium insists on a box.
@@ -19,21 +20,31 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """A Gymnasium environment around a simulator and a task.
 
     Observation: for every state channel in order, an angle as its cosine and sine, anything
-    else divided by the channel's scale; memory channels are hidden. Action: in the units of
-    the action channels. ``info["state"]`` holds the simulator's state, shape (n_s,).
+    else divided by the channel's scale; memory channels and those that the motion does not
+    depend on are hidden. Action: in the units of the action channels. ``info["state"]`` holds
+    the simulator's state, shape (n_s,).
 
     Args:
         simulator: Nominal, true or corrected.
         task: Reward, termination and start states.
         render_mode: ``"rgb_array"`` or None.
+        observed: Names of the state channels that the policy sees, in the simulator's order;
+            by default all that are not hidden.
 
     Raises:
-        ValueError: The simulator cannot be rendered but ``render_mode`` is given.
+        ValueError: The simulator cannot be rendered but ``render_mode`` is given, or it lacks
+            an observed channel.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
 
-    def __init__(self, simulator: Simulator, task: Task, render_mode: str | None = None) -> None:
+    def __init__(
+        self,
+        simulator: Simulator,
+        task: Task,
+        render_mode: str | None = None,
+        observed: Collection[str] | None = None,
+    ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode {render_mode!r} is not supported; use 'rgb_array'")
         self.simulator = simulator
@@ -45,11 +56,11 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         high = np.array([channel.high for channel in simulator.action_channels])
         self._bounds = low, high
         self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
+        self._observed = observed
         bounds = np.concatenate(
             [
                 np.ones(2) if channel.angle else [_UNBOUNDED]
-                for channel in simulator.state_channels
-                if channel.kind != "memory"
+                for channel in observed_channels(simulator, observed)
             ]
         )
         self.observation_space = gymnasium.spaces.Box(-bounds, bounds, dtype=np.float64)
@@ -88,14 +99,29 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._renderer.frame(self._state) if self._renderer else None
 
     def _observe(self) -> np.ndarray:
-        return observe(self.simulator, self._state[None])[0]
+        return observe(self.simulator, self._state[None], self._observed)[0]
 
 
-def observe(simulator: Simulator, states: Array) -> Array:
+def observed_channels(
+    simulator: Simulator, observed: Collection[str] | None = None
+) -> tuple[Channel, ...]:
+    """The state channels that a policy sees, see ``SimulatorEnv``."""
+    channels = simulator.state_channels
+    if observed is None:
+        return tuple(c for c in channels if c.kind != "memory" and not c.invariant)
+    names = [channel.name for channel in channels]
+    unknown = ", ".join(name for name in observed if name not in names)
+    if unknown:
+        raise ValueError(f"there is no state channel {unknown} to observe; {', '.join(names)}")
+    return tuple(channel for channel in channels if channel.name in observed)
+
+
+def observe(simulator: Simulator, states: Array, observed: Collection[str] | None = None) -> Array:
     """What the policy sees of each state: shape (n, n_s) in, (n, n_observed) out."""
+    seen = observed_channels(simulator, observed)
     columns = []
     for channel, column in zip(simulator.state_channels, states.T, strict=True):
-        if channel.kind == "memory":
+        if channel not in seen:
             continue
         if channel.angle:
             columns += [np.cos(column), np.sin(column)]

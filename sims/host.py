@@ -37,6 +37,7 @@ class Joint:
             "force" is a rate of change.
         unit: Unit of the force, ``"N m"`` or ``"N"``.
         scale: A typical force, or None to leave it to the simulator.
+        driven: False if no actuator acts on it, so that it cannot have backlash.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Joint:
     rate: str | None
     unit: str
     scale: float | None = None
+    driven: bool = True
 
 
 class HostSimulator(Simulator):

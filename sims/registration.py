@@ -6,6 +6,7 @@ is made.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 from gymnasium.envs.registration import register as register_environment
@@ -32,9 +33,47 @@ def true_pendulum(render_mode: str | None = None, **task: Any) -> SimulatorEnv:
     return SimulatorEnv(Pendulum.true(), SwingUp(**task), render_mode)
 
 
+def idealised_leo(
+    render_mode: str | None = None,
+    observed: Collection[str] | None = None,
+    stops: bool = False,
+    **task: Any,
+) -> SimulatorEnv:
+    """The idealised Leo with its walking task.
+
+    Args:
+        render_mode: As for every environment of Gymnasium.
+        observed: See ``SimulatorEnv``; ``sims.walking.AUTHORS_OBSERVATION`` is the authors'.
+        stops: Whether the joints have mechanical stops.
+        task: Goes to ``sims.walking.Walking``.
+    """
+    from sims.environment import SimulatorEnv
+    from sims.leo import Leo
+    from sims.walking import Walking
+
+    return SimulatorEnv(Leo(stops=stops), Walking(**task), render_mode, observed)
+
+
+def true_leo(
+    render_mode: str | None = None,
+    observed: Collection[str] | None = None,
+    stops: bool = False,
+    **task: Any,
+) -> SimulatorEnv:
+    """The true Leo (heavier torso, joints with friction); arguments as for ``idealised_leo``."""
+    from sims.environment import SimulatorEnv
+    from sims.leo import Leo
+    from sims.walking import Walking
+
+    return SimulatorEnv(Leo.true(stops=stops), Walking(**task), render_mode, observed)
+
+
 def register() -> None:
-    """Make ``simgap/PendulumIdealised-v0`` and ``simgap/PendulumTrue-v0`` known."""
-    register_environment(
-        "simgap/PendulumIdealised-v0", entry_point="sims.registration:idealised_pendulum"
-    )
-    register_environment("simgap/PendulumTrue-v0", entry_point="sims.registration:true_pendulum")
+    """Make ``simgap/PendulumIdealised-v0``, ``simgap/LeoTrue-v0`` and the like known."""
+    for name, maker in (
+        ("PendulumIdealised", "idealised_pendulum"),
+        ("PendulumTrue", "true_pendulum"),
+        ("LeoIdealised", "idealised_leo"),
+        ("LeoTrue", "true_leo"),
+    ):
+        register_environment(f"simgap/{name}-v0", entry_point=f"sims.registration:{maker}")

@@ -29,6 +29,8 @@ class Channel:
         scale: A typical magnitude in ``unit``; networks and kernels see the channel
             divided by it (an angle is seen as cosine and sine instead).
         low, high: Bounds; only inputs are clipped to them.
+        invariant: True if the motion is the same wherever the channel is (how far a walker
+            has come): policies and difference models need not see it.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Channel:
     scale: float = 1.0
     low: float = -math.inf
     high: float = math.inf
+    invariant: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
