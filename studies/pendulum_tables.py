@@ -14,12 +14,12 @@ from matplotlib.figure import Figure as Drawing
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
-from studies.files import atomic_write_json, atomic_write_text
-from studies.pendulum_report import POLICY_WORDS, TARGET
+from studies.pendulum_report import TARGET
+from studies.policy_records import POLICY_WORDS
 from studies.reporting import Code, Figure, KeyValues, Prose, Report, Section, Table, Verdict
 from studies.reporting.figures import PALETTE, new_figure, save_figure, styled
 from studies.statistics import Mean, mean
-from studies.trials import tidy
+from studies.study_tables import write_tables
 from studies.value_iteration import episode_return, value_iteration
 
 # Tables II and section V-A of the paper.
@@ -32,7 +32,7 @@ PAPER_FIXED_RETURN = {"cold": "82164 ± 7498", "warm": "23383 ± 2357", "differe
 def write_grid_report(
     results: Sequence[Mapping[str, Any]], failures: Mapping[Path, str], folder: Path
 ) -> str:
-    """``results.csv``, ``accuracy.csv``, ``results.json``, figures and ``report.html``.
+    """The tidy tables (``studies.study_tables``), figures and ``report.html``.
 
     Args:
         results: Of every finished trial.
@@ -42,11 +42,7 @@ def write_grid_report(
     Returns:
         The main table as text.
     """
-    rows = pd.DataFrame(tidy(results))
-    errors = accuracy_rows(results)
-    atomic_write_text(folder / "results.csv", rows.to_csv(index=False))
-    atomic_write_text(folder / "accuracy.csv", errors.to_csv(index=False))
-    atomic_write_json(folder / "results.json", {"trials": list(results)})
+    rows, errors = write_tables(results, folder)
     optimum = best_possible(bool(results[0]["config"]["inertia_follows_mass"]))
     summary = summarise(rows, errors)
     sections: list[Section] = [headline(rows, optimum)]
@@ -98,32 +94,6 @@ def best_possible(inertia_follows_mass: bool) -> float:
     policy = value_iteration(model, SwingUp())
     true = Pendulum.true(inertia_follows_mass=inertia_follows_mass)
     return episode_return(policy, true, np.array([np.pi, 0.0]))
-
-
-def accuracy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """One row per trial, update and place where accuracy was measured."""
-    return pd.DataFrame(
-        [
-            {
-                "estimator": trial["label"],
-                "seed": trial["seed"],
-                "samples_per_update": trial["config"]["budget"]["true_samples"],
-                "iteration": record["iteration"],
-                "where": where,
-                "fit_seconds": record["fit_seconds"],
-                "coverage90": record[where]["coverage90"],
-                **{f"one_step_{k}": v for k, v in record[where]["one_step"].items()},
-                **{
-                    f"{horizon.replace(' ', '')}_{k}": v
-                    for horizon, errors in record[where]["multi_step"].items()
-                    for k, v in errors.items()
-                },
-            }
-            for trial in results
-            for record in trial["accuracy"]
-            for where in ("visited", "uniform")
-        ]
-    )
 
 
 def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:

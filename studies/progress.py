@@ -1,15 +1,29 @@
-"""What a study tells its user while it works."""
+"""What a study tells while it works: bars for its user, or nothing."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Protocol
 
 from tqdm import tqdm
 
-Advance = Callable[[int, str], None]
+
+class Advance(Protocol):
+    """Says how far a step is."""
+
+    def __call__(
+        self, done: int, note: str = "", values: Mapping[str, float] | None = None
+    ) -> None:
+        """``done`` units of the step are done.
+
+        Args:
+            done: Units done so far.
+            note: A few words for the user, such as ``"return -660"``.
+            values: Numbers by name to draw as curves over ``done``.
+        """
+        ...
 
 
 class Progress(Protocol):
@@ -31,7 +45,9 @@ class Bars:
             bar_format="{desc} {percentage:3.0f}% |{bar:20}| {elapsed}<{remaining} {postfix}",
         ) as bar:  # fmt: skip
 
-            def advance(done: int, note: str = "") -> None:
+            def advance(
+                done: int, note: str = "", values: Mapping[str, float] | None = None
+            ) -> None:
                 bar.set_postfix_str(note, refresh=False)
                 bar.update(done - bar.n)
 
@@ -39,13 +55,34 @@ class Bars:
 
 
 class Silent:
-    """No output, for workers and tests."""
+    """No output, for tests."""
 
     @contextmanager
     def task(self, title: str, total: int) -> Iterator[Advance]:
         """Nothing is shown."""
 
-        def ignore(done: int, note: str = "") -> None:
+        def ignore(done: int, note: str = "", values: Mapping[str, float] | None = None) -> None:
             pass
 
         yield ignore
+
+
+class Several:
+    """Passes on to several others."""
+
+    def __init__(self, *others: Progress) -> None:
+        self.others = others
+
+    @contextmanager
+    def task(self, title: str, total: int) -> Iterator[Advance]:
+        """A task of each."""
+        with ExitStack() as stack:
+            all_of_them = [stack.enter_context(each.task(title, total)) for each in self.others]
+
+            def advance(
+                done: int, note: str = "", values: Mapping[str, float] | None = None
+            ) -> None:
+                for each in all_of_them:
+                    each(done, note, values)
+
+            yield advance

@@ -2,24 +2,47 @@
 
 A trial's folder is named by what it computes and a hash of its configuration. Finished trials
 are read, not run again; a failed one leaves its traceback and is reported, never averaged.
+``study.json`` beside the folders names those that the last command asked for.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import hashlib
 import json
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from joblib import Parallel, delayed
-
+from studies.curves import Curves
 from studies.files import atomic_write_json, atomic_write_text, read_json
-from studies.progress import Progress
+from studies.progress import Progress, Several
+from studies.watching import StatusFile, TrialsView
+from studies.workers import Backend, Config, workers
 
-Config = Mapping[str, Any]
-Work = Callable[[Config, Path], dict[str, Any]]
+Work = Callable[[Config, Path, Progress], dict[str, Any]]
+Failures = dict[Path, str]
+PLAN = "study.json"
+
+
+@dataclasses.dataclass(frozen=True)
+class Execution:
+    """How trials are run; nothing here changes what they compute.
+
+    Attributes:
+        backend: ``"local"``, ``"dask"`` or ``"ray"``.
+        jobs: Local processes.
+        scheduler: Address of a cluster's scheduler.
+        tensorboard: Folder for training curves.
+    """
+
+    backend: Backend = "local"
+    jobs: int = 1
+    scheduler: str | None = None
+    tensorboard: Path | None = None
 
 
 def trial_folder(root: Path, label: str, config: Config) -> Path:
@@ -29,63 +52,101 @@ def trial_folder(root: Path, label: str, config: Config) -> Path:
 
 
 def run_trials(
-    trials: Mapping[Path, Config], work: Work, jobs: int, progress: Progress
-) -> tuple[list[dict[str, Any]], dict[Path, str]]:
-    """Run what is not finished yet, in ``jobs`` local processes.
+    study: str, trials: Mapping[Path, Config], work: Work, execution: Execution
+) -> tuple[list[dict[str, Any]], Failures]:
+    """Run what is not finished yet.
 
     Args:
-        trials: Configuration by folder.
+        study: Name of the study, for ``study.json``.
+        trials: Configuration by folder, all in one folder.
         work: Computes one trial into its folder and returns its results; importable by name.
-        jobs: Worker processes, each with one thread.
-        progress: Told how many are done.
+        execution: Where to run them.
 
     Returns:
-        The results of all finished trials in the order given, and the tracebacks of those
-        that failed by folder.
+        See ``read_trials``.
+
+    Raises:
+        WorkersError: The cluster cannot be used.
     """
+    # Workers of a cluster may have another working directory.
+    trials = {folder.resolve(): config for folder, config in trials.items()}
     waiting = {folder: config for folder, config in trials.items() if not _finished(folder)}
-    failures: dict[Path, str] = {}
-    with progress.task(f"{len(trials)} trials", len(trials)) as tell:
-        done = len(trials) - len(waiting)
-        tell(done, "")
-        # Ready results come back at once, so that the bar moves and failures are seen early.
-        finished = Parallel(n_jobs=jobs, return_as="generator_unordered")(
-            delayed(_attempt)(work, config, folder) for folder, config in waiting.items()
-        )
-        for folder, failure in finished:
-            if failure:
-                failures[folder] = failure
-            done += 1
-            tell(done, f"{len(failures)} failed" if failures else "")
-    results = [read_json(folder / "results.json") for folder in trials if _finished(folder)]
+    root = next(iter(trials)).parent
+    attempt = functools.partial(attempt_trial, work, execution.tensorboard)
+    with workers(execution.backend, execution.jobs, execution.scheduler) as run:
+        plan = {"study": study, "trials": {path.name: config for path, config in trials.items()}}
+        atomic_write_json(root / PLAN, plan)
+        for folder in waiting:
+            for left in ("status.json", "error.txt"):
+                (folder / left).unlink(missing_ok=True)
+        with TrialsView(waiting, len(trials)) as view:
+            for folder, failure in run(attempt, spread_seeds(waiting)):
+                if failure and not _finished(folder):
+                    atomic_write_text(folder / "error.txt", failure)
+                view.ended(folder, bool(failure))
+    return read_trials(root)
+
+
+def read_trials(root: Path) -> tuple[list[dict[str, Any]], Failures]:
+    """What the trials of a study left, without running anything.
+
+    Args:
+        root: The study's folder. ``study.json`` there names the trials that count; of a folder
+            that was written before there was one, ``results.json`` holds them.
+
+    Returns:
+        The results of all finished trials in the order of the plan, and the tracebacks of
+        those that failed by folder.
+
+    Raises:
+        FileNotFoundError: Neither file is there.
+    """
+    if not (root / PLAN).exists():
+        return read_json(root / "results.json")["trials"], {}
+    folders = [root / name for name in read_json(root / PLAN)["trials"]]
+    results = [read_json(folder / "results.json") for folder in folders if _finished(folder)]
+    failures = {
+        folder: (folder / "error.txt").read_text(encoding="utf-8")
+        for folder in folders
+        if not _finished(folder) and (folder / "error.txt").exists()
+    }
     return results, failures
 
 
-def _attempt(work: Work, config: Config, folder: Path) -> tuple[Path, str | None]:
-    error = folder / "error.txt"
+def attempt_trial(work: Work, tensorboard: Path | None, config: Config, folder: Path) -> str | None:
+    """Compute one trial into its folder: ``results.json``, or ``error.txt`` if it fails.
+
+    Returns:
+        The traceback if it failed.
+    """
+    if _finished(folder):  # clusters repeat what a lost worker had just finished
+        return None
+    status = StatusFile(folder)
+    curves = [Curves(tensorboard / folder.name)] if tensorboard else []
     try:
-        results = work(config, folder)
-    except Exception:
-        atomic_write_text(error, failure := traceback.format_exc())
-        return folder, failure
-    atomic_write_json(folder / "results.json", results)
-    error.unlink(missing_ok=True)
-    return folder, None
+        results = work(config, folder, Several(status, *curves))
+        atomic_write_json(folder / "results.json", results)
+    except (Exception, SystemExit):  # SystemExit would take a cluster's worker with it
+        atomic_write_text(folder / "error.txt", failure := traceback.format_exc())
+        return failure
+    finally:
+        status.remove()
+    (folder / "error.txt").unlink(missing_ok=True)
+    return None
+
+
+def spread_seeds(trials: Mapping[Path, Config]) -> dict[Path, Config]:
+    """The same trials, those of one seed apart from one another.
+
+    Trials of one seed begin with the same stages. Started together, all but one would wait.
+    """
+    seen: Counter[Any] = Counter()
+    turns = {}
+    for folder, config in trials.items():
+        turns[folder] = seen[config.get("seed")]
+        seen[config.get("seed")] += 1
+    return {folder: trials[folder] for folder in sorted(trials, key=turns.__getitem__)}
 
 
 def _finished(folder: Path) -> bool:
     return (folder / "results.json").exists()
-
-
-def tidy(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """One flat row per policy of every trial, for a table or a data frame."""
-    return [
-        {
-            "estimator": trial["label"],
-            "seed": trial["seed"],
-            "samples_per_update": trial["config"]["budget"]["true_samples"],
-            **{name: value for name, value in policy.items() if name != "curve"},
-        }
-        for trial in results
-        for policy in trial["policies"]
-    ]

@@ -101,7 +101,8 @@ def test_saved_policies_and_models_can_be_used(undisturbed):
     found = json.loads((folder / "results.json").read_text())
     agent = DDPG.load(folder / "policies" / "difference-1.safetensors")
     env = gymnasium.make(
-        "simgap/PendulumCorrected-v0", difference=folder / "models" / "difference-1.safetensors"
+        "residual:simgap/PendulumCorrected-v0",
+        difference=folder / "models" / "difference-1.safetensors",
     )
     observation, _ = env.reset(seed=0)
     total, done = 0.0, False

@@ -1,0 +1,66 @@
+"""Rebuild the tables, figures and report of a study from what its trials left on disk.
+
+Nothing is computed again: of a study that is still running, or was killed, the finished trials
+are shown.
+
+  python -m studies.report results/pendulum_gap/budgets
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from studies.command import HelpFormatter, Parser, fail
+from studies.files import read_json
+from studies.trials import PLAN
+
+
+def build_parser() -> Parser:
+    """The command line."""
+    parser = Parser(
+        prog="python -m studies.report", description=__doc__, formatter_class=HelpFormatter
+    )
+    parser.add_argument("folder", type=Path, help="Output folder of a study.")
+    return parser
+
+
+def study_of(folder: Path) -> str:
+    """Name of the study that wrote a folder: ``studies/<name>.py`` can rebuild it.
+
+    ``study.json`` names it, or ``results.json`` by its ``study`` or ``system``; folders that
+    name none are of ``pendulum_gap``.
+
+    Raises:
+        FileNotFoundError: The folder holds no results.
+        ValueError: The name is none of a study.
+    """
+    path = folder / (PLAN if (folder / PLAN).exists() else "results.json")
+    if not path.exists():
+        raise FileNotFoundError(
+            f"{folder}: expected the output folder of a study, with {PLAN} or results.json in it"
+        )
+    found: Any = read_json(path)
+    if isinstance(found.get("trials"), list):
+        found = found["trials"][0]
+    name = str(found.get("study", f"{found.get('system', 'pendulum')}_gap"))
+    # A name from a file is imported: it may only be that of a study.
+    if not re.fullmatch(r"[a-z_]+", name) or not Path(__file__).with_name(f"{name}.py").exists():
+        raise ValueError(f"{path}: there is no study {name!r}")
+    return name
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command."""
+    folder: Path = build_parser().parse_args(arguments).folder
+    try:
+        importlib.import_module(f"studies.{study_of(folder)}").rebuild(folder)
+    except (OSError, ValueError) as error:
+        fail(str(error))
+
+
+if __name__ == "__main__":
+    main()

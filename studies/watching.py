@@ -1,0 +1,134 @@
+"""One live view of many trials, wherever they run.
+
+A running trial keeps a small file, ``status.json``, in its folder; the command that started the
+trials reads these files now and then. Nothing else passes between them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import sys
+import threading
+import time
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from studies.files import atomic_write_json, read_json
+from studies.progress import Advance
+
+STATUS = "status.json"
+EVERY = 2.0  # seconds between two writes of a trial, and at least between two looks at all
+SHOWN = 8  # running trials with a line of their own
+
+
+class StatusFile:
+    """Progress kept in a trial's folder while the trial runs."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / STATUS
+        self._write("starting", 0, 0, "")
+
+    @contextlib.contextmanager
+    def task(self, title: str, total: int) -> Iterator[Advance]:
+        """A step of ``total`` units; written at its start and every two seconds."""
+        self._write(title, 0, total, "")
+
+        def advance(done: int, note: str = "", values: Mapping[str, float] | None = None) -> None:
+            if time.monotonic() - self._written >= EVERY:
+                self._write(title, done, total, note)
+
+        yield advance
+
+    def remove(self) -> None:
+        """The trial has ended."""
+        self.path.unlink(missing_ok=True)
+
+    def _write(self, title: str, done: int, total: int, note: str) -> None:
+        place = {"host": socket.gethostname(), "process": os.getpid()}
+        status = {"step": title, "done": done, "total": total, "note": note}
+        atomic_write_json(self.path, status | place)
+        self._written = time.monotonic()
+
+
+def running(folders: Collection[Path]) -> dict[Path, dict[str, Any]]:
+    """The status of those trials that run."""
+    found = {}
+    for folder in folders:
+        # Not there: it waits or has ended.
+        with contextlib.suppress(OSError, ValueError):
+            found[folder] = read_json(folder / STATUS)
+    return found
+
+
+class TrialsView:
+    """A bar over all trials, and on a terminal a line for each of the first that run.
+
+    Args:
+        folders: Of the trials that are not finished.
+        total: Number of all trials, the finished ones included.
+    """
+
+    def __init__(self, folders: Collection[Path], total: int) -> None:
+        self._waiting = set(folders)
+        self._failed = 0
+        self._bar = tqdm(
+            total=total, initial=total - len(self._waiting), desc=f"{total} trials",
+            file=sys.stderr, mininterval=0.5, smoothing=0, position=0,
+            bar_format="{desc} |{bar:20}| {n} done{postfix}, {elapsed}<{remaining}",
+        )  # fmt: skip
+        self._lines: list[tqdm[Any]] = []
+        self._ended = threading.Event()
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+
+    def __enter__(self) -> TrialsView:
+        self._show()
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._ended.set()
+        self._thread.join()
+        self._show()
+        for line in self._lines:
+            line.close()
+        self._bar.close()
+
+    def ended(self, folder: Path, failed: bool) -> None:
+        """A trial is done, or has failed."""
+        with self._lock:
+            self._waiting.discard(folder)
+            self._failed += failed
+            self._bar.update()
+
+    def _watch(self) -> None:
+        # Looking at ten thousand folders every two seconds would load a network file system.
+        while not self._ended.wait(max(EVERY, len(self._waiting) / 100)):
+            self._show()
+
+    def _show(self) -> None:
+        with self._lock:
+            now = running(self._waiting)
+            self._bar.set_postfix_str(f"{len(now)} running, {self._failed} failed", refresh=True)
+            if sys.stderr.isatty():
+                self._show_lines(now)
+
+    def _show_lines(self, now: Mapping[Path, Mapping[str, Any]]) -> None:
+        shown = list(now.items())[:SHOWN]
+        while len(self._lines) < len(shown):
+            self._lines.append(
+                tqdm(file=sys.stderr, position=len(self._lines) + 1, leave=False,
+                     bar_format="  {desc}")
+            )  # fmt: skip
+        for k, line in enumerate(self._lines):
+            text = ""
+            if k < len(shown):
+                folder, status = shown[k]
+                share = f" {100 * status['done'] // status['total']} %" if status["total"] else ""
+                text = f"{folder.name}: {status['step']}{share} {status['note']}"
+            line.set_description_str(text)
