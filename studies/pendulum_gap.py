@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from sims.pendulum import Pendulum
@@ -28,7 +27,6 @@ from sims.tasks import SwingUp
 from studies.command import Parser
 from studies.gap_study import GapStudy, GapTrial, run_command
 from studies.gap_study import build_parser as parser_of
-from studies.gap_study import rebuild as rebuild_report
 from studies.learning_steps import Problem
 from studies.pendulum_report import policy_table, write_report
 from studies.pendulum_tables import write_grid_report
@@ -78,11 +76,6 @@ def build_parser() -> Parser:
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     run_command(STUDY, arguments)
-
-
-def rebuild(folder: Path) -> None:
-    """The report of a finished folder (``python -m studies.report``)."""
-    rebuild_report(STUDY, folder)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from studies import gap_study
 from studies.command import HelpFormatter, Parser, fail
 from studies.files import read_json
 from studies.trials import PLAN
@@ -57,7 +58,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     folder: Path = build_parser().parse_args(arguments).folder
     try:
-        importlib.import_module(f"studies.{study_of(folder)}").rebuild(folder)
+        module = importlib.import_module(f"studies.{study_of(folder)}")
+        # Other studies than those of a gap have a function of their own.
+        if hasattr(module, "STUDY"):
+            gap_study.rebuild(module.STUDY, folder)
+        else:
+            module.rebuild(folder)
     except (OSError, ValueError) as error:
         fail(str(error))
 

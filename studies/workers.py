@@ -64,10 +64,9 @@ def _in_processes(attempt: Attempt, trials: Mapping[Path, Config], jobs: int) ->
     waiting: dict[Path, Config] = {**trials}
     deaths = 0
     while waiting:
+        calls = [delayed(_named)(attempt, config, folder) for folder, config in waiting.items()]
         # Ready results come back at once, so that the view moves and failures are seen early.
-        ended = Parallel(n_jobs=jobs, return_as="generator_unordered")(
-            delayed(_named)(attempt, config, folder) for folder, config in waiting.items()
-        )
+        ended = Parallel(n_jobs=jobs, return_as="generator_unordered")(calls)
         try:
             for folder, failure in ended:
                 del waiting[folder]
