@@ -115,14 +115,30 @@ def turned(angles: Array, point: Point) -> Array:
 
 def centre_of_mass(positions: Array) -> Array:
     """Centre of mass of the idealised Leo as a whole in m, (n, 9) to (n, 2)."""
+    swing = np.stack([-positions[:, 2], *positions[:, 3:9].T])
+    swing[1:3] += swing[0]
+    swing[3:5] += swing[1:3]
+    swing[5:7] += swing[3:5]
+    sine, cosine = np.sin(swing), np.cos(swing)
+    x, z = _LEVERS[:, :1], _LEVERS[:, 1:]
+    ahead = (cosine * x - sine * z).sum(axis=0)
+    up = (sine * x + cosine * z).sum(axis=0)
+    return positions[:, :2] + np.stack([ahead, up], axis=1)
+
+
+def _levers() -> Array:
+    """How far each link's turning moves the centre of mass, in the link's frame, (7, 2)."""
     torso = torso_with_load(TORSO.mass, TORSO.inertia, ARM.mass, 0.0)
     links = (torso, THIGH, THIGH, SHANK, SHANK, FOOT, FOOT)
-    angles, origins = frames(positions)
-    moments = [
-        link.mass * (origins[:, i] + turned(angles[:, i], link.centre))
-        for i, link in enumerate(links)
-    ]
-    return np.sum(moments, axis=0) / sum(link.mass for link in links)
+    moment = np.array([np.multiply(link.mass, link.centre) for link in links])
+    carried = [link.mass for link in links]
+    for link in range(6, 0, -1):
+        moment[PARENT[link]] += np.multiply(carried[link], PIVOT[link])
+        carried[PARENT[link]] += carried[link]
+    return moment / carried[0]
+
+
+_LEVERS = _levers()
 
 
 def clearance(positions: Array) -> Array:

@@ -32,6 +32,8 @@ from sims.leo_body import (
 )
 
 ITERATIONS = 10
+# The first sub-step starts from no impulses; unsolved rests of it would let a foot creep.
+FIRST_ITERATIONS = 100
 SLOP = 2e-5  # m that a wheel may sink before it is pushed out
 _FAR = 1e3
 _FREE = math.inf
@@ -110,6 +112,7 @@ class Chain:
         self._cp_pushing = [constraint._constraint for constraint in self._pushing]
         self._build: Build | None = None
         self._h = 0.0
+        self._cold = True
 
     def _brakes(self, pairs: list[tuple[pymunk.Body, pymunk.Body]]) -> list[pymunk.Constraint]:
         """Dry friction on x, z, pitch and the six joints: holds, up to a limited force."""
@@ -201,6 +204,7 @@ class Chain:
             lib.cpSpaceStep(self._cp_space, self._h)
         for constraint in self._cp_holding:
             _set_limit(constraint, _FREE)
+        self._cold = True
 
     def run(
         self,
@@ -221,13 +225,28 @@ class Chain:
             steps: Number of sub-steps.
             further: Called in every sub-step before it is solved, to ``push`` and ``brake``.
         """
+        for motor, target in zip(self._cp_motors, targets, strict=True):
+            _set_rate(motor, -target)
+        if self._cold:
+            self._cold = False
+            self._space.iterations = FIRST_ITERATIONS
+            self._substeps(targets, slopes, 1, further)
+            self._space.iterations = ITERATIONS
+            steps -= 1
+        self._substeps(targets, slopes, steps, further)
+
+    def _substeps(
+        self,
+        targets: Sequence[float],
+        slopes: Sequence[float],
+        steps: int,
+        further: Callable[[], None] | None,
+    ) -> None:
         step, space, h = lib.cpSpaceStep, self._cp_space, self._h
         torso, b1, b2, b3, b4, b5, b6 = self._cp_bodies
         m1, m2, m3, m4, m5, m6 = self._cp_motors
         t1, t2, t3, t4, t5, t6 = targets
         s1, s2, s3, s4, s5, s6 = slopes
-        for motor, target in zip(self._cp_motors, targets, strict=True):
-            _set_rate(motor, -target)
         for _ in range(steps):
             w0, w1, w2 = _get_rate(torso), _get_rate(b1), _get_rate(b2)
             w3, w4 = _get_rate(b3), _get_rate(b4)
