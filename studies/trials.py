@@ -20,7 +20,7 @@ from typing import Any
 from studies.curves import Curves
 from studies.files import atomic_write_json, atomic_write_text, read_json
 from studies.progress import Progress, Several
-from studies.watching import StatusFile, TrialsView
+from studies.watching import STATUS, StatusFile, TrialsView
 from studies.workers import Backend, Config, workers
 
 Work = Callable[[Config, Path, Progress], dict[str, Any]]
@@ -77,12 +77,14 @@ def run_trials(
         plan = {"study": study, "trials": {path.name: config for path, config in trials.items()}}
         atomic_write_json(root / PLAN, plan)
         for folder in waiting:
-            for left in ("status.json", "error.txt"):
+            for left in (STATUS, "error.txt"):
                 (folder / left).unlink(missing_ok=True)
         with TrialsView(waiting, len(trials)) as view:
             for folder, failure in run(attempt, spread_seeds(waiting)):
                 if failure and not _finished(folder):
+                    # Its worker could not say so.
                     atomic_write_text(folder / "error.txt", failure)
+                    (folder / STATUS).unlink(missing_ok=True)
                 view.ended(folder, bool(failure))
     return read_trials(root)
 

@@ -9,14 +9,16 @@ again; a trial whose worker has died several times is given up.
 from __future__ import annotations
 
 import contextlib
+import os
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, Literal
 
-from joblib import Parallel, delayed
-from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-from studies.watching import running
+from joblib.externals.loky import ProcessPoolExecutor
+from joblib.externals.loky.process_executor import BrokenProcessPool
 
 Config = Mapping[str, Any]
 # Computes one trial into its folder; returns its traceback if it failed.
@@ -25,7 +27,11 @@ Ended = tuple[Path, str | None]
 Run = Callable[[Attempt, Mapping[Path, Config]], Iterator[Ended]]
 Backend = Literal["local", "dask", "ray"]
 
-DEATHS = 3  # of a process in a row, after which a trial is given up; Dask's default, too
+DEATHS = 3  # of a trial's process, after which the trial is given up; as Dask does by default
+ONE_THREAD = {
+    name: "1"
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
+}
 CONNECT_SECONDS = 20
 
 
@@ -61,30 +67,50 @@ def workers(backend: Backend, jobs: int = 1, scheduler: str | None = None) -> It
 
 
 def _in_processes(attempt: Attempt, trials: Mapping[Path, Config], jobs: int) -> Iterator[Ended]:
-    waiting: dict[Path, Config] = {**trials}
-    deaths = 0
-    while waiting:
-        calls = [delayed(_named)(attempt, config, folder) for folder, config in waiting.items()]
-        # Ready results come back at once, so that the view moves and failures are seen early.
-        ended = Parallel(n_jobs=jobs, return_as="generator_unordered")(calls)
-        try:
-            for folder, failure in ended:
-                del waiting[folder]
-                deaths = 0
-                yield folder, failure
-        except TerminatedWorkerError:
-            # One process died, which ends the others: what they had begun is begun again.
-            deaths += 1
-            begun = running(waiting)
-            if deaths == DEATHS:
-                for folder in list(begun or waiting):
-                    del waiting[folder]
-                    yield folder, f"its process was killed {DEATHS} times (out of memory?)\n"
-                deaths = 0
+    if jobs == 1:
+        for folder, config in trials.items():
+            yield folder, attempt(config, folder)
+        return
+    # One pool for each process: when a process dies it takes no other trial with it.
+    pools: dict[int, ProcessPoolExecutor] = {}
+    stopped = threading.Event()
+
+    def run(config: Config, folder: Path) -> Ended:
+        slot = threading.get_ident()
+        for _ in range(DEATHS):
+            if slot not in pools:
+                pools[slot] = ProcessPoolExecutor(
+                    1, initializer=_end_with, initargs=(os.getpid(),), env=ONE_THREAD
+                )
+            try:
+                return folder, pools[slot].submit(attempt, config, folder).result()
+            except BrokenProcessPool:
+                if stopped.is_set():
+                    break
+                del pools[slot]
+        return folder, f"its process was killed {DEATHS} times (out of memory?)\n"
+
+    threads = ThreadPoolExecutor(jobs)
+    try:
+        ended = [threads.submit(run, config, folder) for folder, config in trials.items()]
+        for future in as_completed(ended):
+            yield future.result()
+    finally:  # also when the user interrupts
+        stopped.set()
+        threads.shutdown(wait=False, cancel_futures=True)
+        for pool in list(pools.values()):
+            pool.shutdown(kill_workers=True)
 
 
-def _named(attempt: Attempt, config: Config, folder: Path) -> Ended:
-    return folder, attempt(config, folder)
+def _end_with(parent: int) -> None:
+    """Let this process end when the one that started it was killed."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @contextlib.contextmanager
@@ -136,13 +162,16 @@ def _ray(scheduler: str) -> Iterator[Run]:
         raise WorkersError(f"no Ray cluster at {scheduler}: {problem}") from None
 
     def run(attempt: Attempt, trials: Mapping[Path, Config]) -> Iterator[Ended]:
-        remote = ray.remote(num_cpus=1, max_retries=DEATHS)(_named)
-        waiting = {remote.remote(attempt, trials[folder], folder): folder for folder in trials}
+        def call(config: Config, folder: Path) -> str | None:
+            return attempt(config, folder)
+
+        remote = ray.remote(num_cpus=1, max_retries=DEATHS)(call)
+        waiting = {remote.remote(config, folder): folder for folder, config in trials.items()}
         while waiting:
             (ready,), _ = ray.wait(list(waiting), num_returns=1)
             folder = waiting.pop(ready)
             try:
-                _, failure = ray.get(ready)
+                failure = ray.get(ready)
             except ray.exceptions.RayError as problem:
                 failure = repr(problem)
             yield folder, failure

@@ -76,7 +76,6 @@ def test_a_failed_trial_is_kept_apart_and_tried_again(tmp_path):
     assert attempts(tmp_path, 1) == 1 and attempts(tmp_path, 2) == 2
 
 
-@pytest.mark.filterwarnings("ignore:A worker stopped:UserWarning")
 def test_a_trial_whose_process_was_killed_is_run_again(tmp_path):
     configs = [{"x": 0}, {"x": 1, "deaths": 1}, {"x": 2}, {"x": 3}]
     results, failures = run(tmp_path, configs, jobs=2)
@@ -85,7 +84,6 @@ def test_a_trial_whose_process_was_killed_is_run_again(tmp_path):
     assert not running([path.parent for path in tmp_path.glob("*/results.json")])
 
 
-@pytest.mark.filterwarnings("ignore:A worker stopped:UserWarning")
 def test_a_trial_that_kills_its_process_again_and_again_is_given_up(tmp_path):
     configs = [{"x": 0}, {"x": 1, "deaths": 99}, {"x": 2}]
     results, failures = run(tmp_path, configs, jobs=2)
