@@ -268,11 +268,11 @@ def angles_and_scales(
 ) -> tuple[tuple[int, ...], tuple[float, ...]]:
     """Angle columns and column scales of raw rows [states, actions].
 
-    A state is scaled by ``Channel.scale``, an action by the larger of its bounds, or by
-    ``Channel.scale`` if it is not bounded.
+    A state is scaled by ``Channel.scale``, one that the motion does not depend on by infinity;
+    an action by the larger of its bounds, or by ``Channel.scale`` if it is not bounded.
     """
     bounds = [max(abs(channel.low), abs(channel.high)) for channel in actions]
-    scales = [channel.scale for channel in states] + [
+    scales = [np.inf if channel.invariant else channel.scale for channel in states] + [
         bound if 0 < bound < np.inf else channel.scale
         for bound, channel in zip(bounds, actions, strict=True)
     ]

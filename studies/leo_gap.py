@@ -1,0 +1,111 @@
+"""Learn to walk on the true Leo, a biped on a boom, from few true samples.
+
+The idealised Leo has a lighter torso and no joint friction (paper, Table I). A policy learnt on
+it walks there and walks worse, or falls, on the true Leo. The study collects true samples with
+it, learns the difference between simulator and robot, trains on, and measures on the true Leo:
+return, distance, motor work per metre, falls, the difference model's accuracy where the policy
+goes, and what as much training without a difference model brings.
+
+  python -m studies.leo_gap
+  python -m studies.leo_gap --estimator residual.GaussianProcess --budget.iterations 1
+  python -m studies.leo_gap --config studies/configs/leo_table.yaml --jobs 2
+
+A killed run continues where it stopped when the same command is given again.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from policy.evaluate import Rollout
+from sims.leo import Leo
+from sims.simulator import Simulator
+from sims.walking import Walking, measure_walk
+from studies.command import Parser
+from studies.difference_learning import Budget
+from studies.gap_study import GapStudy, GapTrial, run_command
+from studies.gap_study import build_parser as parser_of
+from studies.learning_steps import PolicyTests, Problem, visited
+from studies.leo_report import policy_table, write_report
+from studies.leo_tables import write_grid_report
+
+# Learning curves jump by hundreds between tests, so every test is several walks, and the policy
+# kept is the best of them on its own model.
+TESTS = PolicyTests(
+    every=2500, every_true=2500, episodes=3, noisy=2, visited_seconds=4.0, visited_rollouts=5
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class LeoTrial(GapTrial):
+    """One trial: everything that its result depends on.
+
+    Args:
+        simulator: The simulator at hand instead of the idealised Leo: a class path, or a YAML
+            file such as the corrected.yaml of find_gap.
+    """
+
+    budget: Budget = dataclasses.field(
+        default_factory=lambda: Budget(
+            iterations=3,
+            idealised_steps=60_000,
+            difference_steps=15_000,
+            true_steps=60_000,
+            control_steps=15_000,
+        )
+    )
+    simulator: Simulator | None = None
+
+
+def problem(trial: LeoTrial, description: Mapping[str, Any]) -> Problem:
+    """Walking with a heavier torso and friction in the joints."""
+    return Problem(
+        description={**description, "tests": dataclasses.asdict(TESTS)},
+        idealised=trial.simulator or Leo(),
+        true=Leo.true(),
+        task=Walking(start_at="around"),
+        tests=TESTS,
+        measures=walk_measures,
+    )
+
+
+def walk_measures(run: Rollout) -> dict[str, float]:
+    """Distance in m, time in s, whether it fell, and both readings of the work in J/m."""
+    walk = measure_walk(visited(run), run.actions)
+    return {
+        "distance": walk.distance,
+        "seconds": walk.time,
+        "fell": float(walk.fell),
+        "work_per_metre": walk.work_per_metre,
+        "bare_work_per_metre": walk.work_without_gear_per_metre,
+    }
+
+
+STUDY = GapStudy(
+    system="leo",
+    description=__doc__,
+    trial=LeoTrial,
+    problem=problem,
+    table=policy_table,
+    report=write_report,
+    grid_report=write_grid_report,
+)
+
+
+def build_parser() -> Parser:
+    """The command line of this study."""
+    return parser_of(STUDY)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command."""
+    run_command(STUDY, arguments)
+
+
+if __name__ == "__main__":
+    # By its importable name, which worker processes need to find the same classes.
+    from studies import leo_gap
+
+    leo_gap.main()

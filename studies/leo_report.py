@@ -1,0 +1,349 @@
+"""The report of one Leo trial: verdict, films, tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure as Drawing
+
+from sims.leo import Leo
+from studies.policy_records import (
+    Results,
+    last_difference,
+    load_rollout,
+    policies_section,
+    policy_name,
+    provenance,
+    record_key,
+)
+from studies.reporting import (
+    Animation,
+    Figure,
+    Gallery,
+    KeyValues,
+    Prose,
+    Report,
+    Section,
+    Table,
+    Verdict,
+)
+from studies.reporting.figures import draw_lines, new_figure, save_figure, styled
+from studies.reporting.media import encode_gif
+
+CONTROL_PERIOD = 0.03
+FILM_SECONDS = 6.0
+NEAR = 0.9  # the share of the true-model policy's return that counts as closing the gap
+TESTED = ("idealised", "difference", "control", "true")
+GROUPS = {
+    "base": ("x", "z", "pitch"),
+    "joint angles": ("hip", "knee", "ankle"),
+    "base rates": ("x rate", "z rate", "pitch rate"),
+    "joint rates": ("hip rate", "knee rate", "ankle rate"),
+}
+
+
+def group(channel: str) -> str:
+    """The group of a state channel: base or joints, positions or rates."""
+    joint = any(part in channel for part in GROUPS["joint angles"])
+    rate = channel.endswith("rate")
+    return {
+        (False, False): "base",
+        (True, False): "joint angles",
+        (False, True): "base rates",
+        (True, True): "joint rates",
+    }[joint, rate]
+
+
+def grouped(errors: Mapping[str, float]) -> dict[str, float]:
+    """Errors by channel, averaged within each group; a channel without a gap is left out."""
+    table = pd.Series({name: error for name, error in errors.items() if np.isfinite(error)})
+    means = table.groupby([group(name) for name in table.index]).mean()
+    return {name: float(means[name]) for name in GROUPS if name in means}
+
+
+def overall(errors: Mapping[str, float]) -> float | None:
+    """The mean over the groups; None without errors."""
+    return float(np.mean(list(grouped(errors).values()))) if errors else None
+
+
+def averaged(record: Mapping[str, Any]) -> dict[str, float]:
+    """The mean of a policy's tests on the true system, by measure."""
+    return {name: float(value) for name, value in pd.DataFrame(record["tests"]).mean().items()}
+
+
+def policy_table(results: Results) -> str:
+    """The policies as text for the terminal."""
+    rows = []
+    for record in results["policies"]:
+        row = {
+            "policy": policy_name(record),
+            "true samples": record["true_samples"],
+            "return on its model": round(record["return_model"]),
+            "return on the truth": round(record["return_true"]),
+        }
+        if "tests" in record:
+            tests = averaged(record)
+            row |= {
+                "distance m": round(tests["distance"], 1),
+                "falls": f"{sum(test['fell'] for test in record['tests']):.0f} of "
+                f"{len(record['tests'])}",
+            }
+        rows.append(row)
+    lines = [pd.DataFrame(rows).to_string(index=False, na_rep="")]
+    for record in results["accuracy"]:
+        errors = grouped(record["visited"]["one_step"])
+        text = ", ".join(f"{name} {error:.2f}" for name, error in errors.items())
+        lines.append(
+            f"update {record['iteration']}: one-step error where the policy goes, as a share of "
+            f"the gap: {text}; fitted in {record['fit_seconds']:.1f} s"
+        )
+    return "\n".join(lines)
+
+
+def write_report(results: Results, folder: Path) -> Path:
+    """Figures as PNG with their numbers as CSV, and ``report.html``, into ``folder``.
+
+    Args:
+        results: What ``results.json`` holds.
+        folder: The trial's folder, with ``rollouts/``.
+    """
+    titles = {record_key(record): policy_name(record) for record in results["policies"]}
+    rollouts = {
+        key: load_rollout(folder / "rollouts" / f"{key}.npz")
+        for key in titles
+        if (folder / "rollouts" / f"{key}.npz").exists()
+    }
+    learnt = last_difference(results)
+    shown = ["idealised", *([record_key(learnt)] if learnt else []), "true"]
+    shown = [key for key in shown if key in rollouts]
+    figures = folder / "figures"
+    sections: list[Section] = [
+        verdict(results),
+        tiles(results),
+        Gallery(
+            [
+                Animation(
+                    film(rollouts[key]["states"]),
+                    alt=f"Leo on the true system under the policy: {titles[key]}.",
+                    caption=titles[key],
+                )
+                for key in shown
+            ],
+            caption=f"The first {FILM_SECONDS:g} s on the **true** Leo.",
+            heading="Walking",
+        ),
+        Figure(
+            torso_figure({titles[key]: rollouts[key] for key in shown}, figures / "torso.png"),
+            "Distance, height and pitch of the torso over time for each policy.",
+            "On the true Leo, from one start (paper, figures 7 and 9). A line ends where "
+            "the robot falls.",
+            heading="The torso's way",
+        ),
+        Figure(
+            updates_figure(results, figures / "updates.png"),
+            "Return on the true Leo after each update, with and without the difference model.",
+            "Mean of the tests on the true Leo. The control has trained as long, without the "
+            "difference model.",
+            heading="Return by update",
+        ),
+        Figure(
+            curves_figure(results, figures / "curves.png"),
+            "Return on the training model against simulated steps.",
+            "Tests on the model that each policy learns on; the best of them is kept.",
+            heading="Learning curves",
+        ),
+        policies_section(results),
+        walking_section(results),
+        accuracy_section(results),
+        *provenance(results),
+    ]
+    return Report(
+        "Leo: walking across the simulation gap",
+        f"{results['label']}, seed {results['seed']}",
+        sections,
+    ).write(folder / "report.html")
+
+
+def by_name(results: Results, name: str) -> list[Mapping[str, Any]]:
+    """The records of one kind of policy, in order."""
+    return [record for record in results["policies"] if record["name"] == name]
+
+
+def verdict(results: Results) -> Verdict:
+    """Did it work, in one sentence, and was it the difference model's doing?"""
+    idealised = results["policies"][0]["return_true"]
+    learnt, true, control = last_difference(results), by_name(results, "true"), by_name(
+        results, "control"
+    )  # fmt: skip
+    if learnt is None:
+        return Verdict(
+            f"Trained on the simulator alone, the policy returns {idealised:.0f} on the true Leo.",
+            tone="neutral",
+        )
+    after = learnt["return_true"]
+    parts = [f"It took {learnt['true_samples']} true samples, "
+             f"{learnt['true_samples'] * CONTROL_PERIOD / 60:.1f} min."]  # fmt: skip
+    if control:
+        alone = control[-1]["return_true"]
+        parts.append(
+            f"As much training without the difference model ends at {alone:.0f}"
+            + (", so the gain is its doing." if alone < after else ": the gain is not its doing.")
+        )
+    closed = after > idealised and (not control or after > control[-1]["return_true"])
+    if true:
+        best = true[-1]["return_true"]
+        parts.append(f"A policy learnt on the true system returns {best:.0f}.")
+        closed = closed and after >= NEAR * best
+    return Verdict(
+        f"On the true Leo the return went from {idealised:.0f} to {after:.0f}.",
+        " ".join(parts),
+        tone="good" if closed else "warning",
+        label="gap closed" if closed else "gap remains",
+    )
+
+
+def tiles(results: Results) -> KeyValues:
+    """The headline numbers."""
+    items: dict[str, Any] = {}
+    learnt = last_difference(results)
+    for record in (results["policies"][0], learnt):
+        if record:
+            tests = averaged(record)
+            items[f"{policy_name(record)}, distance"] = f"{tests['distance']:.1f} m"
+            items[f"{policy_name(record)}, falls"] = (
+                f"{sum(test['fell'] for test in record['tests']):.0f} of {len(record['tests'])}"
+            )
+    return KeyValues(items, style="tiles")
+
+
+def film(states: np.ndarray) -> bytes:
+    """A walk as a GIF, every second control period shown."""
+    draw = Leo().renderer().frame
+    steps = min(len(states), round(FILM_SECONDS / CONTROL_PERIOD))
+    return encode_gif([draw(state) for state in states[:steps:2]], 2 * CONTROL_PERIOD)
+
+
+@styled()
+def torso_figure(rollouts: Mapping[str, Mapping[str, np.ndarray]], path: Path) -> Drawing:
+    """Distance, height and pitch over time."""
+    figure, axes = new_figure(3, 1, height=6.0, share_x=True)
+    data: dict[str, np.ndarray] = {}
+    for row, label in enumerate(("distance (m)", "height (m)", "pitch (rad)")):
+        series = {}
+        for name, run in rollouts.items():
+            values = run["states"][:, row] - (run["states"][0, row] if row == 0 else 0)
+            series[name] = (np.arange(len(values)) * CONTROL_PERIOD, values)
+            data[f"{name}, {label}"] = values
+        draw_lines(axes[row, 0], series)
+        axes[row, 0].set_ylabel(label)
+    axes[2, 0].set_xlabel("time (s)")
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.4
+    )
+    save_figure(figure, path, data)
+    return figure
+
+
+@styled()
+def updates_figure(results: Results, path: Path) -> Drawing:
+    """Return on the true system per update."""
+    figure, axes = new_figure()
+    start = results["policies"][0]["return_true"]
+    rows = []
+    series = {}
+    for name, label in (("difference", "difference model"), ("control", "no difference model")):
+        if records := by_name(results, name):
+            points = [(0, start)] + [(r["iteration"], r["return_true"]) for r in records]
+            series[label] = tuple(np.array(points, float).T)
+            rows += [{"policy": label, "update": a, "return": b} for a, b in points]
+    draw_lines(axes[0, 0], series)
+    for record in by_name(results, "true"):
+        level = record["return_true"]
+        axes[0, 0].axhline(level, color="#6e7781", linestyle=(0, (4, 3)))
+        axes[0, 0].annotate(
+            "learnt on the true system",
+            (0.99, level),
+            xycoords=("axes fraction", "data"),
+            ha="right",
+            va="bottom",
+            fontsize=9,
+        )
+    axes[0, 0].set(xlabel="update", ylabel="return on the true Leo")
+    axes[0, 0].xaxis.get_major_locator().set_params(integer=True)
+    if series:
+        axes[0, 0].legend()
+    save_figure(figure, path, pd.DataFrame(rows))
+    return figure
+
+
+@styled()
+def curves_figure(results: Results, path: Path) -> Drawing:
+    """Test returns on the training model while learning."""
+    series = {
+        policy_name(record): tuple(np.array(record["curve"], float).T)
+        for record in results["policies"]
+        if record.get("curve") and record["name"] in TESTED
+    }
+    figure, axes = new_figure(height=3.8)
+    draw_lines(axes[0, 0], series)
+    axes[0, 0].set(xlabel="steps of this training", ylabel="return on the model")
+    figure.legend(loc="outside upper left", ncols=2, handlelength=1.4)
+    rows = [
+        {"policy": name, "steps": a, "return": b}
+        for name, (x, y) in series.items()
+        for a, b in zip(x, y, strict=True)
+    ]
+    save_figure(figure, path, pd.DataFrame(rows))
+    return figure
+
+
+def walking_section(results: Results) -> Table:
+    """Distance, work and falls on the true system (the paper's Table III)."""
+    rows = []
+    for record in results["policies"]:
+        if "tests" in record:
+            tests = averaged(record)
+            rows.append([
+                policy_name(record), tests["return"], tests["distance"], tests["work_per_metre"],
+                tests["bare_work_per_metre"], tests["seconds"],
+                sum(int(test["fell"]) for test in record["tests"]),
+            ])  # fmt: skip
+    count = len(results["policies"][0]["tests"])
+    return Table(
+        ["policy", "return", "distance m", "E J/m", "E J/m, bare motor constant", "seconds",
+         "falls"],
+        rows,
+        caption=f"Means over {count} starts on the true Leo. E is the motor work per metre, with "
+        "the motor constant at the joint, and with that of the bare motor as the paper's numbers "
+        "suggest (docs/deviations.md).",
+        heading="How it walks",
+    )  # fmt: skip
+
+
+def accuracy_section(results: Results) -> Table | Prose:
+    """One-step and multi-step error by channel group."""
+    if not results["accuracy"]:
+        return Prose("No difference model was learnt.", heading="Accuracy")
+    rows = []
+    horizons = list(results["accuracy"][0]["visited"]["multi_step"])
+    for record in results["accuracy"]:
+        for where in ("visited", "uniform"):
+            measured = record[where]
+            rows.append([
+                record["iteration"], where,
+                *(grouped(measured["one_step"]).get(name) for name in GROUPS),
+                *(overall(measured["multi_step"].get(horizon, {})) for horizon in horizons),
+                measured["coverage90"],
+                record["fit_seconds"],
+            ])  # fmt: skip
+    return Table(
+        ["update", "states", *GROUPS, *(f"all, {h}" for h in horizons), "90 % coverage", "fit s"],
+        rows,
+        caption="Errors as shares of the gap without the model, along the first seconds of fresh "
+        "rollouts of the policy trained on the model, and from random poses.",
+        heading="Accuracy",
+    )
