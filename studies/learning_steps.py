@@ -221,23 +221,28 @@ class LearningSteps:
                 ended after so many true samples.
         """
         summary = read_json(folder / "summary.json")
+        curve = read_json(folder / "curve.json")
+        if within is not None:
+            curve = [point for point in curve if point["step"] <= within]
+        common = {
+            "name": name,
+            "iteration": 0,
+            "true_samples": within or 0,
+            "curve": [[point["step"], point["deterministic"]] for point in curve],
+        }
         if within is None:
-            return {"name": name, "iteration": 0, "true_samples": 0, **summary}
-        curve = [point for point in read_json(folder / "curve.json") if point["step"] <= within]
+            return common | summary
         best = max(curve, key=lambda point: point["score"])["deterministic"]
         share = within / summary["simulated_steps"]
         # At the full length the policy itself is there, and was tested as all others.
         whole = {k: summary[k] for k in ("return_true", "tests") if k in summary and share == 1}
         return {
-            "name": name,
-            "iteration": 0,
-            "true_samples": within,
+            **common,
             "simulated_steps": 0,
             "return_true": best,
             **whole,
             "return_model": best,
             "seconds": summary["seconds"] * share,
-            "curve": [[point["step"], point["deterministic"]] for point in curve],
         }
 
     def _train(
