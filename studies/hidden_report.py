@@ -1,0 +1,208 @@
+"""Tables and pictures of hidden_effects: one row per cell, and what is taken for what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import yaml
+from matplotlib.figure import Figure as Drawing
+from scipy.stats import beta
+
+from studies.command import versions
+from studies.files import atomic_write_text
+from studies.hidden_strengths import HIDDEN
+from studies.reporting.figures import new_figure, save_figure, styled
+from studies.reporting.report import Report
+from studies.reporting.sections import Code, Figure, Prose, Section, Table
+
+#: Residual over noise on held-out windows at which a gap counts as closed.
+CLOSED = 1.1
+NOTHING, NO_NAME = "nothing hidden", "no name"
+RIVALS = {"one_step": "one-step regression", "pysindy": "pysindy"}
+
+
+def tidy(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """One row for each set of logs and method."""
+    rows = []
+    for result in results:
+        config = result["config"]
+        for method, answer in result["answers"].items():
+            row = {key: config[key] for key in ("block", "size", "excitation", "noise", "runs")}
+            row |= {"hidden": " + ".join(config["hidden"]) or NOTHING, "method": method}
+            row["seed"] = config["seed"]
+            values = {k: v for k, v in answer.items() if k not in ("says", "quality")}
+            for key, value in values.items():
+                row[key] = " ".join(map(str, value)) if isinstance(value, list) else value
+            covered = answer.get("covered", [])
+            row |= {"numbers": len(covered), "numbers_covered": sum(covered)}
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def share(hits: int, count: int) -> str:
+    """A share in per cent with its count and its exact 95 % interval.
+
+    Source: Clopper and Pearson, "The use of confidence or fiducial limits", Biometrika 26 (1934).
+    """
+    if count == 0:
+        return "-"
+    low = beta.ppf(0.025, hits, count - hits + 1) if hits else 0.0
+    high = beta.ppf(0.975, hits + 1, count - hits) if hits < count else 1.0
+    return f"{100 * hits / count:.0f} % ({hits}/{count}; {100 * low:.0f} to {100 * high:.0f})"
+
+
+def _share(column: pd.Series) -> str:
+    known = column.dropna()
+    return share(int(known.astype(bool).sum()), len(known))
+
+
+def cells(data: pd.DataFrame) -> pd.DataFrame:
+    """One row per cell of the grid with find_gap's scores."""
+    ours = data[data["method"] == "find_gap"]
+    keys = ["block", "excitation", "noise", "size", "runs"]
+    rows = [
+        dict(zip(keys, values, strict=True)) | _scores(part) for values, part in ours.groupby(keys)
+    ]
+    return pd.DataFrame(rows)
+
+
+def blocks(data: pd.DataFrame) -> pd.DataFrame:
+    """The same, one row per block and excitation."""
+    ours = data[data["method"] == "find_gap"]
+    keys = ["block", "excitation"]
+    rows = [
+        dict(zip(keys, values, strict=True)) | _scores(part) for values, part in ours.groupby(keys)
+    ]
+    return pd.DataFrame(rows)
+
+
+def _scores(part: pd.DataFrame) -> dict[str, Any]:
+    hits, numbers = int(part["numbers_covered"].sum()), int(part["numbers"].sum())
+    return {
+        "sets": len(part),
+        "first name right": _share(part["first"]),
+        "or its near-twin": _share(part["first_alike"]),
+        "all named": _share(part["all_named"]),
+        "in the named set": _share(part["in_set"]),
+        "intervals cover": share(hits, numbers),
+        f"gap after <= {CLOSED}": _share(part["after"] <= CLOSED),
+        "a name": _share(part["named"].astype(bool)),
+        "a confident wrong name": _share(part["false_sure"] > 0),
+        "unexplained": _share(part["unexplained"]),
+        "s median": round(float(part["seconds"].median()), 1),
+        "s worst": round(float(part["seconds"].max()), 1),
+    }
+
+
+def rivals(data: pd.DataFrame) -> pd.DataFrame:
+    """First names and false names of every method, on the same sets."""
+    rows = []
+    for (block, excitation, noise), part in data.groupby(["block", "excitation", "noise"]):
+        row: dict[str, Any] = {"block": block, "excitation": excitation, "noise": noise}
+        row["sets"] = part["seed"].nunique()
+        for method, title in {"find_gap": "find_gap", **RIVALS}.items():
+            own = part[part["method"] == method]
+            if own.empty:
+                continue
+            row[f"{title}: first right"] = _share(own["first_alike"])
+            row[f"{title}: a false name"] = _share(own["false"] > 0)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def confusion_counts(data: pd.DataFrame) -> pd.DataFrame:
+    """How often a hidden effect (rows) was first called what (columns)."""
+    ours = data[(data["method"] == "find_gap") & ~data["hidden"].str.contains("+", regex=False)]
+    ours = ours[ours["block"].isin(["single", "no gap"])]
+    said = [names.split(" ")[0] if names else NO_NAME for names in ours["named"].fillna("")]
+    table = pd.crosstab(ours["hidden"], np.array(said))
+    order = [*HIDDEN, NOTHING]
+    names = [name for name in order if name in table.index]
+    others = [name for name in table.columns if name not in (*names, NO_NAME)]
+    wanted = [*(n for n in names if n != NOTHING), *others]
+    return table.reindex(index=names, columns=[*wanted, NO_NAME], fill_value=0)
+
+
+@styled()
+def confusion(table: pd.DataFrame) -> Drawing:
+    """The confusion picture: hidden against first named, as shares of each row."""
+    height = 1.6 + 0.26 * len(table)
+    figure, axes = new_figure(width=2.6 + 0.3 * len(table.columns), height=height)
+    axis = axes[0, 0]
+    total = table.sum(axis=1).to_numpy()[:, None]
+    axis.imshow(table.to_numpy() / np.maximum(total, 1), cmap="Blues", vmin=0, vmax=1)
+    for i, row in enumerate(table.to_numpy()):
+        for j, count in enumerate(row):
+            if count:
+                dark = count > 0.5 * total[i, 0]
+                axis.text(j, i, str(count), ha="center", va="center", fontsize=7,
+                          color="white" if dark else "black")  # fmt: skip
+    axis.set_xticks(range(len(table.columns)), table.columns, rotation=60, ha="right", fontsize=7)
+    axis.set_yticks(range(len(table)), table.index, fontsize=7)
+    axis.set(xlabel="named first", ylabel="hidden")
+    axis.grid(visible=False)
+    return figure
+
+
+def summary(results: Sequence[Mapping[str, Any]]) -> str:
+    """A few lines for the terminal."""
+    table = blocks(tidy(results))
+    return table.to_string(index=False) if len(table) else "nothing asked of find_gap"
+
+
+def _table(frame: pd.DataFrame, heading: str, caption: str) -> Table:
+    plain = frame.astype(object).where(frame.notna(), None)
+    return Table(list(frame.columns), plain.values.tolist(), caption=caption, heading=heading)
+
+
+def write_report(
+    results: Sequence[Mapping[str, Any]], output: Path, config: Mapping[str, Any]
+) -> None:
+    """Write sets.csv, cells.csv, rivals.csv, the confusion picture and report.html."""
+    data = tidy(results)
+    output.mkdir(parents=True, exist_ok=True)
+    atomic_write_text(output / "sets.csv", data.to_csv(index=False))
+    sections: list[Section] = [
+        Prose(
+            f"{data['seed'].nunique()} sets of logs. A share is followed by its count and its "
+            "exact 95 % interval. Near-twins are delay and lag, and Coulomb and Stribeck "
+            "friction; effects with the same motion (mass and length, load and bias) count as "
+            "one. The gap after is the residual on held-out windows over the noise.",
+        )
+    ]
+    if (data["method"] == "find_gap").any():
+        table = cells(data)
+        atomic_write_text(output / "cells.csv", table.to_csv(index=False))
+        sections.append(_table(blocks(data), "By kind of set", ""))
+        counts = confusion_counts(data)
+        if counts.size:
+            drawn = confusion(counts)
+            save_figure(drawn, output / "confusion.png", counts.reset_index())
+            sections.append(
+                Figure(
+                    drawn,
+                    "Hidden effects against the name given first; the diagonal is right.",
+                    "Counts of sets; rows of effects hidden alone.",
+                    heading="What is taken for what",
+                )
+            )
+        sections.append(_table(table, "Every cell", ""))
+    compared = rivals(data)
+    atomic_write_text(output / "rivals.csv", compared.to_csv(index=False))
+    sections.append(
+        _table(
+            compared,
+            "Beside other methods",
+            "Near-twins count as right. pysindy differentiates over 50 ms, across the jumps of a "
+            "held input, which it was not made for.",
+        )
+    )
+    sections.append(Code(yaml.safe_dump(dict(config), sort_keys=False), summary="settings"))
+    found = ", ".join(f"{name} {version}" for name, version in versions().items())
+    Report("Hidden effects", "What find_gap names, known what was hidden.", sections, found).write(
+        output / "report.html"
+    )

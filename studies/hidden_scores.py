@@ -1,0 +1,115 @@
+"""How good an answer is, known what was hidden."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from residual.gap import GapResult
+from residual.gap.verdicts import FAMILIES
+from sims.effects.library import exact_aliases
+from sims.pendulum_equation import PendulumEquation
+from studies.hidden_strengths import HIDDEN
+
+#: Declared near-twins: forms of one effect that most data hardly tell apart.
+TWINS: tuple[frozenset[str], ...] = (FAMILIES["delay or lag"], FAMILIES["dry friction"])
+
+
+def same_motion() -> dict[str, frozenset[str]]:
+    """For every effect the names that no data could tell from it, its own included."""
+    found: dict[str, frozenset[str]] = {}
+    for alias in exact_aliases(PendulumEquation()):
+        if "combination" not in alias.says:
+            names = frozenset(label.split("@")[0] for label in alias.effects)
+            found.update(dict.fromkeys(names, names))
+    return found
+
+
+_SAME = same_motion()
+
+
+def same(name: str) -> frozenset[str]:
+    """Names that mean the same motion as ``name``."""
+    return _SAME.get(name, frozenset({name}))
+
+
+def alike(name: str) -> frozenset[str]:
+    """The same, and declared near-twins."""
+    found = same(name)
+    for family in TWINS:
+        if name in family:
+            found |= family
+    return found
+
+
+def score_names(named: Sequence[str], hidden: Sequence[str]) -> dict[str, Any]:
+    """Score a list of names, the most certain first, against what was hidden.
+
+    Returns:
+        ``first``: whether the first name means something hidden; ``first_alike``: near-twins
+        counted; ``all_named``: whether everything hidden is among the names; ``exactly``: and
+        nothing else; ``false``: number of names that mean nothing hidden, near-twins not counted
+        as false. None where nothing was hidden.
+    """
+    exact = [same(name) for name in hidden]
+    near = [alike(name) for name in hidden]
+    first = named[0] if named else ""
+    every = all(any(name in one for name in named) for one in near)
+    wrong = sum(not any(name in one for one in near) for name in named)
+    return {
+        "first": any(first in one for one in exact) if hidden else None,
+        "first_alike": any(first in one for one in near) if hidden else None,
+        "all_named": every if hidden else None,
+        "exactly": every and len(named) == len(hidden) if hidden else None,
+        "false": wrong,
+    }
+
+
+def score(
+    result: GapResult, strengths: Mapping[str, float], outside: bool = False
+) -> dict[str, Any]:
+    """One row of the table from an answer of ``find_gap``.
+
+    Args:
+        result: The answer.
+        strengths: What was hidden, of ``HIDDEN``.
+        outside: Whether something that no library holds was hidden too.
+    """
+    named = [v.effect for v in result.verdicts if v.effect]
+    sure = [v.effect for v in result.verdicts if v.effect and v.kind == "confirmed"]
+    said = {name.split("@")[0] for v in result.verdicts if v.effect for name in v.alternatives}
+    kinds = [v.kind for v in result.verdicts]
+    hidden = [*strengths, *(["outside"] if outside else [])]
+    row = score_names(named, hidden)
+    row["false_sure"] = score_names(sure, hidden)["false"]
+    row["in_set"] = (
+        all(alike(name) & (set(named) | said) for name in strengths) if strengths else None
+    )
+    row |= {
+        "named": named,
+        "sure": sure,
+        "kinds": kinds,
+        "no_gap": "no_gap" in kinds,
+        "unexplained": "unexplained" in kinds,
+        "covered": coverage(result, strengths) if row["exactly"] and row["first"] else [],
+        "before": result.gap.windows_before,
+        "after": result.gap.windows_after,
+        "forecast_before": result.gap.before.value / result.gap.noise_floor.value,
+        "forecast_after": result.gap.after.value / result.gap.noise_floor.value,
+        "seconds": sum(result.seconds.values()),
+        "says": [v.says for v in result.verdicts],
+        "quality": list(result.quality),
+    }
+    return row
+
+
+def coverage(result: GapResult, strengths: Mapping[str, float]) -> list[bool]:
+    """Whether the interval of each number holds the true one, for effects named as hidden."""
+    found = []
+    for verdict in result.verdicts:
+        if verdict.effect not in strengths:
+            continue
+        effect = HIDDEN[verdict.effect].effect(strengths[verdict.effect])
+        for name, number in verdict.parameters.items():
+            found.append(bool(number.low <= getattr(effect, name) <= number.high))
+    return found

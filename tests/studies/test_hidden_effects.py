@@ -1,0 +1,83 @@
+"""The known-truth benchmark: strengths, scores, rivals, and the fast subset end to end."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from sims.effects.library import library
+from sims.pendulum_equation import PendulumEquation
+from studies.hidden_data import Truth, make_logs
+from studies.hidden_effects import Block, HiddenStudy, main, trials_of
+from studies.hidden_report import share
+from studies.hidden_rivals import one_step, regression
+from studies.hidden_scores import score_names
+from studies.hidden_strengths import HIDDEN, sizes, strength, truth
+
+
+def test_every_strength_makes_the_gap_that_was_asked_for():
+    for name in HIDDEN:
+        found = strength(name, 3.0, "strong", "A")
+        assert sizes(name, np.array([found]), "strong", "A")[0] == pytest.approx(3.0, rel=0.05)
+
+
+def test_truth_holds_what_the_library_calls_by_the_same_name():
+    fields = {field.name for field in dataclasses.fields(Truth)}
+    names = {effect.name for effect in library(PendulumEquation())}
+    assert set(HIDDEN) <= fields & names
+    assert truth({"saturation": 0.2}).saturation == pytest.approx(2.4)
+
+
+def test_names_are_scored_with_the_twins_that_are_declared():
+    assert score_names(["length"], ["mass"])["first"]
+    lag = score_names(["actuator_lag"], ["delay"])
+    assert not lag["first"] and lag["first_alike"] and lag["false"] == 0
+    pair = score_names(["mass", "delay"], ["delay", "inertia"])
+    assert not pair["first"] and not pair["all_named"] and pair["false"] == 1
+    assert score_names([], [])["first"] is None
+    assert score_names(["mass"], [])["false"] == 1
+
+
+def test_share_has_an_exact_interval():
+    assert share(0, 200) == "0 % (0/200; 0 to 2)"
+    assert share(0, 0) == "-"
+
+
+def test_draws_are_balanced_over_effects_and_repeatable():
+    study = HiddenStudy([Block("single", [["any"]], [1.5, 3.0], ["strong"], ["A"], sets=18)])
+    cells = trials_of(study)
+    assert sorted(cell["hidden"][0] for cell in cells) == sorted(HIDDEN)
+    assert cells == trials_of(study)
+    assert len({cell["seed"] for cell in cells}) == 18
+
+
+def test_an_unknown_name_is_one_line_and_leaves_nothing(tmp_path, capsys):
+    settings = json.dumps([{"name": "x", "hidden": [["ghost"]]}])
+    with pytest.raises(SystemExit) as stop:
+        main(["--blocks", settings, "--output", str(tmp_path / "out")])
+    assert stop.value.code == 2
+    assert "'ghost'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_step_regression_names_a_mass_when_the_rate_is_measured():
+    logs = make_logs(Truth(mass=0.05), 3, "strong", "A", 6)
+    simulator = PendulumEquation()
+    assert one_step(regression(simulator, library(simulator), logs, False))[0] == "mass"
+
+
+def test_fast_subset(tmp_path, capsys):
+    main(["--config", "studies/configs/hidden_effects/fast.yaml", "--output", str(tmp_path)])
+    assert "single" in capsys.readouterr().out
+    for name in ("report.html", "sets.csv", "cells.csv", "rivals.csv", "confusion.png"):
+        assert (tmp_path / name).stat().st_size > 0
+    said = {
+        (r["config"]["block"], *r["config"]["hidden"]): r["answers"]["find_gap"]
+        for r in (json.loads(p.read_text()) for p in tmp_path.glob("sets/*/results.json"))
+    }
+    assert said["single", "mass"]["first"]
+    assert said["single", "dead_zone"]["first"]
+    assert said["no gap",]["kinds"][0] == "no_gap"
+    assert said["outside", "wind"]["unexplained"]
+    assert said["outside", "wind"]["sure"] == []
