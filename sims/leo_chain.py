@@ -89,27 +89,27 @@ class Chain:
             wheel.filter = pymunk.ShapeFilter(group=1)
         space.add(*self._wheels)
         pairs = [(self._bodies[PARENT[i]], self._bodies[i]) for i in range(1, 7)]
-        # What is held always, and what pushes with a limited force.
-        self._holding: list[pymunk.Constraint] = [
+        self._pivots: list[pymunk.Constraint] = [
             pymunk.PivotJoint(a, b, PIVOT[i + 1], (0.0, 0.0)) for i, (a, b) in enumerate(pairs)
         ]
+        self._stops: list[pymunk.Constraint] = []
         if stops:
-            self._holding += [
+            self._stops = [
                 pymunk.RotaryLimitJoint(a, b, *STOPS[i // 2]) for i, (a, b) in enumerate(pairs)
             ]
         motors = [pymunk.SimpleMotor(a, b, 0.0) for a, b in pairs]
         brakes = self._brakes(pairs) if dry else []
-        self._pushing = [*motors, *brakes]
-        space.add(*self._holding, *self._pushing)
-        for constraint in (*self._holding, *self._pushing):
+        holding, pushing = [*self._pivots, *self._stops], [*motors, *brakes]
+        for constraint in (*holding, *pushing):
             constraint.collide_bodies = False
-        # Handles for the inner loops.
+        space.add(*holding, *pushing)
+        # Handles for the inner loops: what is held always, what pushes with a limited force.
         self._cp_space = space._space
         self._cp_bodies = [body._body for body in self._bodies]
         self._cp_motors = [motor._constraint for motor in motors]
         self._cp_brakes = [brake._constraint for brake in brakes]
-        self._cp_holding = [constraint._constraint for constraint in self._holding]
-        self._cp_pushing = [constraint._constraint for constraint in self._pushing]
+        self._cp_holding = [constraint._constraint for constraint in holding]
+        self._cp_pushing = [constraint._constraint for constraint in pushing]
         self._build: Build | None = None
         self._h = 0.0
         self._cold = True
@@ -130,8 +130,11 @@ class Chain:
         if h != self._h:
             # A fifth of a penetration and half of a joint's error in each sub-step.
             self._space.collision_bias = 0.8 ** (1 / h)
-            for constraint in self._holding:
-                constraint.error_bias = 0.5 ** (1 / h)
+            for pivot in self._pivots:
+                pivot.error_bias = 0.5 ** (1 / h)
+            # A stop hardly pushes back; without any push Chipmunk would leave it out.
+            for stop in self._stops:
+                stop.error_bias = 0.999 ** (1 / h)
             self._h = h
         if build == self._build:
             return
