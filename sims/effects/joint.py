@@ -158,7 +158,8 @@ class Cogging(JointEffect):
         """As for every joint effect; the joint has to turn."""
         found = {**super().measures(simulator), "turn": ("1", 1.0)}
         joint = next(joint for joint in simulator.joints if joint.name == self.joint)
-        angles = [channel.name for channel in simulator.state_channels if channel.angle]
-        if joint.position not in angles:
+        channels = {channel.name: channel for channel in simulator.state_channels}
+        position = channels[joint.position]
+        if not (position.angle or position.unit == "rad"):
             raise ValueError(f"cogging needs a joint that turns; {self.joint!r} slides")
         return found

@@ -63,6 +63,12 @@ class SensorOffset(SensorEffect):
         """Truth."""
         return x - self.offset
 
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """As for every sensor effect; the motion has to depend on the channel."""
+        if any(c.name == self.channel and c.invariant for c in simulator.state_channels):
+            raise ValueError(f"the motion does not depend on {self.channel!r}: no offset shows")
+        return super().measures(simulator)
+
 
 @dataclasses.dataclass(frozen=True)
 class SensorScale(SensorEffect):
