@@ -36,7 +36,7 @@ from studies.command import HelpFormatter, Parser, fail
 from studies.hidden_data import Excitation, make_logs
 from studies.hidden_report import summary, write_report
 from studies.hidden_rivals import one_step, regression, sparse
-from studies.hidden_scores import alike, same, score, score_names
+from studies.hidden_scores import alike, replaceable, score, score_names
 from studies.hidden_strengths import HIDDEN, strength, truth
 from studies.progress import Progress
 from studies.trials import Execution, run_trials, trial_folder
@@ -62,7 +62,7 @@ class Block:
         excitation: ``strong``, ``weak`` or ``policy``.
         noise: ``A``, ``B`` or ``C``.
         runs: Trajectories in a set.
-        remove: Take what is hidden, and what means the same, out of the library.
+        remove: Take what is hidden, and what can replace it exactly, out of the library.
         repeats: Sets for every combination.
         sets: Draw so many sets at random, every effect about equally often; all by default.
     """
@@ -160,7 +160,7 @@ def _spelt_out(names: Sequence[str], rng: np.random.Generator) -> list[list[str]
     if len(wild) == 2:
         while True:
             pair = [str(name) for name in rng.choice(list(HIDDEN), 2, replace=False)]
-            if pair[1] not in alike(pair[0]):
+            if pair[1] not in alike(pair[0]) | replaceable(pair[0]):
                 return [pair]
     return [list(names)]
 
@@ -209,7 +209,7 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
         tell(1)
         offered: list[Effect] = list(library(simulator))
         if config["remove"]:
-            gone = frozenset().union(*(same(name) for name in config["hidden"]))
+            gone = frozenset().union(*(replaceable(name) for name in config["hidden"]))
             offered = [effect for effect in offered if effect.name not in gone]
         answers: dict[str, Any] = {}
         if "find_gap" in config["methods"]:

@@ -26,6 +26,11 @@ def same_motion() -> dict[str, frozenset[str]]:
 
 
 _SAME = same_motion()
+_COMBINED = [
+    {label.split("@")[0] for label in alias.effects}
+    for alias in exact_aliases(PendulumEquation())
+    if "combination" in alias.says
+]
 
 
 def same(name: str) -> frozenset[str]:
@@ -39,6 +44,18 @@ def alike(name: str) -> frozenset[str]:
     for family in TWINS:
         if name in family:
             found |= family
+    return found
+
+
+def replaceable(name: str) -> frozenset[str]:
+    """All that has to go from a library so that no two effects are exactly the same as this one.
+
+    The torque constant and the resistance of a motor together are a gain, for example.
+    """
+    found = same(name)
+    for members in _COMBINED:
+        if len(members) <= 3 and members & same(name):
+            found |= frozenset().union(*(same(member) for member in members))
     return found
 
 

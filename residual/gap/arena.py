@@ -130,7 +130,8 @@ class Arena:
         largest = (drawn**2).max(axis=0)
         spread = largest.std() * np.sqrt(6) / np.pi
         point = largest.mean() - 0.5772 * spread - spread * np.log(-np.log(0.999))
-        self.threshold = max(float(point), self.material)
+        self.noise_gain = float(point)
+        self.threshold = max(self.noise_gain, self.material)
 
     def score(self, key: Key) -> float:
         """Cost plus the price of the unknowns; lower is better."""

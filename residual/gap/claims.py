@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import norm
 
 from residual.gap.adequacy import Remainder
 from residual.gap.candidates import Candidate
@@ -17,9 +18,10 @@ from sims.effects.base import Effect
 from sims.effects.library import exact_aliases
 from sims.host import HostSimulator
 
-#: Score difference beyond which a rival is excluded: a rival that is true loses by more than this
-#: with probability below 1e-3, however far apart the two predictions are.
-TIE = 9.55
+#: Score difference beyond which a rival is excluded. If the rival is true and the two predictions
+#: are d standard errors apart, the difference is normal with mean -d^2 and deviation 2 d, and it
+#: exceeds z^2 with the largest probability at d = z: that of a normal beyond z, here 1e-3.
+TIE = float(norm.isf(1e-3)) ** 2
 
 
 def aliases(

@@ -53,23 +53,48 @@ def _scale(
     runs: Sequence[Trajectory], position: int, rate: int, rule: Callable[[Array, Array], float]
 ) -> tuple[float, float]:
     """Change of the position per integral of the rate, with its standard error over stretches."""
-    moved, integrals = [], []
+    moved, integrals, noises = [], [], []
     for run in runs:
         x, v = run.states[:, position], run.states[:, rate]
         for a in range(0, len(run) - 7, 8):
             part = slice(a, a + 9)
             if np.isfinite(x[part]).all() and np.isfinite(v[part]).all():
+                times = run.times[part]
                 moved.append(x[part][-1] - x[part][0])
-                integrals.append(float(rule(v[part], run.times[part])))
+                integrals.append(float(rule(v[part], times)))
+                noises.append((_roughness(x[part], times), _roughness(v[part], times)))
     if len(moved) < 10:
         return np.nan, np.inf
     y, z = np.array(moved), np.array(integrals)
-    # Stretches of little motion tell nothing but noise, which would bias the scale down.
-    far = np.abs(z) >= np.median(np.abs(z))
-    y, z = y[far], z[far]
-    scale = float((y @ z) / (z @ z))
-    left = (y - scale * z) * z
-    return scale, float(np.sqrt(left @ left) / (z @ z))
+    of_x, of_v = np.median(np.array(noises), axis=0)
+    step = float(np.median([np.median(run.durations) for run in runs]))
+    # Variance of the change (two readings) and of the integral (eight steps of readings).
+    in_y, in_z = max(2 * of_x, 1e-300), max(8 * step**2 * of_v, 1e-300)
+    if z @ z < 4 * len(z) * in_z:
+        return np.nan, np.inf
+    scale = _through_origin(z, y, in_y / in_z)
+    left = y - scale * z
+    # Both have noise, so the part of the residual that belongs to z goes back to it.
+    cleaned = z + left * scale * in_z / (in_y + scale**2 * in_z)
+    return scale, float(np.linalg.norm(left * cleaned) / (cleaned @ cleaned))
+
+
+def _through_origin(z: Array, y: Array, ratio: float) -> float:
+    """Slope of y = slope z with noise in both, ``ratio`` of their variances.
+
+    Least squares alone would take noise in z for a smaller slope. Source: Deming, "Statistical
+    adjustment of data" (1943), without the constant.
+    """
+    yy, zz, zy = float(y @ y), float(z @ z), float(z @ y)
+    rest = yy - ratio * zz
+    return (rest + np.sqrt(rest**2 + 4 * ratio * zy**2)) / (2 * zy)
+
+
+def _roughness(values: Array, times: Array) -> float:
+    """Variance of what a cubic in time leaves."""
+    basis = np.vander((times - times.mean()) / max(float(np.ptp(times)), 1e-12), 4)
+    rest = values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+    return float(rest @ rest) / (len(values) - 4)
 
 
 def _simpson(values: Array, times: Array) -> float:

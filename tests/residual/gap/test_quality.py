@@ -29,3 +29,9 @@ def test_coarse_sampling_is_no_reason_to_blame_the_sensor(excitation):
     runs, findings = kinematics(PendulumEquation(), logs)
     assert findings == []
     assert runs == logs
+
+
+def test_noise_in_the_rate_is_not_taken_for_a_smaller_scale():
+    # A wide dead zone leaves little motion, so most of the measured rate is noise.
+    logs = make_logs(Truth(dead_zone=0.58), 4, "weak", "A", 15)
+    assert kinematics(PendulumEquation(), logs) == (logs, [])

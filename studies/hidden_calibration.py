@@ -1,0 +1,131 @@
+"""What noise alone reaches in find_gap's tests: the ground that its thresholds stand on.
+
+Logs in which nothing is hidden, made by SciPy and measured with noise, go through the same noise
+estimate, windows, signatures and tests as any other; the largest values seen say where the
+thresholds have to lie. The gain of the best effect is a maximum over the whole library, so its
+quantiles allow for the number of effects that were offered.
+
+  python -m studies.hidden_calibration --sets 20 --output results/hidden_calibration
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import threadpoolctl
+from jsonargparse.typing import PositiveInt
+
+from residual.gap.adequacy import remainder
+from residual.gap.arena import Settings
+from residual.gap.candidates import candidates
+from residual.gap.claims import aliases
+from residual.gap.samples import Samples
+from residual.gap.search import search
+from residual.gap.signatures import gains
+from residual.gap.workflow import split
+from sims.effects.library import library
+from sims.pendulum_equation import PendulumEquation
+from studies.command import HelpFormatter, Parser
+from studies.files import atomic_write_text
+from studies.hidden_data import Truth, make_logs
+from studies.progress import Progress
+from studies.trials import Execution, run_trials, trial_folder
+
+
+def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Test statistics of one set of logs without a gap."""
+    simulator = PendulumEquation()
+    with threadpoolctl.threadpool_limits(1):
+        logs = make_logs(
+            Truth(), config["seed"], config["excitation"], config["noise"], config["runs"]
+        )
+        train, _ = split(logs)
+        samples = Samples.join(train, simulator.substeps)
+        offered = library(simulator)
+        groups, _ = aliases(simulator, offered)
+        kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
+        pool = candidates(simulator, kept, samples)
+        rng = np.random.default_rng(0)
+        found = search(simulator, pool, samples, rng, Settings())
+        left = remainder(
+            found.arena.tried[()], samples, found.arena.windows, found.arena.sigma,
+            found.nominal_floor, found.arena.scale,
+        )  # fmt: skip
+        # Not more than one round: what noise reaches before anything is chosen.
+        best = gains(found.trial.signatures(()))[0]
+    return {
+        **{key: config[key] for key in ("excitation", "noise", "runs", "seed")},
+        "chosen": len(found.key),
+        "gain": best.value,
+        "gain_share": best.value / found.trial.size,
+        "drawn_point": found.trial.noise_gain,
+        "threshold": found.trial.threshold,
+        "ratio": float(left.ratio.max()),
+        "ratio_in_errors": float(((left.ratio - 1) / left.error).max()),
+        "chance": left.chance,
+    }
+
+
+def table(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """Largest values by condition, and over all."""
+    data = pd.DataFrame(results)
+    rows = []
+    parts = [*data.groupby(["excitation", "noise", "runs"]), (("all", "", ""), data)]
+    for (excitation, noise, runs), part in parts:
+        rows.append(
+            {
+                "excitation": excitation, "noise": noise, "runs": runs, "sets": len(part),
+                "chosen": int((part["chosen"] > 0).sum()),
+                "gain median": part["gain"].median(),
+                "gain 99 %": part["gain"].quantile(0.99),
+                "gain worst": part["gain"].max(),
+                "threshold median": part["threshold"].median(),
+                "ratio worst": part["ratio"].max(),
+                "ratio worst, errors": part["ratio_in_errors"].max(),
+                "chance smallest": part["chance"].min(),
+            }
+        )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command."""
+    parser = Parser(
+        prog="python -m studies.hidden_calibration",
+        description=__doc__,
+        formatter_class=HelpFormatter,
+    )
+    parser.add_argument("--sets", type=PositiveInt, default=20, help="Sets for each condition.")
+    parser.add_argument("--runs", type=PositiveInt, nargs="+", default=[5, 15], help="Sizes.")
+    parser.add_argument("--seed", type=int, default=0, help="Of the first set.")
+    parser.add_argument("--output", type=Path, default=Path("results/hidden_calibration"))
+    parser.add_argument("--jobs", type=PositiveInt, default=1, help="Processes.")
+    given = parser.parse_args(arguments)
+    cells = itertools.product(range(given.sets), ("strong", "weak", "policy"), "ABC", given.runs)
+    folders = {}
+    for number, (_, excitation, noise, runs) in enumerate(cells):
+        config = {"excitation": excitation, "noise": noise, "runs": runs}
+        config["seed"] = 1_000_000 * (given.seed + 1) + number
+        folders[trial_folder(given.output / "sets", f"{excitation}-{noise}-{runs}", config)] = (
+            config
+        )
+    results, failures = run_trials(
+        "hidden_calibration", folders, run_set, Execution(jobs=given.jobs)
+    )
+    if failures:
+        raise SystemExit(f"{len(failures)} sets failed, see error.txt in {given.output / 'sets'}")
+    found = table(results)
+    atomic_write_text(given.output / "calibration.csv", found.to_csv(index=False))
+    print(found.to_string(index=False, float_format=lambda v: f"{v:.4g}"))
+
+
+if __name__ == "__main__":
+    # By its importable name, which worker processes need to find the same classes.
+    from studies import hidden_calibration
+
+    hidden_calibration.main()
