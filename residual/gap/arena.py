@@ -29,9 +29,11 @@ class Settings:
         pairs: Pairs that enter a round.
         swaps: Exchanges that enter a round.
         most: Largest number of effects chosen.
-        share: Smallest part of the noise energy worth a name.
+        share: Smallest part of the noise energy worth a name; it binds in long logs, where
+            chance alone would let effects in that change the residual by a thousandth.
         part: Smallest part of the squared error that an effect must remove as long as a
-            remainder well above the noise is left.
+            remainder well above the noise is left; it bears on leads only, since what leaves
+            such a remainder is reported as unexplained.
         nominal_turns: Gauss-Newton iterations of the nominal simulator.
         first_turns, more_turns: The same of all rivals, and of the close ones.
         runs: Training runs that the tournament sees; the final fit sees all.

@@ -84,7 +84,8 @@ class Gap:
         steps: From nominal to corrected, one effect at a time.
         by_channel: The same for every measured channel.
         windows_before, windows_after: Residual over noise on held-out windows with free start
-            states; 1 is the noise.
+            states; 1 is the noise. A window counts at most 20 times the median one: where the
+            start state was not found, its residual says nothing of the model.
         left_out: Share of forecasts that no model could make (unstable), left out.
     """
 

@@ -28,7 +28,7 @@ class Claim:
         name, where, label: What and where.
         numbers: Fitted numbers.
         ties: Effects that these data cannot exclude in its place.
-        twins: Exact aliases: no data could.
+        twins: Exact aliases, beside whatever else is claimed: no data could.
         gain: What leaving it out would cost.
         artefact: True if another step size or input hold explains it.
         sentence: What the effect is.
@@ -62,15 +62,27 @@ def verdicts(
     tolerance: float | None,
     blind: Sequence[Blind],
 ) -> tuple[Verdict, ...]:
-    """All verdicts, most important first."""
+    """All verdicts, most important first.
+
+    Args:
+        claims: The chosen effects.
+        left: What they leave.
+        gap: Forecast errors on held-out data.
+        sets: Exactly dependent sets of effects, see ``residual.gap.claims.aliases``.
+        tolerance: Forecast error that does not matter.
+        blind: Effects that the log could hide.
+    """
     found: list[Verdict] = []
     small = tolerance is not None and gap.before.value <= tolerance
     real = [claim for claim in claims if not claim.artefact]
     # Three free effects imitate nearly anything, so they name nothing.
     sound = left.adequate and len(claims) <= 2
     removed = gap.windows_before / max(gap.windows_after, 1e-9)
+    labels = [claim.label for claim in real]
     for claim in real:
-        found.append(_effect(claim, sound, removed, gap))
+        stand_ins, together = dependent(claim.label, labels, sets)
+        claim = dataclasses.replace(claim, twins=(*claim.twins, *stand_ins))
+        found.append(_effect(claim, sound, removed, gap, together))
     for claim in claims:
         if claim.artefact:
             found.append(
@@ -98,7 +110,32 @@ def verdicts(
     return tuple(found)
 
 
-def _effect(claim: Claim, sound: bool, removed: float, gap: Gap) -> Verdict:
+def dependent(
+    label: str, claimed: Sequence[str], sets: Sequence[tuple[str, ...]]
+) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    """What exactly dependent sets mean for one of several claimed effects.
+
+    Returns:
+        Effects that could stand in its place beside the other claimed ones, and sets of effects
+        that make the same motion together (those that share no member with the other claims).
+    """
+    stand_ins: list[str] = []
+    together: list[tuple[str, ...]] = []
+    for members in sets:
+        others = tuple(name for name in members if name != label)
+        free = tuple(name for name in others if name not in claimed)
+        if label not in members or not free:
+            continue
+        if len(free) == 1:
+            stand_ins += [name for name in free if name not in stand_ins]
+        elif len(free) == len(others):
+            together.append(free)
+    return tuple(stand_ins), tuple(together)
+
+
+def _effect(
+    claim: Claim, sound: bool, removed: float, gap: Gap, together: Sequence[tuple[str, ...]]
+) -> Verdict:
     numbers = ", ".join(
         f"{name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}"
         for name, n in claim.numbers.items()
@@ -112,6 +149,10 @@ def _effect(claim: Claim, sound: bool, removed: float, gap: Gap) -> Verdict:
             says += f" ({title}, form undecided)"
     if claim.twins:
         says += f"; the same motion as {', '.join(claim.twins)}"
+    if together:
+        sets = " or ".join(" with ".join(names) for names in together[:2])
+        more = f" (and {len(together) - 2} more such sets)" if len(together) > 2 else ""
+        says += f"; {sets}, in one exact proportion, would move alike{more}"
     if not sound:
         says += "; a remainder is unexplained"
     kind: Kind = "confirmed" if confirmed else "ambiguous"
