@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,9 @@ def tidy(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
             values = {k: v for k, v in answer.items() if k not in ("says", "quality")}
             for key, value in values.items():
                 row[key] = " ".join(map(str, value)) if isinstance(value, list) else value
+            if config["remove"]:
+                # What is not in the library cannot be named, except by a near-twin.
+                row |= dict.fromkeys(["first", "all_named", "exactly", "in_set"])
             covered = answer.get("covered", [])
             row |= {"numbers": len(covered), "numbers_covered": sum(covered)}
             rows.append(row)
@@ -55,44 +58,48 @@ def share(hits: int, count: int) -> str:
     return f"{100 * hits / count:.0f} % ({hits}/{count}; {100 * low:.0f} to {100 * high:.0f})"
 
 
-def _share(column: pd.Series) -> str:
+def count(hits: int, count: int) -> str:
+    """``hits/count``, or a dash if there is nothing to count."""
+    return f"{hits}/{count}" if count else "-"
+
+
+def _share(column: pd.Series, form: Callable[[int, int], str] = share) -> str:
     known = column.dropna()
-    return share(int(known.astype(bool).sum()), len(known))
+    return form(int(known.astype(bool).sum()), len(known))
 
 
 def cells(data: pd.DataFrame) -> pd.DataFrame:
-    """One row per cell of the grid with find_gap's scores."""
-    ours = data[data["method"] == "find_gap"]
-    keys = ["block", "excitation", "noise", "size", "runs"]
-    rows = [
-        dict(zip(keys, values, strict=True)) | _scores(part) for values, part in ours.groupby(keys)
-    ]
-    return pd.DataFrame(rows)
+    """One row per cell of the grid with find_gap's scores as counts."""
+    return _by(data, ["block", "excitation", "noise", "size", "runs"], count)
 
 
 def blocks(data: pd.DataFrame) -> pd.DataFrame:
-    """The same, one row per block and excitation."""
+    """One row per block and excitation with find_gap's scores as shares with intervals."""
+    return _by(data, ["block", "excitation"], share)
+
+
+def _by(data: pd.DataFrame, keys: list[str], form: Callable[[int, int], str]) -> pd.DataFrame:
     ours = data[data["method"] == "find_gap"]
-    keys = ["block", "excitation"]
     rows = [
-        dict(zip(keys, values, strict=True)) | _scores(part) for values, part in ours.groupby(keys)
+        dict(zip(keys, values, strict=True)) | _scores(part, form)
+        for values, part in ours.groupby(keys)
     ]
     return pd.DataFrame(rows)
 
 
-def _scores(part: pd.DataFrame) -> dict[str, Any]:
+def _scores(part: pd.DataFrame, form: Callable[[int, int], str]) -> dict[str, Any]:
     hits, numbers = int(part["numbers_covered"].sum()), int(part["numbers"].sum())
     return {
         "sets": len(part),
-        "first name right": _share(part["first"]),
-        "or its near-twin": _share(part["first_alike"]),
-        "all named": _share(part["all_named"]),
-        "in the named set": _share(part["in_set"]),
-        "intervals cover": share(hits, numbers),
-        f"gap after <= {CLOSED}": _share(part["after"] <= CLOSED),
-        "a name": _share(part["named"].astype(bool)),
-        "a confident wrong name": _share(part["false_sure"] > 0),
-        "unexplained": _share(part["unexplained"]),
+        "first name right": _share(part["first"], form),
+        "or its near-twin": _share(part["first_alike"], form),
+        "all named": _share(part["all_named"], form),
+        "in the named set": _share(part["in_set"], form),
+        "intervals cover": form(hits, numbers),
+        f"gap after <= {CLOSED}": _share(part["after"] <= CLOSED, form),
+        "a name": _share(part["named"].astype(bool), form),
+        "a confident wrong name": _share(part["false_sure"] > 0, form),
+        "unexplained": _share(part["unexplained"], form),
         "s median": round(float(part["seconds"].median()), 1),
         "s worst": round(float(part["seconds"].max()), 1),
     }
@@ -108,8 +115,8 @@ def rivals(data: pd.DataFrame) -> pd.DataFrame:
             own = part[part["method"] == method]
             if own.empty:
                 continue
-            row[f"{title}: first right"] = _share(own["first_alike"])
-            row[f"{title}: a false name"] = _share(own["false"] > 0)
+            row[f"{title}: first right"] = _share(own["first_alike"], count)
+            row[f"{title}: a false name"] = _share(own["false"] > 0, count)
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -171,7 +178,8 @@ def write_report(
             f"{data['seed'].nunique()} sets of logs. A share is followed by its count and its "
             "exact 95 % interval. Near-twins are delay and lag, and Coulomb and Stribeck "
             "friction; effects with the same motion (mass and length, load and bias) count as "
-            "one. The gap after is the residual on held-out windows over the noise.",
+            "one. The gap after is the residual on held-out windows over the noise. Confident "
+            "names are those that were confirmed.",
         )
     ]
     if (data["method"] == "find_gap").any():
