@@ -1,0 +1,65 @@
+"""The pendulum study on a pendulum that takes one Euler step: a trial lasts a second."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sims.pendulum import Pendulum
+from sims.simulator import Simulator
+from sims.tasks import SwingUp
+from studies import pendulum_gap
+from studies.gap_study import run_command
+from studies.learning_steps import Problem
+from studies.study_tables import write_tables
+
+
+class EulerPendulum(Simulator):
+    """A pendulum under a torque of 0.5 Nm/V times the voltage."""
+
+    name = "Euler pendulum"
+    dt = 0.05
+    state_channels = Pendulum().state_channels
+    action_channels = Pendulum().action_channels
+
+    def __init__(self, gravity: float = 9.81) -> None:
+        self.gravity = gravity
+        self.parameters = {}
+
+    def step(self, states, actions):
+        states, actions = self.check_rows(states, actions)
+        rate = states[:, 1] + self.dt * (
+            self.gravity * np.sin(states[:, 0]) + 0.5 * actions[:, 0] - 0.5 * states[:, 1]
+        )
+        return np.stack([states[:, 0] + self.dt * rate, rate], axis=1)
+
+
+def problem(trial, description) -> Problem:
+    return Problem(
+        description=description,
+        idealised=EulerPendulum(),
+        true=EulerPendulum(gravity=14.0),
+        task=SwingUp(horizon=50),
+    )
+
+
+def table(results: Sequence[Mapping], failures: Mapping[Path, str], folder: Path) -> str:
+    rows, _ = write_tables(results, folder)
+    return rows.to_string()
+
+
+STUDY = dataclasses.replace(pendulum_gap.STUDY, problem=problem, grid_report=table)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    run_command(STUDY, arguments)
+
+
+if __name__ == "__main__":
+    # By its importable name, which worker processes need to find the same classes.
+    import quick_gap
+
+    quick_gap.main()

@@ -1,0 +1,99 @@
+"""A report is rebuilt from what trials left, and nothing is computed."""
+
+import json
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+import quick_gap
+
+from studies import report
+from studies.gap_study import rebuild
+from studies.report import main, study_of
+
+TINY = (
+    "budget: {iterations: 1, true_samples: 40, idealised_steps: 1050, difference_steps: 300}\n"
+    "ddpg: {hidden: [16, 16]}\n"
+    "estimator: {class_path: residual.Linear}\n"
+)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "grid.yaml").write_text(TINY + "grid:\n- seed: [0, 1]\n")
+    quick_gap.main(["--config", str(folder / "grid.yaml"), "--output", str(folder / "out")])
+    return folder / "out"
+
+
+def test_a_study_leaves_one_tidy_table_as_csv_and_parquet(finished):
+    for name in ("results", "accuracy"):
+        text = pd.read_csv(finished / f"{name}.csv")
+        binary = pd.read_parquet(finished / f"{name}.parquet")
+        pd.testing.assert_frame_equal(text, binary, check_dtype=False)
+    assert len(pd.read_csv(finished / "results.csv")) == 2 * 2
+
+
+def test_tables_come_back_from_the_trials_alone(finished, monkeypatch):
+    tables = ["results.csv", "results.parquet", "accuracy.csv", "accuracy.parquet", "results.json"]
+    before = {name: (finished / name).read_bytes() for name in tables}
+    for name in tables:
+        (finished / name).unlink()
+    monkeypatch.setattr("studies.gap_study.learn_by_difference", None)
+    rebuild(quick_gap.STUDY, finished)
+    assert {name: (finished / name).read_bytes() for name in tables} == before
+
+
+def test_an_unfinished_study_shows_what_is_finished(finished, tmp_path, capsys):
+    plan = json.loads((finished / "study.json").read_text())
+    (tmp_path / "study.json").write_text(json.dumps(plan))
+    first, second = plan["trials"]
+    for name in (first, second):
+        (tmp_path / name).mkdir()
+    kept = (finished / first / "results.json").read_text()
+    (tmp_path / first / "results.json").write_text(kept)
+    (tmp_path / second / "error.txt").write_text("Traceback\nRuntimeError: deliberate\n")
+    rebuild(quick_gap.STUDY, tmp_path)
+    assert len(pd.read_csv(tmp_path / "results.csv")) == 2
+    assert "RuntimeError: deliberate" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "name"),
+    [
+        ("study.json", {"study": "leo_gap", "trials": {}}, "leo_gap"),
+        ("results.json", {"study": "hidden_effects"}, "hidden_effects"),
+        ("results.json", {"system": "leo", "policies": []}, "leo_gap"),
+        ("results.json", {"trials": [{"system": "pendulum"}]}, "pendulum_gap"),
+        ("results.json", {"policies": []}, "pendulum_gap"),
+    ],
+)
+def test_the_folder_says_which_study_made_it(tmp_path, file, content, name):
+    (tmp_path / file).write_text(json.dumps(content))
+    assert study_of(tmp_path) == name
+
+
+def test_only_studies_are_imported(tmp_path):
+    for name in ("os", "../evil", "no_such_study"):
+        (tmp_path / "study.json").write_text(json.dumps({"study": name}))
+        with pytest.raises(ValueError, match="there is no study"):
+            study_of(tmp_path)
+
+
+@pytest.mark.parametrize("content", [None, {"study": "pendulum_gap", "trials": {}}])
+def test_nothing_to_report_is_one_line_and_exit_code_2(tmp_path, capsys, content):
+    if content:
+        (tmp_path / "study.json").write_text(json.dumps(content))
+    with pytest.raises(SystemExit) as stopped:
+        main([str(tmp_path)])
+    said = capsys.readouterr().err
+    assert stopped.value.code == 2 and said.count("\n") == 1 and str(tmp_path) in said
+
+
+def test_a_study_of_its_own_rebuilds_itself(tmp_path, monkeypatch):
+    rebuilt = []
+    own = SimpleNamespace(rebuild=rebuilt.append)
+    (tmp_path / "results.json").write_text(json.dumps({"study": "hidden_effects"}))
+    monkeypatch.setattr(report.importlib, "import_module", lambda name: own)
+    main([str(tmp_path)])
+    assert rebuilt == [tmp_path]
