@@ -57,6 +57,7 @@ class PolicyTests:
             chosen for one lucky path through the model's errors.
         visited_seconds: Accuracy is measured over the first seconds of fresh rollouts.
         visited_rollouts: How many of those.
+        visited_stride: Open-loop predictions start at every so many-th state of them.
     """
 
     every: int = 500
@@ -66,6 +67,7 @@ class PolicyTests:
     # Later a good policy balances, where there is next to nothing to predict.
     visited_seconds: float = 2.0
     visited_rollouts: int = 5
+    visited_stride: int = 1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,6 +81,8 @@ class Problem:
         task: Reward, start states, horizon.
         tests: How policies are tested.
         measures: What is reported of a rollout on the true system beside its return, by name.
+        elsewhere: Draws states and actions of rollouts of the true system from anywhere, as
+            ``residual.accuracy.uniform_rollouts``, which is used without it.
     """
 
     description: Mapping[str, Any]
@@ -87,6 +91,7 @@ class Problem:
     task: Task
     tests: PolicyTests = PolicyTests()
     measures: Callable[[Rollout], dict[str, float]] | None = None
+    elsewhere: Callable[[np.random.Generator], tuple[Array, Array]] | None = None
 
     def environment(self, simulator: Simulator) -> SimulatorEnv:
         """The task on ``simulator``."""
@@ -193,12 +198,17 @@ class LearningSteps:
         shortest = min(len(run.rewards) for run in runs)
         states = np.stack([visited(run)[: shortest + 1] for run in runs])
         actions = np.stack([run.actions[:shortest] for run in runs])
-        uniform = uniform_rollouts(self.problem.true, np.random.default_rng(seed))
+        rng = np.random.default_rng(seed)
+        if self.problem.elsewhere:
+            uniform = self.problem.elsewhere(rng)
+        else:
+            uniform = uniform_rollouts(self.problem.true, rng)
+        stride = tests.visited_stride
         atomic_write_json(
             folder / "accuracy.json",
             {
-                "visited": accuracy_along(corrected, states, actions),
-                "uniform": accuracy_along(corrected, *uniform),
+                "visited": accuracy_along(corrected, states, actions, stride=stride),
+                "uniform": accuracy_along(corrected, *uniform, stride=stride),
             },
         )
 

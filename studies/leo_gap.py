@@ -19,9 +19,12 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from policy.evaluate import Rollout
 from sims.leo import Leo
-from sims.simulator import Simulator
+from sims.leo_body import clearance
+from sims.simulator import Array, Simulator
 from sims.walking import Walking, measure_walk
 from studies.command import Parser
 from studies.difference_learning import Budget
@@ -34,7 +37,13 @@ from studies.leo_tables import write_grid_report
 # Learning curves jump by hundreds between tests, so every test is several walks, and the policy
 # kept is the best of them on its own model.
 TESTS = PolicyTests(
-    every=2500, every_true=2500, episodes=3, noisy=2, visited_seconds=4.0, visited_rollouts=5
+    every=2500,
+    every_true=2500,
+    episodes=3,
+    noisy=2,
+    visited_seconds=4.0,
+    visited_rollouts=5,
+    visited_stride=5,
 )
 
 
@@ -68,7 +77,28 @@ def problem(trial: LeoTrial, description: Mapping[str, Any]) -> Problem:
         task=Walking(start_at="around"),
         tests=TESTS,
         measures=walk_measures,
+        elsewhere=random_poses,
     )
+
+
+def random_poses(
+    rng: np.random.Generator, rollouts: int = 60, steps: int = 12
+) -> tuple[Array, Array]:
+    """Rollouts of the true Leo from random poses close above the ground, under random voltages.
+
+    Returns:
+        States (rollouts, steps + 1, 18) and actions (rollouts, steps, 6).
+    """
+    leo = Leo.true()
+    scales = np.array([channel.scale for channel in leo.state_channels])
+    starts = rng.uniform(-scales, scales, (rollouts, len(scales)))
+    starts[:, 0] = 0.0
+    starts[:, 5:7] = -np.abs(starts[:, 5:7])  # knees bend one way
+    starts[:, 1] = rng.uniform(0.0, 0.02, rollouts)
+    starts[:, 1] -= clearance(np.where(np.arange(9) == 1, 0.0, starts[:, :9])).min(axis=1)
+    volts = np.array([channel.high for channel in leo.action_channels])
+    actions = rng.uniform(-volts, volts, (rollouts, steps, len(volts)))
+    return leo.rollout(starts, actions), actions
 
 
 def walk_measures(run: Rollout) -> dict[str, float]:
