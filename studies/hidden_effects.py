@@ -20,6 +20,7 @@ import importlib.util
 import itertools
 import json
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -37,7 +38,7 @@ from studies.hidden_data import Excitation, make_logs
 from studies.hidden_report import summary, write_report
 from studies.hidden_rivals import one_step, regression, sparse
 from studies.hidden_scores import alike, replaceable, score, score_names
-from studies.hidden_strengths import HIDDEN, strength, truth
+from studies.hidden_strengths import HIDDEN, draw, strength, truth
 from studies.progress import Progress
 from studies.trials import Execution, run_trials, trial_folder
 
@@ -196,9 +197,7 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
         if name in OUTSIDE:
             outside.update(OUTSIDE[name])
             continue
-        size = strength(name, config["size"], config["excitation"], config["noise"])
-        sign = rng.choice([-1.0, 1.0]) if HIDDEN[name].two_signed else 1.0
-        strengths[name] = float(sign * min(size * rng.uniform(0.85, 1.2), HIDDEN[name].most))
+        strengths[name] = draw(name, config["size"], config["excitation"], config["noise"], rng)
     hidden_truth = truth(strengths | outside)
     simulator = PendulumEquation()
     with threadpoolctl.threadpool_limits(1), progress.task("set", 2) as tell:
@@ -213,8 +212,10 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
             offered = [effect for effect in offered if effect.name not in gone]
         answers: dict[str, Any] = {}
         if "find_gap" in config["methods"]:
+            begin = time.process_time()
             result = find_gap(simulator, logs, effects=offered, ceiling=False)
-            answers["find_gap"] = score(result, strengths, bool(outside))
+            used = {"processor_seconds": time.process_time() - begin}
+            answers["find_gap"] = score(result, strengths, bool(outside)) | used
         names = [*strengths, *outside]
         if "one_step" in config["methods"]:
             said = one_step(regression(simulator, offered, logs, differentiate=False))

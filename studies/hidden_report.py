@@ -70,39 +70,83 @@ def _share(column: pd.Series, form: Callable[[int, int], str] = share) -> str:
 
 def cells(data: pd.DataFrame) -> pd.DataFrame:
     """One row per cell of the grid with find_gap's scores as counts."""
-    return _by(data, ["block", "excitation", "noise", "size", "runs"], count)
-
-
-def blocks(data: pd.DataFrame) -> pd.DataFrame:
-    """One row per block and excitation with find_gap's scores as shares with intervals."""
-    return _by(data, ["block", "excitation"], share)
-
-
-def _by(data: pd.DataFrame, keys: list[str], form: Callable[[int, int], str]) -> pd.DataFrame:
     ours = data[data["method"] == "find_gap"]
-    rows = [
-        dict(zip(keys, values, strict=True)) | _scores(part, form)
-        for values, part in ours.groupby(keys)
-    ]
+    keys = ["block", "excitation", "noise", "size", "runs"]
+    rows = []
+    for (block, excitation, noise, size, runs), part in ours.groupby(keys):
+        row = {"block": block, "logs": f"{excitation} {noise} x {runs}", "size": size}
+        rows.append(row | _scores(part))
     return pd.DataFrame(rows)
 
 
-def _scores(part: pd.DataFrame, form: Callable[[int, int], str]) -> dict[str, Any]:
+def _scores(part: pd.DataFrame) -> dict[str, Any]:
     hits, numbers = int(part["numbers_covered"].sum()), int(part["numbers"].sum())
     return {
         "sets": len(part),
-        "first name right": _share(part["first"], form),
-        "or its near-twin": _share(part["first_alike"], form),
-        "all named": _share(part["all_named"], form),
-        "in the named set": _share(part["in_set"], form),
-        "intervals cover": form(hits, numbers),
-        f"gap after <= {CLOSED}": _share(part["after"] <= CLOSED, form),
-        "a name": _share(part["named"].astype(bool), form),
-        "a confident wrong name": _share(part["false_sure"] > 0, form),
-        "unexplained": _share(part["unexplained"], form),
-        "s median": round(float(part["seconds"].median()), 1),
-        "s worst": round(float(part["seconds"].max()), 1),
+        "first right": _share(part["first"], count),
+        "or twin": _share(part["first_alike"], count),
+        "all named": _share(part["all_named"], count),
+        "cover": count(hits, numbers),
+        "closed": _share(part["after"] <= CLOSED, count),
+        "named": _share(part["named"].astype(bool), count),
+        "wrong": _share(part["false_sure"] > 0, count),
+        "unexplained": _share(part["unexplained"], count),
+        "s": round(float(part["seconds"].median()), 1),
+        "s most": round(float(part["seconds"].max()), 1),
     }
+
+
+def headlines(data: pd.DataFrame) -> pd.DataFrame:
+    """What is asked of find_gap, how often it should be so, and how often it was."""
+    ours = data[data["method"] == "find_gap"]
+    calm = ours["excitation"] != "policy"
+    single, pair = ours["block"] == "single", ours["block"] == "pair"
+    nothing, removed = ours["block"] == "no gap", ours["block"] == "removed"
+    some = ours["hidden"] != NOTHING
+    rows: list[tuple[str, str, str]] = []
+
+    def add(what: str, wanted: str, part: pd.DataFrame, column: pd.Series) -> None:
+        if len(part):
+            rows.append((what, wanted, _share(column[part.index])))
+
+    closed, wrong = ours["after"] <= CLOSED, ours["false_sure"] > 0
+    named = ours["named"].fillna("").astype(bool)
+    for title, part, first in (
+        ("", ours[single & calm], 97),
+        ("policy, ", ours[~calm & single], 92),
+    ):
+        add(f"{title}first name right", f"{first} %", part, ours["first"])
+        add(f"{title}or its near-twin", "", part, ours["first_alike"])
+        hits, numbers = int(part["numbers_covered"].sum()), int(part["numbers"].sum())
+        if numbers:
+            wanted = "90 to 99 %" if not title else "90 %"
+            rows.append((f"{title}95 % intervals that cover", wanted, share(hits, numbers)))
+        add(f"{title}a confident wrong name", "at most 2 %", part, wrong)
+    add("both of a pair", "90 %", ours[pair], ours["all_named"])
+    add("pairs with a confident wrong name", "", ours[pair], wrong)
+    add(
+        f"gap after at most {CLOSED} times the noise",
+        "97 %",
+        ours[some & (single | pair) & calm],
+        closed,
+    )
+    add("nothing hidden, yet a name", "at most 1 %", ours[nothing], named)
+    add("nothing hidden, yet unexplained", "at most 3 %", ours[nothing], ours["unexplained"])
+    add("removed from the library: unexplained", "90 %", ours[removed], ours["unexplained"])
+    add("removed: a confident wrong name", "", ours[removed], wrong)
+    outside = ours[ours["block"] == "outside"]
+    add("outside of every library: unexplained", "", outside, ours["unexplained"])
+    add("outside: a confident wrong name", "", outside, wrong)
+    seconds = ours["seconds"]
+    if len(seconds):
+        rows.append(
+            (
+                "s for a set, median and worst",
+                "60 and 120",
+                f"{seconds.median():.1f} and {seconds.max():.1f}",
+            )
+        )
+    return pd.DataFrame(rows, columns=["what", "wanted", "found"])
 
 
 def rivals(data: pd.DataFrame) -> pd.DataFrame:
@@ -141,7 +185,9 @@ def confusion(table: pd.DataFrame) -> Drawing:
     figure, axes = new_figure(width=2.6 + 0.3 * len(table.columns), height=height)
     axis = axes[0, 0]
     total = table.sum(axis=1).to_numpy()[:, None]
-    axis.imshow(table.to_numpy() / np.maximum(total, 1), cmap="Blues", vmin=0, vmax=1)
+    axis.imshow(
+        table.to_numpy() / np.maximum(total, 1), cmap="Blues", vmin=0, vmax=1, aspect="auto"
+    )
     for i, row in enumerate(table.to_numpy()):
         for j, count in enumerate(row):
             if count:
@@ -157,8 +203,7 @@ def confusion(table: pd.DataFrame) -> Drawing:
 
 def summary(results: Sequence[Mapping[str, Any]]) -> str:
     """A few lines for the terminal."""
-    table = blocks(tidy(results))
-    return table.to_string(index=False) if len(table) else "nothing asked of find_gap"
+    return headlines(tidy(results)).to_string(index=False)
 
 
 def _table(frame: pd.DataFrame, heading: str, caption: str) -> Table:
@@ -185,7 +230,7 @@ def write_report(
     if (data["method"] == "find_gap").any():
         table = cells(data)
         atomic_write_text(output / "cells.csv", table.to_csv(index=False))
-        sections.append(_table(blocks(data), "By kind of set", ""))
+        sections.append(_table(headlines(data), "In short", ""))
         counts = confusion_counts(data)
         if counts.size:
             drawn = confusion(counts)
@@ -198,7 +243,14 @@ def write_report(
                     heading="What is taken for what",
                 )
             )
-        sections.append(_table(table, "Every cell", ""))
+        sections.append(
+            _table(
+                table,
+                "Every cell",
+                f"Counts. Closed: the gap after is at most {CLOSED}; wrong: a confident name that "
+                "means nothing hidden. Logs: excitation, noise, number of trajectories.",
+            )
+        )
     compared = rivals(data)
     atomic_write_text(output / "rivals.csv", compared.to_csv(index=False))
     sections.append(

@@ -39,6 +39,8 @@ from studies.hidden_data import (
 )
 
 Array = NDArray[np.float64]
+#: Largest input in V under each excitation.
+REACH: Mapping[str, float] = {"strong": LIMIT, "weak": 0.8, "policy": LIMIT}
 COGGING_ORDER, COGGING_PHASE, STRIBECK_SPEED = 5, 0.4, 1.5
 
 
@@ -140,14 +142,14 @@ def _reference(excitation: Excitation, noise: str) -> _Reference:
 
 
 def sizes(name: str, strengths: Array, excitation: Excitation, noise: str) -> Array:
-    """Size of the gap that an effect makes at each of some strengths, by its signature."""
+    """Size of the gap that an effect makes at each of some strengths, by its signature.
+
+    Strengths are as ``strength`` gives them.
+    """
     ground = _reference(excitation, noise)
     hidden = HIDDEN[name]
     simulator = ground.fit.model.simulator
-    bound = [hidden.effect(float(s)) for s in strengths]
-    if name == "saturation" and excitation == "weak":
-        reach = float(np.abs(ground.samples.actions).max())
-        bound = [known.Saturation("voltage", reach * (1 - float(s))) for s in strengths]
+    bound = [hidden.effect(_from_reach(name, float(s), excitation)) for s in strengths]
     (candidate,) = (
         c
         for c in candidates(simulator, [bound[0]], ground.samples)
@@ -162,9 +164,34 @@ def sizes(name: str, strengths: Array, excitation: Excitation, noise: str) -> Ar
     return np.sqrt(1 + found.strengths / ground.freedom)
 
 
+def _from_reach(name: str, strength: float, excitation: Excitation) -> float:
+    """A saturation cuts a share of the largest input there is, which a weak excitation lowers."""
+    if name != "saturation":
+        return strength
+    return 1 - REACH[excitation] * (1 - strength) / LIMIT
+
+
+def draw(
+    name: str, size: float, excitation: Excitation, noise: str, rng: np.random.Generator
+) -> float:
+    """A strength near the one that makes a gap of ``size``, with a random sign if it may have one.
+
+    Raises:
+        ValueError: No sensible strength makes such a gap.
+    """
+    hidden = HIDDEN[name]
+    usual = strength(name, size, excitation, noise)
+    sign = rng.choice([-1.0, 1.0]) if hidden.two_signed else 1.0
+    return _from_reach(
+        name, float(sign * min(usual * rng.uniform(0.85, 1.2), hidden.most)), excitation
+    )
+
+
 @functools.cache
 def strength(name: str, size: float, excitation: Excitation, noise: str) -> float:
     """Strength (of ``HIDDEN``) at which an effect makes a gap of ``size`` times the noise.
+
+    That of a saturation is the share that it cuts of the largest input under this excitation.
 
     Raises:
         ValueError: No sensible strength makes such a gap.
