@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sims.effects.base import Effect
 from sims.effects.library import library, typical
 from sims.host import HostSimulator
-from sims.simulator import Array, Channel, Simulator
+from sims.simulator import Array, Simulator, random_values
 
 
 @dataclasses.dataclass(frozen=True)
@@ -234,13 +234,9 @@ def _row(
 def _draw(simulator: Simulator, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
     """Random rows within the scales of the channels; memory as it would be after rest."""
 
-    def column(channel: Channel) -> Array:
-        size = np.pi if channel.angle else channel.scale
-        return rng.uniform(max(channel.low, -size), min(channel.high, size), n)
-
-    actions = np.stack([column(channel) for channel in simulator.action_channels], axis=1)
+    actions = np.stack([random_values(c, n, rng) for c in simulator.action_channels], axis=1)
     states = [
-        np.zeros(n) if channel.kind == "memory" else column(channel)
+        np.zeros(n) if channel.kind == "memory" else random_values(channel, n, rng)
         for channel in simulator.state_channels
     ]
     found = np.stack(states, axis=1)

@@ -23,7 +23,7 @@ from sims.effects.base import Effect
 from sims.effects.joint import JointEffect
 from sims.effects.parameter import ParameterChange
 from sims.effects.sensor import SensorEffect
-from sims.simulator import Array, Channel, Simulator
+from sims.simulator import Array, Channel, Simulator, random_values
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,6 +91,14 @@ class HostSimulator(Simulator):
         if joint.scale is None:
             raise NotImplementedError(f"joint {joint.name!r} has no scale")
         return joint.scale
+
+    def smooth_states(self, n: int, rng: np.random.Generator) -> Array:
+        """Random physical states where a small change has a small effect, (n, n_physical).
+
+        By default within the scales of the channels, angles anywhere; a simulator with contacts
+        keeps away from them.
+        """
+        return np.stack([random_values(c, n, rng) for c in self.physical_channels], axis=1)
 
     # -- what it is made of ---------------------------------------------------------------
 

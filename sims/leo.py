@@ -132,6 +132,12 @@ class Leo(HostSimulator):
         """How it looks."""
         return LeoRenderer()
 
+    def smooth_states(self, n: int, rng: np.random.Generator) -> Array:
+        """Random states in the air, see ``HostSimulator.smooth_states``."""
+        states = super().smooth_states(n, rng)
+        states[:, 1] += 1.0
+        return states
+
     def drive_forces(self, states: Array, inputs: Array) -> Array:
         """Torques of the motors, shape (n, 9), zero on x, z and pitch."""
         p: dict[str, Any] = {

@@ -183,3 +183,9 @@ def state_difference(channels: tuple[Channel, ...], a: ArrayLike, b: ArrayLike) 
         if channel.angle:
             difference[..., column] = wrap(difference[..., column])
     return difference
+
+
+def random_values(channel: Channel, n: int, rng: np.random.Generator) -> Array:
+    """Random values of a channel, (n,): an angle anywhere, others within scale and bounds."""
+    size = np.pi if channel.angle else channel.scale
+    return rng.uniform(max(channel.low, -size), min(channel.high, size), n)

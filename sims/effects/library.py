@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,7 +31,7 @@ from sims.effects.joint import (
 )
 from sims.effects.parameter import ParameterChange
 from sims.effects.sensor import SensorOffset, SensorScale
-from sims.simulator import Array, Channel
+from sims.simulator import Array, random_values
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
@@ -119,66 +120,91 @@ def exact_aliases(
     """
     rng = rng or np.random.default_rng(0)
     plain = simulator.with_effects(())
-    states, inputs = _random_rows(plain, 96, rng)
-    columns: dict[str, Array] = {}
+    states = plain.smooth_states(96, rng)
+    inputs = np.stack([random_values(c, 96, rng) for c in plain.action_channels], axis=1)
+    near: dict[str, Array] = {}
+    far: dict[str, Array] = {}
     for effect in library(plain):
         linear = isinstance(effect, JointEffect) and not isinstance(effect, DryFriction)
         if linear or isinstance(effect, ParameterChange | ActuatorGain | ActuatorBias):
             if len(effect.strengths()) != 1:
                 continue
-            column = _response(plain, effect, states, inputs)
-            if np.linalg.norm(column) > 0:
-                columns[str(effect)] = column / np.linalg.norm(column)
+            response = _response(plain, effect, states, inputs, 1e-4)
+            if np.any(response):
+                near[str(effect)] = response
+                far[str(effect)] = _response(plain, effect, states, inputs, 3e-4)
+    columns, blurs = _columns(near, far)
     found: list[Alias] = []
     alike: dict[str, list[str]] = {}
-    for name, column in columns.items():
-        twin = next((n for n in alike if _dependent([columns[n], column])), None)
+    for name in columns:
+        twin = next((n for n in alike if _dependent([n, name], columns, blurs)), None)
         alike.setdefault(twin or name, []).append(name)
     for twins in alike.values():
         if len(twins) > 1:
             says = f"{', '.join(twins)}: the same motion, no data tells which"
             found.append(Alias(tuple(twins), says))
     sets: list[set[str]] = []
+    involved = _in_null_space({name: columns[name] for name in alike}, blurs)
     for size in range(3, most + 1):
-        for names in itertools.combinations(alike, size):
+        for names in itertools.combinations(involved, size):
             if any(known <= set(names) for known in sets):
                 continue
-            if _dependent([columns[name] for name in names]):
+            if _dependent(names, columns, blurs):
                 sets.append(set(names))
                 rest = ", ".join(names)
                 found.append(Alias(names, f"{rest}: any one is a combination of the others"))
     return tuple(found)
 
 
-def _dependent(columns: list[Array]) -> bool:
-    return bool(np.linalg.svd(np.stack(columns), compute_uv=False)[-1] < 1e-6)
+def _columns(
+    near: dict[str, Array], far: dict[str, Array]
+) -> tuple[dict[str, Array], dict[str, float]]:
+    """Responses as vectors of unit length, and how far each is known.
+
+    A response to a change three times as large tells: states in which they differ, such as one
+    where a motor in a solver is just about to saturate, are left out.
+    """
+    smooth = np.ones(len(next(iter(near.values()))), dtype=bool) if near else np.empty(0, bool)
+    for name, response in near.items():
+        off = np.linalg.norm(response - far[name], axis=1)
+        smooth &= off < 1e-3 * np.sqrt(np.mean(response**2) * response.shape[1])
+    columns, blurs = {}, {}
+    for name, response in near.items():
+        size = np.linalg.norm(response[smooth])
+        if size > 0:
+            columns[name] = response[smooth].ravel() / size
+            blurs[name] = float(np.linalg.norm((response - far[name])[smooth]) / size)
+    return columns, blurs
 
 
-def _random_rows(simulator: HostSimulator, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    def draw(channel: Channel) -> Array:
-        size = np.pi if channel.angle else channel.scale
-        low, high = max(channel.low, -size), min(channel.high, size)
-        return rng.uniform(low, high, n)
-
-    states = np.stack([draw(channel) for channel in simulator.physical_channels], axis=1)
-    inputs = np.empty((n, len(simulator.action_channels)))
-    for j, channel in enumerate(simulator.action_channels):
-        inputs[:, j] = draw(channel)
-    return states, inputs
+def _in_null_space(columns: dict[str, Array], blurs: dict[str, float]) -> list[str]:
+    """Those that can be part of a dependent set: they have a share in some null vector of all."""
+    if not columns:
+        return []
+    matrix = np.stack(list(columns.values()), axis=1)
+    _, sizes, vectors = np.linalg.svd(matrix, full_matrices=False)
+    shares = np.abs(vectors[sizes < max(1e-3, 10 * max(blurs.values()))])
+    return [name for name, share in zip(columns, shares.T, strict=True) if (share > 1e-2).any()]
 
 
-def _response(simulator: HostSimulator, effect: Effect, states: Array, inputs: Array) -> Array:
-    """Change of the motion over a tenth of a control period per strength, flattened."""
+def _dependent(names: Sequence[str], columns: dict[str, Array], blurs: dict[str, float]) -> bool:
+    matrix = np.stack([columns[name] for name in names])
+    known = max(1e-6, 2 * max(blurs[name] for name in names))
+    return bool(np.linalg.svd(matrix, compute_uv=False)[-1] < known)
+
+
+def _response(
+    simulator: HostSimulator, effect: Effect, states: Array, inputs: Array, share: float
+) -> Array:
+    """Change of the motion over a tenth of a control period per strength, (n, n_s)."""
     (name,) = effect.strengths()
-    change = 1e-4 * effect.quantities(simulator)[name].scale
+    change = share * effect.quantities(simulator)[name].scale
     ends = []
     for value in (change, -change):
         changed = simulator.with_effects([effect.with_values(**{name: value})])
         # The actuator path is applied to the input here, where it has no memory.
-        commands = np.stack(
-            [changed.drive(row[None], np.array([1.0]), 2, "zero")[0] for row in inputs]
-        )
+        commands = changed.drive(inputs, np.ones(len(inputs)), 2, "zero")
         durations = np.full(len(states), 0.1 * simulator.dt)
         ends.append(changed.integrate(states, commands, durations))
     scale = np.array([channel.scale for channel in simulator.physical_channels])
-    return ((ends[0] - ends[1]) / (scale * change)).ravel()
+    return (ends[0] - ends[1]) / (scale * change)

@@ -1,6 +1,7 @@
 """Effects on Leo act at the level of forces, against the reference with the same force."""
 
 import functools
+import itertools
 
 import leo_reference as reference
 import numpy as np
@@ -16,6 +17,7 @@ from sims.effects import (
     QuadraticDrag,
     StribeckFriction,
     ViscousFriction,
+    exact_aliases,
 )
 from sims.leo import COORDINATES, Leo
 
@@ -177,3 +179,16 @@ def test_values_per_row_are_those_of_single_rows():
             states[i : i + 1], actions[i : i + 1]
         )
         assert np.array_equal(alone[0], together[i])
+
+
+@pytest.mark.long
+def test_only_what_no_walk_could_tell_apart_is_an_alias():
+    found = {frozenset(alias.effects) for alias in exact_aliases(Leo())}
+    # K / R times the supply and K^2 / R + friction are all that enters.
+    motor = ("torque_constant", "resistance", "supply", "friction")
+    expected = {frozenset(three) for three in itertools.combinations(motor, 3)}
+    expected |= {
+        frozenset([f"constant_load@{joint}", f"actuator_bias@{joint}_voltage"])
+        for joint in COORDINATES[3:]
+    }
+    assert found == expected
