@@ -33,6 +33,7 @@ ONE_THREAD = {
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
 }
 CONNECT_SECONDS = 20
+_LOST = "the {} at {} was lost: start it and give the same command again; nothing finished is lost"
 
 
 class WorkersError(RuntimeError):
@@ -132,10 +133,7 @@ def _dask(scheduler: str) -> Iterator[Run]:
         for future in distributed.as_completed(list(futures)):
             folder = futures.pop(future)
             if future.status == "cancelled":
-                raise WorkersError(
-                    f"the Dask scheduler at {scheduler} was lost: start it and give the "
-                    "same command again; finished trials are kept"
-                )
+                raise WorkersError(_LOST.format("Dask scheduler", scheduler))
             # An error here is not the trial's: its worker died too often, or cannot import it.
             failure = repr(future.exception()) if future.status == "error" else future.result()
             yield folder, failure
@@ -172,6 +170,8 @@ def _ray(scheduler: str) -> Iterator[Run]:
             folder = waiting.pop(ready)
             try:
                 failure = ray.get(ready)
+            except ray.exceptions.LocalRayletDiedError:
+                raise WorkersError(_LOST.format("Ray cluster", scheduler)) from None
             except ray.exceptions.RayError as problem:
                 failure = repr(problem)
             yield folder, failure
