@@ -91,7 +91,8 @@ class Leo(HostSimulator):
         friction: Viscous friction of all six joints, N m s/rad.
         stops: Whether the joints have the mechanical stops of the robot; the authors' model
             has none.
-        voltage: Largest voltage of the motors.
+        voltage: Largest voltage of the motors; 8.6 V in the authors' code at the time of the paper,
+            which learning takes longer with (docs/deviations.md).
         dt: Control period in seconds.
         substeps: Sub-steps per control period, each of five steps of Pymunk.
         effects: What acts beside all that.
@@ -106,7 +107,7 @@ class Leo(HostSimulator):
         torso_mass: float = IDEALISED_TORSO,
         friction: float = 0.0,
         stops: bool = False,
-        voltage: float = 8.6,
+        voltage: float = 10.7745,
         dt: float = 0.03,
         substeps: int = 30,
         effects: Sequence[Effect] = (),

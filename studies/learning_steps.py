@@ -36,9 +36,7 @@ from sims.tasks import Task
 from studies.files import atomic_write_json, read_json
 from studies.progress import Progress
 
-# Policies learnt from nothing explore more (paper, section IV-C: "slightly higher"; 0.20 in the
-# authors' scripts) and begin with random actions; the same for the baselines.
-COLD_SIGMA = 0.20
+# Policies learnt from nothing begin with random actions, the baselines too.
 RANDOM_STEPS = 1000
 
 
@@ -81,6 +79,8 @@ class Problem:
         task: Reward, start states, horizon.
         tests: How policies are tested.
         measures: What is reported of a rollout on the true system beside its return, by name.
+        cold_sigma: Exploration noise of policies learnt from nothing; the others have the
+            paper's. Slightly higher (paper, section IV-C), 0.20 in the authors' scripts.
         elsewhere: Draws states and actions of rollouts of the true system from anywhere, as
             ``residual.accuracy.uniform_rollouts``, which is used without it.
     """
@@ -91,6 +91,7 @@ class Problem:
     task: Task
     tests: PolicyTests = PolicyTests()
     measures: Callable[[Rollout], dict[str, float]] | None = None
+    cold_sigma: float = 0.20
     elsewhere: Callable[[np.random.Generator], tuple[Array, Array]] | None = None
 
     def environment(self, simulator: Simulator) -> SimulatorEnv:
@@ -110,7 +111,7 @@ class LearningSteps:
 
     def train_idealised(self, folder: Path, steps: int) -> None:
         """The policy that one gets from the idealised simulator alone."""
-        agent = self._agent(COLD_SIGMA)
+        agent = self._agent(self.problem.cold_sigma)
         env = self._environments(self.problem.idealised)
         self._train(folder, agent, env, steps, "train on the idealised model", RANDOM_STEPS)
 
@@ -173,7 +174,11 @@ class LearningSteps:
     def train_on_true(self, folder: Path, start: Path | None, steps: int) -> None:
         """A baseline: DDPG on the true system, from nothing or from a policy's networks."""
         if start is None:
-            agent, title, random_steps = self._agent(COLD_SIGMA), "cold start", RANDOM_STEPS
+            agent, title, random_steps = (
+                self._agent(self.problem.cold_sigma),
+                "cold start",
+                RANDOM_STEPS,
+            )
         else:
             agent, title, random_steps = self._agent(), "warm start", 0
             agent.restore(DDPG.load(start / "agent.safetensors").networks())

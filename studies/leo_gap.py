@@ -46,6 +46,9 @@ TESTS = PolicyTests(
     visited_stride=5,
 )
 
+# With the pendulum's 0.20 nothing walked within 60 000 steps (docs/deviations.md).
+COLD_SIGMA = 0.15
+
 
 @dataclasses.dataclass(frozen=True)
 class LeoTrial(GapTrial):
@@ -59,9 +62,9 @@ class LeoTrial(GapTrial):
     budget: Budget = dataclasses.field(
         default_factory=lambda: Budget(
             iterations=3,
-            idealised_steps=60_000,
+            idealised_steps=80_000,
             difference_steps=15_000,
-            true_steps=60_000,
+            true_steps=80_000,
             control_steps=15_000,
         )
     )
@@ -71,12 +74,17 @@ class LeoTrial(GapTrial):
 def problem(trial: LeoTrial, description: Mapping[str, Any]) -> Problem:
     """Walking with a heavier torso and friction in the joints."""
     return Problem(
-        description={**description, "tests": dataclasses.asdict(TESTS)},
+        description={
+            **description,
+            "tests": dataclasses.asdict(TESTS),
+            "cold_sigma": COLD_SIGMA,
+        },
         idealised=trial.simulator or Leo(),
         true=Leo.true(),
         task=Walking(start_at="around"),
         tests=TESTS,
         measures=walk_measures,
+        cold_sigma=COLD_SIGMA,
         elsewhere=random_poses,
     )
 
