@@ -123,3 +123,12 @@ def test_rescaling_removes_the_shrinkage_that_dropout_leaves():
     assert np.all(relative_error(rescaled, probe, truth) < relative_error(plain, probe, truth))
     slopes = [np.polyfit(rescaled.predict(X)[:, k], y[:, k], 1)[0] for k in range(2)]
     assert np.allclose(slopes, 1, atol=0.05)
+
+
+def test_very_many_rows_take_no_more_steps(monkeypatch):
+    monkeypatch.setattr("residual.dropout_net._ALL_EPOCHS", 400)
+    X = np.random.default_rng(0).normal(size=(1000, 1))
+    options = {"hidden": (2,), "epochs": 9, "batch_size": 100, "random_state": 0}
+    # A tenth of the rows is held out.
+    assert DropoutNet(**options).fit(X, X).epochs_ == 4
+    assert DropoutNet(**options).fit(X[:400], X[:400]).epochs_ == 9

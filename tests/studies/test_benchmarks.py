@@ -64,6 +64,28 @@ def measured():
     }  # fmt: skip
 
 
+def at_scale(name, points, seconds, error):
+    info: dict[str, object] = {
+        "estimator": name,
+        "points": points,
+        "fit_seconds": seconds,
+        "held_out_error": error,
+    }
+    info |= {"processor_seconds": 0.9 * seconds, "peak_megabytes": 400.0}
+    return entry(f"test_fit_at_scale[{name}-{points}]", seconds + 3, **info)
+
+
+@pytest.fixture
+def scaled(measured):
+    measured["benchmarks"] += [
+        at_scale("Linear", 10_000, 0.2, 0.1),
+        at_scale("Linear", 100_000, 2.0, 0.09),
+        at_scale("DropoutNet", 10_000, 20.0, 0.2),
+        at_scale("DropoutNet", 100_000, 360.0, 0.25),
+    ]
+    return measured
+
+
 def rows(page, start):
     """The cells of the table rows that begin with this cell."""
     lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("|")]
@@ -108,7 +130,9 @@ def test_targets_are_judged_in_both_directions(measured):
     found = verdicts(tables(measured))
     assert len(found) == 7
     assert found["DDPG, pendulum: times stable-baselines3's updates per second"] == "yes"
-    assert found["DDPG, pendulum: share of the matrix-multiply peak (goal)"].startswith("no: 0.80")
+    assert found["DDPG, pendulum: share of an update that is its matrix products"].startswith(
+        "no: 0.94"
+    )
     assert found["Linear: prediction of one row, ms"] == "yes"
     assert found["DropoutNet: prediction of one row, ms"].startswith("no: 1.50")
     assert found["the same: held-out error"] == "yes"
@@ -156,6 +180,28 @@ def test_without_the_suite_the_folder_is_named(tmp_path, capsys, monkeypatch):
     with pytest.raises(SystemExit):
         main([])
     assert str(tmp_path / benchmarks.SUITE) in capsys.readouterr().err
+
+
+def test_the_cost_of_a_fit_is_judged_by_time_and_error(scaled):
+    page = tables(scaled)
+    found = [(r[0], r[3]) for r in rows(page, "") if len(r) == 4 and "10000" in r[0]]
+    assert found == [
+        ("Linear: fit of 100000 Leo-sized points, s", "yes"),
+        ("the same: held-out error, against that at 10000", "yes"),
+        ("DropoutNet: fit of 100000 Leo-sized points, s", "no: 2.00 times that"),
+        ("the same: held-out error, against that at 10000", "no: 1.25 times that"),
+    ]
+    assert ["Linear", "100000", "2", "1.8", "400", "0.09"] in rows(page, "Linear")
+
+
+def test_the_page_shows_the_cost_of_a_fit_on_log_axes(scaled, tmp_path):
+    source, target = tmp_path / "measured.json", tmp_path / "docs" / "page.md"
+    source.write_text(json.dumps(scaled))
+    main(["--read", str(source), "--output", str(target)])
+    assert "](images/fit_scaling.png)" in target.read_text()
+    assert (tmp_path / "docs" / "images" / "fit_scaling.png").stat().st_size > 1000
+    numbers = (tmp_path / "docs" / "images" / "fit_scaling.csv").read_text()
+    assert len(numbers.splitlines()) == 5
 
 
 def test_a_table_without_rows_is_nothing():
