@@ -58,9 +58,9 @@ def share(hits: int, count: int) -> str:
     return f"{100 * hits / count:.0f} % ({hits}/{count}; {100 * low:.0f} to {100 * high:.0f})"
 
 
-def count(hits: int, count: int) -> str:
-    """``hits/count``, or a dash if there is nothing to count."""
-    return f"{hits}/{count}" if count else "-"
+def count(hits: int, total: int) -> str:
+    """``hits/total``, or a dash if there is nothing to count."""
+    return f"{hits}/{total}" if total else "-"
 
 
 def _share(column: pd.Series, form: Callable[[int, int], str] = share) -> str:
@@ -132,7 +132,8 @@ def headlines(data: pd.DataFrame) -> pd.DataFrame:
     )
     add("nothing hidden, yet a name", "at most 1 %", ours[nothing], named)
     add("nothing hidden, yet unexplained", "at most 3 %", ours[nothing], ours["unexplained"])
-    add("removed from the library: unexplained", "90 %", ours[removed], ours["unexplained"])
+    left = ours["unexplained"].astype(bool) | ours["first_alike"].eq(True)
+    add("removed from the library: unexplained, or a near-twin", "90 %", ours[removed], left)
     add("removed: a confident wrong name", "", ours[removed], wrong)
     outside = ours[ours["block"] == "outside"]
     add("outside of every library: unexplained", "", outside, ours["unexplained"])
