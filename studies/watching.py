@@ -22,7 +22,8 @@ from studies.files import atomic_write_json, read_json
 from studies.progress import Advance
 
 STATUS = "status.json"
-EVERY = 2.0  # seconds between two writes of a trial, and at least between two looks at all
+WRITE_EVERY = 10.0  # seconds; hundreds of trials share a file system
+LOOK_EVERY = 2.0  # seconds
 SHOWN = 8  # running trials with a line of their own
 
 
@@ -35,11 +36,11 @@ class StatusFile:
 
     @contextlib.contextmanager
     def task(self, title: str, total: int) -> Iterator[Advance]:
-        """A step of ``total`` units; written at its start and every two seconds."""
+        """A step of ``total`` units; written at its start and every ten seconds."""
         self._write(title, 0, total, "")
 
         def advance(done: int, note: str = "", values: Mapping[str, float] | None = None) -> None:
-            if time.monotonic() - self._written >= EVERY:
+            if time.monotonic() - self._written >= WRITE_EVERY:
                 self._write(title, done, total, note)
 
         yield advance
@@ -108,7 +109,7 @@ class TrialsView:
 
     def _watch(self) -> None:
         # Looking at ten thousand folders every two seconds would load a network file system.
-        while not self._ended.wait(max(EVERY, len(self._waiting) / 100)):
+        while not self._ended.wait(max(LOOK_EVERY, len(self._waiting) / 100)):
             self._show()
 
     def _show(self) -> None:

@@ -9,7 +9,7 @@ from studies.watching import StatusFile, TrialsView, running
 
 
 def test_a_running_trial_says_where_it_is(tmp_path, monkeypatch):
-    monkeypatch.setattr("studies.watching.EVERY", 0.0)
+    monkeypatch.setattr("studies.watching.WRITE_EVERY", 0.0)
     status = StatusFile(tmp_path / "one")
     with status.task("train", 200) as tell:
         tell(50, "return -3")
