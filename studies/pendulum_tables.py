@@ -59,7 +59,9 @@ def write_grid_report(
             list(summary.columns),
             summary.astype(object).where(summary.notna(), None).values.tolist(),
             caption="Return on the true pendulum: mean over seeds with its 95 % interval. The "
-            f"best return that physics allows is {optimum:.0f} (value iteration on a grid).",
+            f"best return that physics allows is {optimum:.0f} (value iteration on a grid). Error: "
+            "of one step where the policy goes, as a share of the gap, mean of both channels; in "
+            "90 %: share of the truth inside the predicted 90 % interval.",
             digits=4,
             heading="All policies",
         )
@@ -126,8 +128,8 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
                 returns(part),
             )
             | {
-                "one-step error": round(one_step, 4),
-                "90 % coverage": seen["coverage90"].astype(float).mean(),
+                "error": round(one_step, 4),
+                "in 90 %": round(seen["coverage90"].astype(float).mean(), 3),
                 "fit s": round(seen["fit_seconds"].mean(), 2),
             }
         )
@@ -144,7 +146,7 @@ def _row(policy: str, samples: int, value: Mean) -> dict[str, Any]:
         "policy": policy,
         "true samples": samples,
         "return": str(value),
-        "worst seed": round(value.worst, 1),
+        "worst": round(value.worst),
         "seeds": value.count,
     }
 
