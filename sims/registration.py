@@ -43,13 +43,13 @@ def idealised_leo(
 
     Args:
         render_mode: As for every environment of Gymnasium.
-        observed: See ``SimulatorEnv``; ``sims.walking.AUTHORS_OBSERVATION`` is the authors'.
+        observed: See ``SimulatorEnv``; ``sims.leo.walking.AUTHORS_OBSERVATION`` is the authors'.
         stops: Whether the joints have mechanical stops.
-        task: Goes to ``sims.walking.Walking``.
+        task: Goes to ``sims.leo.walking.Walking``.
     """
     from sims.environment import SimulatorEnv
-    from sims.leo import Leo
-    from sims.walking import Walking
+    from sims.leo.simulator import Leo
+    from sims.leo.walking import Walking
 
     return SimulatorEnv(Leo(stops=stops), Walking(**task), render_mode, observed)
 
@@ -62,8 +62,8 @@ def true_leo(
 ) -> SimulatorEnv:
     """The true Leo (heavier torso, joints with friction); arguments as for ``idealised_leo``."""
     from sims.environment import SimulatorEnv
-    from sims.leo import Leo
-    from sims.walking import Walking
+    from sims.leo.simulator import Leo
+    from sims.leo.walking import Walking
 
     return SimulatorEnv(Leo.true(stops=stops), Walking(**task), render_mode, observed)
 

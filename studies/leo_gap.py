@@ -22,10 +22,9 @@ from typing import Any
 import numpy as np
 
 from policy.evaluate import Rollout
-from sims.leo import Leo
-from sims.leo_body import clearance
+from sims.leo import Leo, Walking, measure_walk
+from sims.leo.body import clearance
 from sims.simulator import Array, Simulator
-from sims.walking import Walking, measure_walk
 from studies.command import Parser
 from studies.difference_learning import Budget
 from studies.gap_study import GapStudy, GapTrial, run_command

@@ -35,11 +35,7 @@ def write_tables(
 def policy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """One row per policy of every trial."""
     return pd.DataFrame(
-        [
-            _trial(trial) | _policy(policy)
-            for trial in results
-            for policy in trial["policies"]
-        ]
+        [_trial(trial) | _policy(policy) for trial in results for policy in trial["policies"]]
     )
 
 

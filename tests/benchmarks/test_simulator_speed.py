@@ -28,11 +28,11 @@ from residual.linear import Linear
 from sims.effects import CoulombFriction, ViscousFriction
 from sims.environment import SimulatorEnv
 from sims.leo import Leo
+from sims.leo.walking import Walking
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Simulator
 from sims.tasks import SwingUp, Task
-from sims.walking import Walking
 
 # Processor time of this one thread: another program on the core then does not count.
 TIMER = time.thread_time

@@ -13,7 +13,7 @@ from leo_rows import flying, squat, standing, struggling, walking
 
 from sims.checks import check_simulator
 from sims.leo import Leo
-from sims.walking import Walking
+from sims.leo.walking import Walking
 
 SYSTEMS = {
     "idealised": (Leo(), reference.System()),

@@ -19,7 +19,7 @@ from sims.effects import (
     ViscousFriction,
     exact_aliases,
 )
-from sims.leo import COORDINATES, Leo
+from sims.leo.simulator import COORDINATES, Leo
 
 
 @functools.cache

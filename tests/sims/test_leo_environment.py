@@ -8,8 +8,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from sims.environment import SimulatorEnv, observe
-from sims.leo import STATE_CHANNELS, Leo
-from sims.walking import AUTHORS_OBSERVATION, Walking
+from sims.leo.simulator import STATE_CHANNELS, Leo
+from sims.leo.walking import AUTHORS_OBSERVATION, Walking
 
 
 @pytest.mark.parametrize("name", ["Idealised", "True"])

@@ -6,8 +6,8 @@ import pytest
 from leo_rows import flying
 
 from sims.leo import Leo
-from sims.leo_body import centre_of_mass, clearance
-from sims.walking import Walking, electrical_work, measure_walk
+from sims.leo.body import centre_of_mass, clearance
+from sims.leo.walking import Walking, electrical_work, measure_walk
 
 K, R = 0.006325081 * 212.6, 4.6
 

@@ -8,7 +8,7 @@ from residual import Linear
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
 from studies.difference_learning import Budget, learn_by_difference
-from studies.learning_steps import Problem, PolicyTests
+from studies.learning_steps import PolicyTests, Problem
 from studies.progress import Silent
 from studies.stages import Stages
 

@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 import pymunk
 from pymunk._chipmunk_cffi import lib
 
-from sims.leo_body import (
+from sims.leo.body import (
     FOOT,
     GROUND,
     HEEL,
@@ -48,7 +48,7 @@ STOPS = ((-0.785398, 2.548181), (-2.617994, 0.034907), (-1.570796, 1.448623))
 
 @dataclasses.dataclass(frozen=True)
 class Build:
-    """What one row of a batch is made of; SI units, see ``sims.leo.leo_parameters``."""
+    """What one row of a batch is made of; SI units, see ``sims.leo.simulator.leo_parameters``."""
 
     torso_mass: float
     torso_inertia: float

@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from sims.leo import RESISTANCE, TORQUE_CONSTANT
-from sims.leo_body import COORDINATES, GEAR, MOTORS, centre_of_mass, clearance
+from sims.leo.body import COORDINATES, GEAR, MOTORS, centre_of_mass, clearance
+from sims.leo.simulator import RESISTANCE, TORQUE_CONSTANT
 from sims.simulator import Array
 from sims.tasks import Task
 
@@ -61,7 +61,7 @@ class Walking(Task):
         return state
 
     def reward(self, states: Array, actions: Array, next_states: Array) -> Array:
-        """Reward per step; columns of states as in ``sims.leo.STATE_CHANNELS``, of actions V."""
+        """Reward per step, from states as in ``STATE_CHANNELS`` and actions in V."""
         ahead = centre_of_mass(next_states[:, :9])[:, 0] - centre_of_mass(states[:, :9])[:, 0]
         work = electrical_work(states, actions, next_states, self.dt)
         return 300 * ahead - 1.5 - 2 * work - 75 * self.terminal(next_states)

@@ -8,8 +8,8 @@ from sims.effects.backlash import Backlash
 from sims.effects.base import Effect
 from sims.effects.friction import CoulombFriction, DryFriction
 from sims.effects.joint import ConstantLoad, JointEffect, ViscousFriction
-from sims.leo_body import COORDINATES
-from sims.leo_chain import Chain
+from sims.leo.body import COORDINATES
+from sims.leo.chain import Chain
 
 BASE = 3
 """The first coordinates - x, z and pitch - have no motor."""

@@ -10,10 +10,10 @@ import numpy as np
 
 from sims.effects.base import Effect
 from sims.host import HostSimulator, Joint
-from sims.leo_body import ARM, COORDINATES, FOOT, GEAR, MOTORS, SHANK, THIGH, TORSO
-from sims.leo_chain import Build, chain
-from sims.leo_forces import Forces
-from sims.leo_render import LeoRenderer
+from sims.leo.body import ARM, COORDINATES, FOOT, GEAR, MOTORS, SHANK, THIGH, TORSO
+from sims.leo.chain import Build, chain
+from sims.leo.forces import Forces
+from sims.leo.render import LeoRenderer
 from sims.simulator import Array, Channel, Parameter
 
 IDEALISED_TORSO, TRUE_TORSO = TORSO.mass, 1.25

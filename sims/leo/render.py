@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image, ImageDraw
 
-from sims.leo_body import ANKLE, GROUND, HAND, HEEL, HIP, KNEE, SHOULDER, TOE, WHEEL, frames, turned
+from sims.leo.body import ANKLE, GROUND, HAND, HEEL, HIP, KNEE, SHOULDER, TOE, WHEEL, frames, turned
 from sims.simulator import Array
 
 _SIZE = 240
