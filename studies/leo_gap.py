@@ -109,14 +109,18 @@ def random_poses(
 
 
 def walk_measures(run: Rollout) -> dict[str, float]:
-    """Distance in m, time in s, whether it fell, and both readings of the work in J/m."""
+    """Distance in m, time in s, whether it fell, and both readings of the work in J/m.
+
+    A walk that leads nowhere has no work per metre: NaN.
+    """
     walk = measure_walk(visited(run), run.actions)
+    metres = walk.distance if walk.distance > 0 else np.nan
     return {
         "distance": walk.distance,
         "seconds": walk.time,
         "fell": float(walk.fell),
-        "work_per_metre": walk.work_per_metre,
-        "bare_work_per_metre": walk.work_without_gear_per_metre,
+        "work_per_metre": walk.work / metres,
+        "bare_work_per_metre": walk.work_without_gear / metres,
     }
 
 

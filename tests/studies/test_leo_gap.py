@@ -1,0 +1,83 @@
+"""The biped's study from command to report, with next to no training."""
+
+import json
+
+import numpy as np
+import pytest
+
+from studies import leo_gap
+from studies.leo_report import grouped
+from studies.leo_tables import write_grid_report
+
+TINY = [
+    "--estimator", "residual.Linear",
+    "--budget.true_samples", "40",
+    "--budget.iterations", "1",
+    "--budget.idealised_steps", "80",
+    "--budget.difference_steps", "60",
+    "--budget.control_steps", "60",
+    "--budget.true_steps", "80",
+    "--budget.baseline_steps", "60",
+    "--ddpg.hidden", "[8, 8]",
+    "--ddpg.warm_up", "20",
+    "--ddpg.batch", "8",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("leo") / "run"
+    leo_gap.main([*TINY, "--output", str(folder)])
+    return folder
+
+
+@pytest.fixture(scope="module")
+def results(folder):
+    return json.loads((folder / "results.json").read_text())
+
+
+def test_every_policy_is_walked_on_the_true_leo_from_several_starts(results):
+    named = {(policy["name"], policy["iteration"]): policy for policy in results["policies"]}
+    assert set(named) == {
+        ("idealised", 0), ("difference", 1), ("control", 1), ("true", 0), ("cold", 0), ("warm", 0),
+    }  # fmt: skip
+    for key in (("idealised", 0), ("difference", 1), ("control", 1), ("true", 0)):
+        tests = named[key]["tests"]
+        assert len(tests) == leo_gap.TESTS.episodes
+        assert named[key]["return_true"] == pytest.approx(np.mean([t["return"] for t in tests]))
+        for test in tests:
+            assert test["fell"] == (test["seconds"] < 20.0)
+            walked = test["distance"] > 0
+            assert (test["work_per_metre"] is not None) == walked
+            assert (test["bare_work_per_metre"] is not None) == walked
+
+
+def test_accuracy_is_told_by_group(results):
+    (accuracy,) = results["accuracy"]
+    assert set(grouped(accuracy["visited"]["one_step"])) == {
+        "base", "joint angles", "base rates", "joint rates",
+    }  # fmt: skip
+
+
+def test_the_report_shows_it_walking_and_carries_everything(folder):
+    page = (folder / "report.html").read_text()
+    assert page.count("data:image/gif") == 3
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    for name in ("torso", "updates", "curves"):
+        assert (folder / "figures" / f"{name}.png").stat().st_size > 1000
+
+
+def test_a_table_over_trials(results, tmp_path):
+    other = json.loads(json.dumps(results)) | {"seed": 1}
+    text = write_grid_report([results, other], {}, tmp_path)
+    assert "Linear, update 1" in text and "no difference model, update 1" in text
+    page = (tmp_path / "report.html").read_text()
+    assert "Table III" in page and "309 766" in page
+
+
+def test_a_wrong_budget_is_one_line(capsys, tmp_path):
+    with pytest.raises(SystemExit) as stopped:
+        leo_gap.main(["--budget.true_samples", "1", "--output", str(tmp_path / "run")])
+    assert stopped.value.code == 2
+    assert "true_samples" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
