@@ -105,9 +105,10 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
     shared = rows[rows["name"] != "difference"].drop_duplicates(
         ["name", "seed", "true_samples", "return_true"]
     )
-    for _, part in shared.groupby(["name", "true_samples"], sort=False):
+    other = [column for column in ("settings",) if column in shared]
+    for _, part in shared.groupby(["name", "true_samples", *other], sort=False):
         first = part.iloc[0]
-        words = POLICY_WORDS[first["name"]]
+        words = ", ".join([POLICY_WORDS[first["name"]], *(first[column] for column in other)])
         table.append(_row(words, int(first["true_samples"]), returns(part)))
     learnt = rows[rows["name"] == "difference"]
     keys = ["estimator", "samples_per_update", "iteration"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,17 @@ from typing import Any
 import pandas as pd
 
 from studies.files import atomic_path, atomic_write_json, atomic_write_text
+
+# Policies of trials that differ in these only are the same, or stand in rows of their own.
+_IN_COLUMNS = {
+    "seed",
+    *(
+        f"budget.{name}"
+        for name in (
+            "true_samples", "iterations", "true_steps", "baseline_steps", "control_steps",
+        )
+    ),
+}  # fmt: skip
 
 
 def write_tables(
@@ -23,13 +35,46 @@ def write_tables(
     Returns:
         The two tables.
     """
-    rows, errors = policy_rows(results), accuracy_rows(results)
+    named = apart(results)
+    rows, errors = policy_rows(named), accuracy_rows(named)
     for name, table in (("results", rows), ("accuracy", errors)):
         atomic_write_text(folder / f"{name}.csv", table.to_csv(index=False))
         with atomic_path(folder / f"{name}.parquet") as path:
             table.to_parquet(path, index=False)
     atomic_write_json(folder / "results.json", {"trials": list(results)})
     return rows, errors
+
+
+def apart(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """The trials, those with other settings told apart by their label.
+
+    A mean over the trials of one label must not mix settings. Whatever differs between trials,
+    beside what the tables have columns for, becomes part of the label and is kept as
+    ``settings``.
+    """
+    flat = [_flat(trial["config"]) for trial in results]
+    names = dict.fromkeys(name for settings in flat for name in settings)
+    differing = [
+        name
+        for name in names
+        if name.split(".")[0] != "estimator"
+        and name not in _IN_COLUMNS
+        and len({json.dumps(settings.get(name)) for settings in flat}) > 1
+    ]
+    named = []
+    for trial, settings in zip(results, flat, strict=True):
+        text = ", ".join(f"{name}={settings.get(name)}" for name in differing)
+        more = {"label": f"{trial['label']}, {text}", "settings": text} if text else {}
+        named.append(dict(trial) | more)
+    return named
+
+
+def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in settings.items():
+        nested = isinstance(value, Mapping)
+        flat |= _flat(value, f"{prefix}{name}.") if nested else {f"{prefix}{name}": value}
+    return flat
 
 
 def policy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
@@ -75,4 +120,5 @@ def _trial(trial: Mapping[str, Any]) -> dict[str, Any]:
         "estimator": trial["label"],
         "seed": trial["seed"],
         "samples_per_update": trial["config"]["budget"]["true_samples"],
+        **({"settings": trial["settings"]} if "settings" in trial else {}),
     }

@@ -1,0 +1,37 @@
+"""Tables keep apart what differs."""
+
+from studies.study_tables import apart, policy_rows
+
+
+def trial(seed, label="Linear", **settings):
+    config = {"seed": seed, "estimator": {"class_path": label}, "caution": 0.0}
+    config |= {"budget": {"true_samples": 40, "iterations": 1}, "ddpg": {"gamma": 0.99}}
+    policy = {"name": "idealised", "return_true": -1.0}
+    return {"label": label, "seed": seed, "config": config | settings, "policies": [policy]}
+
+
+def labels(*trials):
+    return [named["label"] for named in apart(trials)]
+
+
+def test_seeds_and_estimators_need_no_other_label():
+    assert labels(trial(0), trial(1), trial(0, "Other")) == ["Linear", "Linear", "Other"]
+    assert "settings" not in policy_rows(apart([trial(0), trial(1)]))
+
+
+def test_a_mean_never_mixes_settings():
+    gentle, bold = trial(0, ddpg={"gamma": 0.9}), trial(0)
+    assert labels(gentle, bold) == ["Linear, ddpg.gamma=0.9", "Linear, ddpg.gamma=0.99"]
+    rows = policy_rows(apart([gentle, bold]))
+    assert list(rows["settings"]) == ["ddpg.gamma=0.9", "ddpg.gamma=0.99"]
+
+
+def test_what_has_a_column_is_no_part_of_the_label():
+    small, large = ({"true_samples": n, "iterations": n} for n in (1, 2))
+    assert labels(trial(0, budget=small), trial(0, budget=large)) == ["Linear", "Linear"]
+
+
+def test_settings_that_older_trials_lack_keep_them_apart():
+    old = trial(0)
+    del old["config"]["caution"]
+    assert labels(old, trial(0)) == ["Linear, caution=None", "Linear, caution=0.0"]
