@@ -88,7 +88,7 @@ def _policy(record: Mapping[str, Any]) -> dict[str, Any]:
     """A policy's record without its curve, and with the means of its tests by measure."""
     flat = {name: value for name, value in record.items() if name not in ("curve", "tests")}
     tests = pd.DataFrame(record.get("tests", [])).drop(columns="return", errors="ignore")
-    return flat | tests.mean().to_dict()
+    return flat | {str(name): value for name, value in tests.mean().items()}
 
 
 def accuracy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
