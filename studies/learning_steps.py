@@ -276,7 +276,8 @@ class LearningSteps:
         with self.progress.task(title, steps) as tell:
 
             def report(point: Point) -> None:
-                tell(point.step, f"return {point.deterministic:.0f}")
+                numbers = {"return": point.deterministic}
+                tell(point.step, f"return {point.deterministic:.0f}", numbers)
 
             selection = learn_and_select(
                 agent,
