@@ -6,14 +6,17 @@ import json
 import numpy as np
 import pytest
 
+from residual.gap.adequacy import CHANCE, ERRORS
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
+from studies.hidden_calibration import run_set, table
 from studies.hidden_data import Truth, make_logs
 from studies.hidden_effects import Block, HiddenStudy, main, trials_of
 from studies.hidden_report import share
 from studies.hidden_rivals import one_step, regression
 from studies.hidden_scores import score_names
 from studies.hidden_strengths import HIDDEN, sizes, strength, truth
+from studies.progress import Silent
 
 
 def test_every_strength_makes_the_gap_that_was_asked_for():
@@ -67,9 +70,19 @@ def test_one_step_regression_names_a_mass_when_the_rate_is_measured():
     assert one_step(regression(simulator, library(simulator), logs, False))[0] == "mass"
 
 
+def test_noise_alone_stays_below_every_threshold(tmp_path):
+    config = {"excitation": "weak", "noise": "A", "runs": 5, "seed": 5}
+    found = run_set(config, tmp_path, Silent())
+    assert found["chosen"] == 0
+    assert found["gain"] < found["threshold"]
+    assert found["ratio_in_errors"] < ERRORS
+    assert found["chance"] > CHANCE
+    assert table([found])["sets"].tolist() == [1, 1]
+
+
 def test_fast_subset(tmp_path, capsys):
     main(["--config", "studies/configs/hidden_effects/fast.yaml", "--output", str(tmp_path)])
-    assert "single" in capsys.readouterr().out
+    assert "first name right" in capsys.readouterr().out
     for name in ("report.html", "sets.csv", "cells.csv", "rivals.csv", "confusion.png"):
         assert (tmp_path / name).stat().st_size > 0
     said = {
