@@ -76,10 +76,10 @@ def kick(
         if joint.width > 0:
             side = 1 if x >= edge and pushing >= 0 else -1 if x <= -edge and pushing <= 0 else 0
         opened = joint.width > 0 and side == 0
-        slip = (rate > 0) - (rate < 0) if holds > 0 else 0
+        slip = int(rate > 0) - int(rate < 0) if holds > 0 else 0
         if holds > 0 and rate == 0:
             pull = joint.torque(angle, 0.0, load, u, opened)
-            slip = (pull > holds) - (pull < -holds)
+            slip = int(pull > holds) - int(pull < -holds)
         mode = _Mode(joint, angle, load, u, slip, side, opened, stuck=holds > 0 and slip == 0)
         after = mode.after(rate, x, left)
         over = [end for end in mode.ends() if mode.margin(end, *after) < 0]

@@ -34,13 +34,14 @@ from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.command import HelpFormatter, Parser, fail
+from studies.files import atomic_write_json, read_json
 from studies.hidden_data import Excitation, make_logs
 from studies.hidden_report import summary, write_report
 from studies.hidden_rivals import one_step, regression, sparse
 from studies.hidden_scores import alike, replaceable, score, score_names
 from studies.hidden_strengths import HIDDEN, draw, strength, truth
 from studies.progress import Progress
-from studies.trials import Execution, run_trials, trial_folder
+from studies.trials import Execution, read_trials, run_trials, trial_folder
 
 RESULTS = Path("results/hidden_effects")
 #: Effects that no library holds, as fields of ``Truth`` at a size that is seen.
@@ -227,6 +228,17 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
     return {"config": dict(config), "strengths": strengths, "answers": answers}
 
 
+def rebuild(folder: Path) -> None:
+    """Write the report again from the finished sets, for ``studies.report``.
+
+    Args:
+        folder: Where the sets are: ``sets`` in the output folder.
+    """
+    results, _ = read_trials(folder)
+    write_report(results, folder.parent, read_json(folder.parent / "settings.json"))
+    print(f"{summary(results)}\n\nreport: {folder.parent / 'report.html'}")
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     parser = build_parser()
@@ -242,9 +254,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     folders = {
         trial_folder(output / "sets", "-".join([c["block"], *c["hidden"]]), c): c for c in cells
     }
+    settings = json.loads(parser.dump(given, format="json"))
+    atomic_write_json(output / "settings.json", settings)
     results, failures = run_trials("hidden_effects", folders, run_set, Execution(jobs=given.jobs))
     if results:
-        write_report(results, output, json.loads(parser.dump(given, format="json")))
+        write_report(results, output, settings)
         print(f"\n{summary(results)}\n\nreport: {output / 'report.html'}")
     for folder, failure in failures.items():
         reason = failure.strip().splitlines()[-1]

@@ -4,6 +4,7 @@ Nothing is computed again: of a study that is still running, or was killed, the 
 are shown.
 
   python -m studies.report results/pendulum_gap/budgets
+  python -m studies.report results/hidden_effects/sets
 """
 
 from __future__ import annotations

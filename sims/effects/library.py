@@ -121,7 +121,9 @@ def exact_aliases(
     rng = rng or np.random.default_rng(0)
     plain = simulator.with_effects(())
     states = plain.smooth_states(96, rng)
-    inputs = np.stack([random_values(c, 96, rng) for c in plain.action_channels], axis=1)
+    inputs = np.empty((96, len(plain.action_channels)))  # a system may have none
+    for column, channel in enumerate(plain.action_channels):
+        inputs[:, column] = random_values(channel, 96, rng)
     near: dict[str, Array] = {}
     far: dict[str, Array] = {}
     for effect in library(plain):

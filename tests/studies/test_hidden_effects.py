@@ -9,6 +9,7 @@ import pytest
 from residual.gap.adequacy import CHANCE, ERRORS
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
+from studies import report
 from studies.hidden_calibration import run_set, table
 from studies.hidden_data import Truth, make_logs
 from studies.hidden_effects import Block, HiddenStudy, main, trials_of
@@ -94,3 +95,6 @@ def test_fast_subset(tmp_path, capsys):
     assert said["no gap",]["kinds"][0] == "no_gap"
     assert said["outside", "wind"]["unexplained"]
     assert said["outside", "wind"]["sure"] == []
+    (tmp_path / "cells.csv").unlink()
+    report.main([str(tmp_path / "sets")])
+    assert (tmp_path / "cells.csv").stat().st_size > 0
