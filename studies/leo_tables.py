@@ -87,7 +87,8 @@ def summarise(rows: pd.DataFrame) -> pd.DataFrame:
     rows = rows.drop_duplicates(["name", "estimator", "iteration", "true_samples", "seed"])
     table = []
     keys = ["name", "estimator", "iteration", "true_samples"]
-    for (name, estimator, iteration, samples), part in rows.groupby(keys, sort=False):
+    for _, part in rows.groupby(keys, sort=False):
+        name, estimator, iteration, samples = part.iloc[0][keys]
         words = POLICY_WORDS[name].format(iteration=iteration)
         returned = mean(part["return_true"].tolist())
         row: dict[str, Any] = {
@@ -206,7 +207,8 @@ def updates_figure(rows: pd.DataFrame, path: Path) -> Drawing:
         loops.append(("no difference model", control))
     for colour, (label, part) in zip(PALETTE, loops, strict=False):
         means = {0: mean(idealised)} | {
-            int(k): mean(group["return_true"].tolist()) for k, group in part.groupby("iteration")
+            int(group["iteration"].iloc[0]): mean(group["return_true"].tolist())
+            for _, group in part.groupby("iteration")
         }
         values = list(means.values())
         axis.plot(list(means), [m.value for m in values], "o-", color=colour, label=label)
