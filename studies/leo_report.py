@@ -307,7 +307,7 @@ def curves_figure(results: Results, path: Path) -> Drawing:
 
 def walking_section(results: Results) -> Table:
     """Distance, work and falls on the true system (the paper's Table III)."""
-    rows = []
+    rows: list[list[Cell]] = []
     for record in results["policies"]:
         if "tests" in record:
             tests = averaged(record)
