@@ -13,8 +13,9 @@ from matplotlib.figure import Figure as Drawing
 from sims.leo import Leo
 from studies.policy_records import (
     Results,
+    accuracy_line,
     last_difference,
-    load_rollout,
+    load_rollouts,
     policies_section,
     policy_name,
     provenance,
@@ -95,13 +96,10 @@ def policy_table(results: Results) -> str:
             }
         rows.append(row)
     lines = [pd.DataFrame(rows).to_string(index=False, na_rep="")]
-    for record in results["accuracy"]:
-        errors = grouped(record["visited"]["one_step"])
-        text = ", ".join(f"{name} {error:.2f}" for name, error in errors.items())
-        lines.append(
-            f"update {record['iteration']}: one-step error where the policy goes, as a share of "
-            f"the gap: {text}; fitted in {record['fit_seconds']:.1f} s"
-        )
+    lines += [
+        accuracy_line(record, grouped(record["visited"]["one_step"]), 2)
+        for record in results["accuracy"]
+    ]
     return "\n".join(lines)
 
 
@@ -113,11 +111,7 @@ def write_report(results: Results, folder: Path) -> Path:
         folder: The trial's folder, with ``rollouts/``.
     """
     titles = {record_key(record): policy_name(record) for record in results["policies"]}
-    rollouts = {
-        key: load_rollout(folder / "rollouts" / f"{key}.npz")
-        for key in titles
-        if (folder / "rollouts" / f"{key}.npz").exists()
-    }
+    rollouts = load_rollouts(results, folder)
     learnt = last_difference(results)
     shown = ["idealised", *([record_key(learnt)] if learnt else []), "true"]
     shown = [key for key in shown if key in rollouts]

@@ -11,8 +11,8 @@ import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
 from studies.leo_report import NEAR
-from studies.policy_records import POLICY_WORDS
-from studies.reporting import Code, Figure, KeyValues, Report, Section, Table, Verdict
+from studies.policy_records import POLICY_WORDS, failures_section
+from studies.reporting import Figure, KeyValues, Report, Section, Table, Verdict
 from studies.reporting.figures import PALETTE, new_figure, save_figure, styled
 from studies.statistics import Mean, mean
 from studies.study_tables import write_tables
@@ -47,14 +47,7 @@ def write_grid_report(
     rows, _ = write_tables(results, folder)
     summary = summarise(rows)
     sections: list[Section] = [headline(rows)]
-    if failures:
-        sections.append(
-            Code(
-                "\n".join(f"{path}\n{text}" for path, text in failures.items()),
-                summary=f"{len(failures)} trials failed and are in no mean",
-                heading="Failed trials",
-            )
-        )
+    sections += failures_section(failures)
     sections += [
         Table(
             list(summary.columns),

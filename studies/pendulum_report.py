@@ -13,8 +13,9 @@ from matplotlib.figure import Figure as Drawing
 from sims.render import PendulumRenderer
 from studies.policy_records import (
     Results,
+    accuracy_line,
     last_difference,
-    load_rollout,
+    load_rollouts,
     policies_section,
     policy_name,
     provenance,
@@ -50,13 +51,9 @@ def policy_table(results: Results) -> str:
         for record in results["policies"]
     ]
     lines = [pd.DataFrame(rows).to_string(index=False)]
-    for record in results["accuracy"]:
-        one_step = record["visited"]["one_step"]
-        errors = ", ".join(f"{name} {error:.3f}" for name, error in one_step.items())
-        lines.append(
-            f"update {record['iteration']}: one-step error where the policy goes, as a share of "
-            f"the gap: {errors}; fitted in {record['fit_seconds']:.1f} s"
-        )
+    lines += [
+        accuracy_line(record, record["visited"]["one_step"], 3) for record in results["accuracy"]
+    ]
     return "\n".join(lines)
 
 
@@ -67,11 +64,7 @@ def write_report(results: Results, folder: Path) -> Path:
         results: What ``results.json`` holds.
         folder: The trial's folder, with ``rollouts/``.
     """
-    rollouts = {
-        record_key(record): load_rollout(folder / "rollouts" / f"{record_key(record)}.npz")
-        for record in results["policies"]
-        if (folder / "rollouts" / f"{record_key(record)}.npz").exists()
-    }
+    rollouts = load_rollouts(results, folder)
     titles = {record_key(record): policy_name(record) for record in results["policies"]}
     figures = folder / "figures"
     sections: list[Section] = [verdict(results), tiles(results)]

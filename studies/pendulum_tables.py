@@ -15,8 +15,8 @@ from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
 from studies.pendulum_report import TARGET
-from studies.policy_records import POLICY_WORDS
-from studies.reporting import Code, Figure, KeyValues, Prose, Report, Section, Table, Verdict
+from studies.policy_records import POLICY_WORDS, failures_section
+from studies.reporting import Figure, KeyValues, Prose, Report, Section, Table, Verdict
 from studies.reporting.figures import PALETTE, new_figure, save_figure, styled
 from studies.statistics import Mean, mean
 from studies.study_tables import write_tables
@@ -46,14 +46,7 @@ def write_grid_report(
     optimum = best_possible(bool(results[0]["config"]["inertia_follows_mass"]))
     summary = summarise(rows, errors)
     sections: list[Section] = [headline(rows, optimum)]
-    if failures:
-        sections.append(
-            Code(
-                "\n".join(f"{path}\n{text}" for path, text in failures.items()),
-                summary=f"{len(failures)} trials failed and are in no mean",
-                heading="Failed trials",
-            )
-        )
+    sections += failures_section(failures)
     sections.append(
         Table(
             list(summary.columns),

@@ -41,10 +41,43 @@ def load_rollout(path: Path) -> dict[str, np.ndarray]:
         return dict(data)
 
 
+def load_rollouts(results: Results, folder: Path) -> dict[str, dict[str, np.ndarray]]:
+    """The episode of every policy that left one in ``folder/rollouts``, by ``record_key``."""
+    paths = {
+        record_key(record): folder / "rollouts" / f"{record_key(record)}.npz"
+        for record in results["policies"]
+    }
+    return {key: load_rollout(path) for key, path in paths.items() if path.exists()}
+
+
 def last_difference(results: Results) -> Mapping[str, Any] | None:
     """The policy after the last update, if there was one."""
     learnt = [record for record in results["policies"] if record["name"] == "difference"]
     return learnt[-1] if learnt else None
+
+
+def accuracy_line(record: Mapping[str, Any], errors: Mapping[str, float], digits: int) -> str:
+    """The one-step errors of a difference model as text for the terminal.
+
+    Args:
+        record: Of one update, as ``results.json`` has it.
+        errors: By channel or group of channels.
+        digits: Decimals of the errors.
+    """
+    text = ", ".join(f"{name} {error:.{digits}f}" for name, error in errors.items())
+    return (
+        f"update {record['iteration']}: one-step error where the policy goes, as a share of "
+        f"the gap: {text}; fitted in {record['fit_seconds']:.1f} s"
+    )
+
+
+def failures_section(failures: Mapping[Path, str]) -> list[Section]:
+    """The tracebacks of failed trials by folder; no section if none failed."""
+    if not failures:
+        return []
+    text = "\n".join(f"{path}\n{failure}" for path, failure in failures.items())
+    summary = f"{len(failures)} trials failed and are in no mean"
+    return [Code(text, summary=summary, heading="Failed trials")]
 
 
 def policies_section(results: Results) -> Table:
