@@ -14,10 +14,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from studies.benchmark_tables import SCALING, records, tables
-from studies.command import Parser, fail
-from studies.files import atomic_write_json, atomic_write_text, read_json
-from studies.fit_scaling import write_figure
+from studies.running.command import Parser, fail
+from studies.running.files import atomic_write_json, atomic_write_text, read_json
+from studies.timing.fit_scaling import write_figure
+from studies.timing.tables import SCALING, records, tables
 
 ROOT = Path(__file__).resolve().parents[1]
 SUITE = Path("tests", "benchmarks")

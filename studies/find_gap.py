@@ -31,9 +31,9 @@ from residual.logs import LogData, LogFormat, read_logs
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Simulator
-from studies.command import HelpFormatter, Parser, fail
-from studies.gap_files import CORRECTED, REPORT, write_gap
-from studies.gap_words import summary
+from studies.gap.files import CORRECTED, REPORT, write_gap
+from studies.gap.words import summary
+from studies.running.command import HelpFormatter, Parser, fail
 
 
 @dataclasses.dataclass(frozen=True)

@@ -33,15 +33,15 @@ from residual.gap import find_gap
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
-from studies.command import HelpFormatter, Parser, fail
-from studies.files import atomic_write_json, read_json
-from studies.hidden_data import Excitation, make_logs
-from studies.hidden_report import summary, write_report
-from studies.hidden_rivals import one_step, regression, sparse
-from studies.hidden_scores import alike, replaceable, score, score_names
-from studies.hidden_strengths import HIDDEN, draw, strength, truth
-from studies.progress import Progress
-from studies.trials import Execution, read_trials, run_trials, trial_folder
+from studies.hidden.data import Excitation, make_logs
+from studies.hidden.report import summary, write_report
+from studies.hidden.rivals import one_step, regression, sparse
+from studies.hidden.scores import alike, replaceable, score, score_names
+from studies.hidden.strengths import HIDDEN, draw, strength, truth
+from studies.running.command import HelpFormatter, Parser, fail
+from studies.running.files import atomic_write_json, read_json
+from studies.running.progress import Progress
+from studies.running.trials import Execution, read_trials, run_trials, trial_folder
 
 RESULTS = Path("results/hidden_effects")
 #: Effects that no library holds, as fields of ``Truth`` at a size that is seen.

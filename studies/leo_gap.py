@@ -25,13 +25,13 @@ from policy.evaluate import Rollout
 from sims.leo import Leo, Walking, measure_walk
 from sims.leo.body import clearance
 from sims.simulator import Array, Simulator
-from studies.command import Parser
-from studies.difference_learning import Budget
-from studies.gap_study import GapStudy, GapTrial, run_command
-from studies.gap_study import build_parser as parser_of
-from studies.learning_steps import PolicyTests, Problem, visited
-from studies.leo_report import policy_table, write_report
-from studies.leo_tables import write_grid_report
+from studies.learning.loop import Budget
+from studies.learning.steps import PolicyTests, Problem, visited
+from studies.learning.study import GapStudy, GapTrial, run_command
+from studies.learning.study import build_parser as parser_of
+from studies.leo.report import policy_table, write_report
+from studies.leo.tables import write_grid_report
+from studies.running.command import Parser
 
 # Learning curves jump by hundreds between tests, so every test is several walks, and the policy
 # kept is the best of them on its own model.

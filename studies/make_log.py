@@ -19,9 +19,9 @@ import numpy as np
 from jsonargparse.typing import PositiveInt
 
 from sims.pendulum import IDEALISED_MASS, TRUE_MASS
-from studies.command import HelpFormatter, Parser
-from studies.files import atomic_write_text
-from studies.hidden_data import Truth, make_logs
+from studies.hidden.data import Truth, make_logs
+from studies.running.command import HelpFormatter, Parser
+from studies.running.files import atomic_write_text
 
 HIDDEN = Truth(mass=TRUE_MASS / IDEALISED_MASS - 1)
 

@@ -24,12 +24,12 @@ from typing import Any
 from sims.pendulum import Pendulum
 from sims.simulator import Simulator
 from sims.tasks import SwingUp
-from studies.command import Parser
-from studies.gap_study import GapStudy, GapTrial, run_command
-from studies.gap_study import build_parser as parser_of
-from studies.learning_steps import Problem
-from studies.pendulum_report import policy_table, write_report
-from studies.pendulum_tables import write_grid_report
+from studies.learning.steps import Problem
+from studies.learning.study import GapStudy, GapTrial, run_command
+from studies.learning.study import build_parser as parser_of
+from studies.pendulum.report import policy_table, write_report
+from studies.pendulum.tables import write_grid_report
+from studies.running.command import Parser
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,7 +11,7 @@ import pandas as pd
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.host import Joint
 from sims.simulator import Array, Channel, Parameter
-from studies.files import atomic_write_text
+from studies.running.files import atomic_write_text
 
 GRAVITY = 9.81
 

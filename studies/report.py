@@ -15,10 +15,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from studies import gap_study
-from studies.command import HelpFormatter, Parser, fail
-from studies.files import read_json
-from studies.trials import PLAN
+from studies.learning import study
+from studies.running.command import HelpFormatter, Parser, fail
+from studies.running.files import read_json
+from studies.running.trials import PLAN
 
 
 def build_parser() -> Parser:
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         module = importlib.import_module(f"studies.{study_of(folder)}")
         # Other studies than those of a gap have a function of their own.
         if hasattr(module, "STUDY"):
-            gap_study.rebuild(module.STUDY, folder)
+            study.rebuild(module.STUDY, folder)
         else:
             module.rebuild(folder)
     except (OSError, ValueError) as error:

@@ -18,7 +18,7 @@ from sims.host import HostSimulator
 Array = NDArray[np.float64]
 
 #: Standard errors by which a residual may exceed the noise: one in 740 does by chance alone. In
-#: 72 logs without a gap the largest excess was 2.0 (studies.hidden_calibration).
+#: 72 logs without a gap the largest excess was 2.0 (studies.hidden.calibration).
 ERRORS = 3.0
 #: Probability below which a generic force is there. The same logs gave probabilities that are
 #: uniform or a little larger, down to 0.03.

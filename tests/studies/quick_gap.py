@@ -12,9 +12,9 @@ from sims.pendulum import Pendulum
 from sims.simulator import Simulator
 from sims.tasks import SwingUp
 from studies import pendulum_gap
-from studies.gap_study import run_command
-from studies.learning_steps import Problem
-from studies.study_tables import write_tables
+from studies.learning.steps import Problem
+from studies.learning.study import run_command
+from studies.learning.tables import write_tables
 
 
 class EulerPendulum(Simulator):

@@ -6,8 +6,8 @@ import json
 import pytest
 
 from studies import benchmarks
-from studies.benchmark_tables import markdown, tables
 from studies.benchmarks import main
+from studies.timing.tables import markdown, tables
 
 
 def entry(name, seconds, **extra):

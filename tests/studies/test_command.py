@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studies.command import expand_grid
+from studies.running.command import expand_grid
 
 BASE = {"seed": 0, "budget": {"true_samples": 3750, "iterations": 2}, "estimator": {}}
 

@@ -7,10 +7,10 @@ from policy.ddpg import DDPGConfig
 from residual import Linear
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
-from studies.difference_learning import Budget, learn_by_difference
-from studies.learning_steps import PolicyTests, Problem
-from studies.progress import Silent
-from studies.stages import Stages
+from studies.learning.loop import Budget, learn_by_difference
+from studies.learning.stages import Stages
+from studies.learning.steps import PolicyTests, Problem
+from studies.running.progress import Silent
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
 from studies import pendulum_gap
 from studies.find_gap import main, run
-from studies.gap_words import number_text, rounded
+from studies.gap.words import number_text, rounded
 from studies.make_log import write_logs
 
 EQUATION = "sims.pendulum_equation.PendulumEquation"

@@ -10,14 +10,14 @@ from residual.gap.adequacy import CHANCE, ERRORS
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies import report
-from studies.hidden_calibration import run_set, table
-from studies.hidden_data import Truth, make_logs
+from studies.hidden.calibration import run_set, table
+from studies.hidden.data import Truth, make_logs
+from studies.hidden.report import share
+from studies.hidden.rivals import one_step, regression
+from studies.hidden.scores import score_names
+from studies.hidden.strengths import HIDDEN, sizes, strength, truth
 from studies.hidden_effects import Block, HiddenStudy, main, trials_of
-from studies.hidden_report import share
-from studies.hidden_rivals import one_step, regression
-from studies.hidden_scores import score_names
-from studies.hidden_strengths import HIDDEN, sizes, strength, truth
-from studies.progress import Silent
+from studies.running.progress import Silent
 
 
 def test_every_strength_makes_the_gap_that_was_asked_for():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from studies import leo_gap
-from studies.leo_report import grouped
-from studies.leo_tables import write_grid_report
+from studies.leo.report import grouped
+from studies.leo.tables import write_grid_report
 
 TINY = [
     "--estimator", "residual.Linear",

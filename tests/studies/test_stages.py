@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from studies.stages import Stages
+from studies.learning.stages import Stages
 
 
 def write(text):

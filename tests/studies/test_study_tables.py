@@ -1,6 +1,6 @@
 """Tables keep apart what differs."""
 
-from studies.study_tables import apart, policy_rows
+from studies.learning.tables import apart, policy_rows
 
 
 def trial(seed, label="Linear", **settings):

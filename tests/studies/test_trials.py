@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from studies.files import read_json
-from studies.progress import Silent
-from studies.trials import (
+from studies.running.files import read_json
+from studies.running.progress import Silent
+from studies.running.trials import (
     Execution,
     attempt_trial,
     read_trials,
@@ -18,8 +18,8 @@ from studies.trials import (
     spread_seeds,
     trial_folder,
 )
-from studies.watching import running
-from studies.workers import WorkersError, workers
+from studies.running.watching import running
+from studies.running.workers import WorkersError, workers
 
 
 def square(config, folder, progress):
@@ -133,7 +133,7 @@ def test_the_plan_names_the_study(tmp_path):
     ],
 )
 def test_a_cluster_that_is_not_there_is_named(monkeypatch, backend, address, message):
-    monkeypatch.setattr("studies.workers.CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr("studies.running.workers.CONNECT_SECONDS", 0.5)
     with pytest.raises(WorkersError, match=f"(?i){message}"), workers(backend, 1, address):
         pass
 

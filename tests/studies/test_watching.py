@@ -2,14 +2,14 @@
 
 import pytest
 
-from studies.curves import Curves
-from studies.files import read_json
-from studies.progress import Bars, Several
-from studies.watching import StatusFile, TrialsView, running
+from studies.running.curves import Curves
+from studies.running.files import read_json
+from studies.running.progress import Bars, Several
+from studies.running.watching import StatusFile, TrialsView, running
 
 
 def test_a_running_trial_says_where_it_is(tmp_path, monkeypatch):
-    monkeypatch.setattr("studies.watching.WRITE_EVERY", 0.0)
+    monkeypatch.setattr("studies.running.watching.WRITE_EVERY", 0.0)
     status = StatusFile(tmp_path / "one")
     with status.task("train", 200) as tell:
         tell(50, "return -3")

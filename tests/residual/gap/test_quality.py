@@ -6,7 +6,7 @@ import pytest
 from residual.gap.quality import kinematics
 from residual.trajectories import Trajectory
 from sims.pendulum_equation import PendulumEquation
-from studies.hidden_data import Truth, make_logs
+from studies.hidden.data import Truth, make_logs
 
 
 def swings(factor):

@@ -11,7 +11,7 @@ from residual.gap.shooting import fit
 from residual.gap.windows import by_growth, carry, fixed
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
-from studies.hidden_data import Truth, make_logs
+from studies.hidden.data import Truth, make_logs
 
 NOISE = {"A": [0.01, 0.2], "B": [0.002 / np.sqrt(12)], "C": [0.01]}
 

@@ -9,7 +9,7 @@ from residual.gap import find_gap
 from residual.trajectories import Trajectory
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
-from studies.hidden_data import Truth, make_logs
+from studies.hidden.data import Truth, make_logs
 
 
 def answer(truth, seed=11, excitation="strong", kind="A", runs=8, **options):

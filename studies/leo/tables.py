@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from studies.leo_report import NEAR
-from studies.policy_records import POLICY_WORDS, failures_section
+from studies.learning.records import POLICY_WORDS, failures_section
+from studies.learning.statistics import Mean, mean
+from studies.learning.tables import write_tables
+from studies.leo.report import NEAR
 from studies.reporting import Figure, KeyValues, Report, Section, Table, Verdict
 from studies.reporting.figures import PALETTE, new_figure, save_figure, styled
-from studies.statistics import Mean, mean
-from studies.study_tables import write_tables
 
 # Tables III and IV of the paper; L in m, E in J/m.
 PAPER_WALKS = {
@@ -34,7 +34,7 @@ PAPER_SAMPLES = {
 def write_grid_report(
     results: Sequence[Mapping[str, Any]], failures: Mapping[Path, str], folder: Path
 ) -> str:
-    """The tidy tables (``studies.study_tables``), figures and ``report.html``.
+    """The tidy tables (``studies.learning.tables``), figures and ``report.html``.
 
     Args:
         results: Of every finished trial.

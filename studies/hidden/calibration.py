@@ -5,7 +5,7 @@ estimate, windows, signatures and tests as any other; the largest values seen sa
 thresholds have to lie. The gain of the best effect is a maximum over the whole library, so its
 quantiles allow for the number of effects that were offered.
 
-  python -m studies.hidden_calibration --sets 20 --output results/hidden_calibration
+  python -m studies.hidden.calibration --sets 20 --output results/hidden_calibration
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from residual.gap.signatures import gains
 from residual.gap.workflow import split
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
-from studies.command import HelpFormatter, Parser
-from studies.files import atomic_write_text
-from studies.hidden_data import Truth, make_logs
-from studies.progress import Progress
-from studies.trials import Execution, run_trials, trial_folder
+from studies.hidden.data import Truth, make_logs
+from studies.running.command import HelpFormatter, Parser
+from studies.running.files import atomic_write_text
+from studies.running.progress import Progress
+from studies.running.trials import Execution, run_trials, trial_folder
 
 
 def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -96,7 +96,7 @@ def table(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     parser = Parser(
-        prog="python -m studies.hidden_calibration",
+        prog="python -m studies.hidden.calibration",
         description=__doc__,
         formatter_class=HelpFormatter,
     )
@@ -126,6 +126,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 if __name__ == "__main__":
     # By its importable name, which worker processes need to find the same classes.
-    from studies import hidden_calibration
+    from studies.hidden import calibration
 
-    hidden_calibration.main()
+    calibration.main()

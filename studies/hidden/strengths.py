@@ -26,7 +26,7 @@ from residual.trajectories import Trajectory
 from sims import effects as known
 from sims.effects.base import Effect
 from sims.pendulum_equation import PendulumEquation
-from studies.hidden_data import (
+from studies.hidden.data import (
     DT,
     INERTIA,
     LIMIT,

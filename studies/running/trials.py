@@ -17,11 +17,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from studies.curves import Curves
-from studies.files import atomic_write_json, atomic_write_text, read_json
-from studies.progress import Progress, Several
-from studies.watching import STATUS, StatusFile, TrialsView
-from studies.workers import Backend, Config, workers
+from studies.running.curves import Curves
+from studies.running.files import atomic_write_json, atomic_write_text, read_json
+from studies.running.progress import Progress, Several
+from studies.running.watching import STATUS, StatusFile, TrialsView
+from studies.running.workers import Backend, Config, workers
 
 Work = Callable[[Config, Path, Progress], dict[str, Any]]
 Failures = dict[Path, str]

@@ -15,9 +15,9 @@ import yaml
 from residual.gap import GapResult
 from residual.logs import Finding
 from sims.loading import corrected_settings
-from studies.command import versions
-from studies.files import atomic_write_json, atomic_write_text
-from studies.gap_report import write_report
+from studies.gap.report import write_report
+from studies.running.command import versions
+from studies.running.files import atomic_write_json, atomic_write_text
 
 JSON, CORRECTED, REPORT = "gap.json", "corrected.yaml", "report.html"
 

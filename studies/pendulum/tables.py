@@ -14,13 +14,13 @@ from matplotlib.figure import Figure as Drawing
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
-from studies.pendulum_report import TARGET
-from studies.policy_records import POLICY_WORDS, failures_section
+from studies.learning.records import POLICY_WORDS, failures_section
+from studies.learning.statistics import Mean, mean
+from studies.learning.tables import write_tables
+from studies.pendulum.report import TARGET
+from studies.pendulum.value_iteration import episode_return, value_iteration
 from studies.reporting import Figure, KeyValues, Prose, Report, Section, Table, Verdict
 from studies.reporting.figures import PALETTE, new_figure, save_figure, styled
-from studies.statistics import Mean, mean
-from studies.study_tables import write_tables
-from studies.value_iteration import episode_return, value_iteration
 
 # Tables II and section V-A of the paper.
 PAPER_RETURNS = {"idealised": -15508.0, "difference": -660.0}
@@ -32,7 +32,7 @@ PAPER_FIXED_RETURN = {"cold": "82164 ± 7498", "warm": "23383 ± 2357", "differe
 def write_grid_report(
     results: Sequence[Mapping[str, Any]], failures: Mapping[Path, str], folder: Path
 ) -> str:
-    """The tidy tables (``studies.study_tables``), figures and ``report.html``.
+    """The tidy tables (``studies.learning.tables``), figures and ``report.html``.
 
     Args:
         results: Of every finished trial.

@@ -18,8 +18,8 @@ from typing import Any
 
 from tqdm import tqdm
 
-from studies.files import atomic_write_json, read_json
-from studies.progress import Advance
+from studies.running.files import atomic_write_json, read_json
+from studies.running.progress import Advance
 
 STATUS = "status.json"
 WRITE_EVERY = 10.0  # seconds; hundreds of trials share a file system

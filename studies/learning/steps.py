@@ -33,8 +33,8 @@ from residual.trajectories import Transitions
 from sims.environment import SimulatorEnv
 from sims.simulator import Array, Simulator
 from sims.tasks import Task
-from studies.files import atomic_write_json, read_json
-from studies.progress import Progress
+from studies.running.files import atomic_write_json, read_json
+from studies.running.progress import Progress
 
 # Policies learnt from nothing begin with random actions, the baselines too.
 RANDOM_STEPS = 1000

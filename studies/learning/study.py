@@ -25,21 +25,21 @@ from sklearn.base import BaseEstimator
 
 from policy.ddpg import DDPGConfig
 from residual import DropoutNet
-from studies.command import HelpFormatter, Parser, class_label, expand_grid, fail, versions
-from studies.curves import Curves
-from studies.difference_learning import Budget, learn_by_difference
-from studies.files import (
+from studies.learning.loop import Budget, learn_by_difference
+from studies.learning.stages import Stages
+from studies.learning.steps import Problem
+from studies.running.command import HelpFormatter, Parser, class_label, expand_grid, fail, versions
+from studies.running.curves import Curves
+from studies.running.files import (
     atomic_write_json,
     atomic_write_text,
     copy_file,
     read_json,
     remove_partial_files,
 )
-from studies.learning_steps import Problem
-from studies.progress import Bars, Progress, Several
-from studies.stages import Stages
-from studies.trials import Execution, Failures, read_trials, run_trials, trial_folder
-from studies.workers import Backend, WorkersError
+from studies.running.progress import Bars, Progress, Several
+from studies.running.trials import Execution, Failures, read_trials, run_trials, trial_folder
+from studies.running.workers import Backend, WorkersError
 
 Config = Mapping[str, Any]
 Results = Mapping[str, Any]

@@ -23,10 +23,10 @@ from typing import Any
 from sklearn.base import BaseEstimator
 
 from policy.ddpg import DDPGConfig
-from studies.files import read_json
-from studies.learning_steps import LearningSteps, Problem, describe, seeded
-from studies.progress import Progress
-from studies.stages import Stages
+from studies.learning.stages import Stages
+from studies.learning.steps import LearningSteps, Problem, describe, seeded
+from studies.running.files import read_json
+from studies.running.progress import Progress
 
 Record = dict[str, Any]
 

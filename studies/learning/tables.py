@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from studies.files import atomic_path, atomic_write_json, atomic_write_text
+from studies.running.files import atomic_path, atomic_write_json, atomic_write_text
 
 # Policies of trials that differ in these only are the same, or stand in rows of their own.
 _IN_COLUMNS = {

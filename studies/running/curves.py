@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from studies.progress import Advance
+from studies.running.progress import Advance
 
 
 class Curves:

@@ -9,7 +9,7 @@ from residual.gap import GapResult
 from residual.gap.verdicts import FAMILIES
 from sims.effects.library import exact_aliases
 from sims.pendulum_equation import PendulumEquation
-from studies.hidden_strengths import HIDDEN
+from studies.hidden.strengths import HIDDEN
 
 #: Declared near-twins: forms of one effect that most data hardly tell apart.
 TWINS: tuple[frozenset[str], ...] = (FAMILIES["delay or lag"], FAMILIES["dry friction"])

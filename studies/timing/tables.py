@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from studies import fit_scaling
+from studies.timing import fit_scaling
 
 PEERS = {"GaussianProcess": "GaussianProcessRegressor", "DropoutNet": "MLPRegressor"}
 OURS = ("Linear", "GaussianProcess", "DropoutNet")

@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
 from sims.render import PendulumRenderer
-from studies.policy_records import (
+from studies.learning.records import (
     Results,
     accuracy_line,
     last_difference,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 
 from residual.gap import GapResult
 from residual.gap.result import Profile, Rollout
-from studies.gap_words import CEILING, FLOOR, gap_rows, quantity_text
+from studies.gap.words import CEILING, FLOOR, gap_rows, quantity_text
 from studies.reporting.figures import (
     AMBER,
     BLUE,

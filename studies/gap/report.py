@@ -13,8 +13,8 @@ import yaml
 from residual.gap import GapResult
 from residual.gap.result import Rollout
 from residual.gap.result import Verdict as Answer
-from studies.gap_figures import lags, profile, rollout, shrinking
-from studies.gap_words import (
+from studies.gap.figures import lags, profile, rollout, shrinking
+from studies.gap.words import (
     KINDS,
     effect_name,
     experiment,

@@ -1,0 +1,1 @@
+"""The answer of ``find_gap``: its words, figures, report and files."""

@@ -1,0 +1,1 @@
+"""The paper's loop, and what every study of it shares: settings, stages, records, tables."""
