@@ -12,7 +12,7 @@ from residual.gap.candidates import Candidate
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from residual.gap.shooting import Fit, capped, fit
-from residual.gap.signatures import Signatures, signatures
+from residual.gap.signatures import Signatures, gains, signatures
 from residual.gap.windows import Windows
 from sims.host import HostSimulator
 
@@ -173,6 +173,16 @@ class Arena:
         again = self._fit(found.model, found.nodes, found.theta, turns, None, 0.05)
         if again.merit < found.merit:
             self.tried[key] = again
+
+    def alone(self, candidate: Candidate) -> Fit:
+        """Fit of an effect that takes no part in the tournament."""
+        nominal = self.tried[()]
+        found = signatures(nominal, self.samples, self.windows, self.sigma, [candidate])
+        (start,) = gains(found)[0].values
+        model = Model(self.simulator, [candidate])
+        theta = np.clip(start, model.low, model.high)
+        rough = self._fit(model, self.nodes, theta, self.settings.first_turns, self.by_state)
+        return self._fit(model, rough.nodes, rough.theta, self.settings.more_turns, None, 0.05)
 
     def signatures(self, key: Key) -> Signatures:
         """Signatures of all candidates around a fitted set."""

@@ -8,14 +8,14 @@ import numpy as np
 from scipy.stats import norm
 
 from residual.gap.adequacy import Remainder
-from residual.gap.candidates import Candidate
+from residual.gap.candidates import Candidate, candidates
 from residual.gap.checks import integration
 from residual.gap.intervals import covariance
 from residual.gap.result import Blind, Number, Rival
 from residual.gap.search import Found
 from residual.gap.verdicts import Claim
 from sims.effects.base import Effect
-from sims.effects.library import exact_aliases
+from sims.effects.library import exact_aliases, library, near_combinations
 from sims.host import HostSimulator
 
 #: Score difference beyond which a rival is excluded. If the rival is true and the two predictions
@@ -53,6 +53,7 @@ def claim(found: Found, left: Remainder, groups: dict[str, tuple[str, ...]]) -> 
     numerics = integration(found, most_windows=60)
     freedom = max(arena.size - best.basis.shape[2] * len(arena.windows), 1)
     excess = max(1.0, float(best.costs.sum()) / freedom)
+    alone_instead = not_offered(found, groups) if left.adequate else ()
     claims = []
     for position, number in enumerate(found.key):
         candidate = arena.candidates[number]
@@ -72,28 +73,51 @@ def claim(found: Found, left: Remainder, groups: dict[str, tuple[str, ...]]) -> 
             artefact = True
         smaller = tuple(i for i in found.key if i != number)
         alone = arena.score(smaller) if smaller in arena.tried else np.inf
-        ties = []
+        ties, instead = [], []
         for other in arena.tried:
-            if len(other) != len(found.key) or len(set(other) - set(found.key)) != 1:
+            if len(other) != len(found.key) or number in other:
                 continue
-            (gone,) = set(found.key) - set(other)
-            if gone != number:
-                continue
-            (rival,) = set(other) - set(found.key)
-            label = arena.candidates[rival].label
             difference = arena.score(other) - arena.score(found.key)
             ratio = arena.tried[other].merit / best.merit
-            if label not in ties and not excluded(difference, ratio, excess, left.adequate):
-                ties.append(label)
+            if excluded(difference, ratio, excess, left.adequate):
+                continue
+            fresh = tuple(arena.candidates[i].label for i in other if i not in found.key)
+            known = ties if len(fresh) == 1 else instead
+            name = " with ".join(fresh)
+            if name not in known:
+                known.append(name)
         twins = groups.get(candidate.label, ())
         claims.append(
             Claim(
                 candidate.name, candidate.effect.where, candidate.label, numbers,
                 tuple(ties), tuple(n for n in twins if n != candidate.label),
+                (*instead, *alone_instead),
                 alone - arena.score(found.key), artefact, candidate.effect.sentence,
             )
         )  # fmt: skip
     return sorted(claims, key=lambda c: -c.gain)
+
+
+def not_offered(found: Found, groups: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Single effects that were not offered and do as well as a chosen pair.
+
+    Only such that the pair imitates by the simulator's own equations, so that nothing is
+    looked for that was ruled out: what would be named is named, with the doubt.
+    """
+    arena = found.arena
+    if len(found.key) != 2:
+        return ()
+    simulator = arena.simulator
+    offered = {c.label for c in arena.candidates} | {n for twins in groups.values() for n in twins}
+    near = near_combinations(simulator, [arena.candidates[i].label for i in found.key])
+    new = [e for e in library(simulator) if str(e) in near and str(e) not in offered]
+    told = []
+    for candidate in candidates(simulator, new, arena.samples):
+        single = arena.alone(candidate)
+        price = np.log(arena.size) * len(single.theta)
+        if single.merit + price - arena.score(found.key) < TIE:
+            told.append(candidate.label)
+    return tuple(told)
 
 
 def excluded(difference: float, ratio: float, excess: float, adequate: bool) -> bool:

@@ -118,6 +118,8 @@ def search(
         sets.update({rival: [trial.tried[rival].theta] for rival in rivals(trial, key)})
         full.refit(full.tried[()], sets, most=True)
         full.threshold, full.noise_gain = trial.threshold, trial.noise_gain
+        # All runs may prefer a rival that came close on those of the tournament.
+        key = min(sets, key=full.score, default=key)
         left = remainder(full.tried[key], samples, full.windows, floor.sigma, floor, scale)
         if left.adequate or (turn and key == before) or turn == 2:
             break

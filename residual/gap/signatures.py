@@ -207,15 +207,32 @@ def constrained_gram(
     return max(float(2 * best @ right - best @ gram @ best), 0.0), best
 
 
-def pair_gains(found: Signatures, top: int = 40) -> list[Gain]:
-    """Linear gain of every pair of variants of different candidates, best first."""
-    gram = found.matrix.T @ found.matrix
-    right = found.matrix.T @ found.residual
+def pair_gains(
+    found: Signatures,
+    top: int = 40,
+    residual: Array | None = None,
+    matrix: Array | None = None,
+    without: Sequence[int] = (),
+) -> list[Gain]:
+    """Linear gain of every pair of variants of different candidates, best first.
+
+    Args:
+        found: Signatures.
+        top: How many pairs are returned.
+        residual, matrix: By default those with the chosen effects projected out.
+        without: Candidates that take no part.
+    """
+    residual = found.residual if residual is None else residual
+    matrix = found.matrix if matrix is None else matrix
+    gram = matrix.T @ matrix
+    right = matrix.T @ residual
     out = []
     for i, first in enumerate(found.variants):
+        if first.candidate in without:
+            continue
         for j in range(i + 1, len(found.variants)):
             second = found.variants[j]
-            if first.candidate == second.candidate:
+            if second.candidate == first.candidate or second.candidate in without:
                 continue
             columns = list(first.columns + second.columns)
             sides = np.append(first.trial.one_sided, second.trial.one_sided)

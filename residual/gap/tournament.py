@@ -60,7 +60,37 @@ def choose(arena: Arena, known: dict[Key, Array]) -> Key:
         current = best
     if current:
         arena.polish(current)
+        current = challenged(arena, current)
     return current
+
+
+def challenged(arena: Arena, current: Key) -> Key:
+    """The chosen set, or a pair that shares no member with it and does better.
+
+    Exchanges replace one member at a time, so a pair is also measured against all pairs of
+    others: those that come close in the linear picture are refitted. They stay rivals if they
+    do nearly as well.
+    """
+    if len(current) != 2 or not near_floor(arena, current):
+        return current
+    found, now = arena.signatures(current), arena.tried[current]
+    # As if the chosen pair were not there.
+    residual = found.plain_residual + found.chosen @ now.theta
+    whole = float(residual @ residual)
+    chosen = whole - float((now.weights * now.costs).sum())
+    sets: dict[Key, list[Array]] = {}
+    for gain in pair_gains(found, 40, residual, found.plain, current):
+        if len(sets) == arena.settings.swaps or gain.value < 0.95 * chosen - 3 * arena.threshold:
+            break
+        numbers = [found.variants[i].candidate for i in gain.variants]
+        if len({arena.candidates[n].label for n in numbers}) < 2:
+            continue
+        key, theta = arena.merged((), list(zip(numbers, gain.values, strict=True)))
+        if key not in arena.tried:
+            sets.setdefault(key, []).append(theta)
+    arena.refit(now, sets)
+    best = min((k for k in arena.tried if len(k) == len(current)), key=arena.score)
+    return best
 
 
 def worth(arena: Arena, smaller: Key, larger: Key) -> bool:
@@ -231,15 +261,16 @@ def backward(arena: Arena, best: Key) -> Key:
 
 
 def rivals(arena: Arena, key: Key, reach: float = 100.0) -> list[Key]:
-    """Refitted sets of the same size that differ in one member and come close in score."""
+    """Refitted sets of the same size that come close in score, and the best without any member."""
     if not key:
         return []
     best = arena.score(key)
     near = [
         other
         for other in arena.tried
-        if len(other) == len(key)
-        and len(set(other) - set(key)) == 1
-        and arena.score(other) - best < reach
+        if len(other) == len(key) and other != key and arena.score(other) - best < reach
     ]
-    return sorted(near, key=arena.score)[: arena.settings.close]
+    near.sort(key=arena.score)
+    unlike = [other for other in near if not set(other) & set(key)]
+    close = near[: arena.settings.close]
+    return close + [other for other in unlike[:1] if other not in close]

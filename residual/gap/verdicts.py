@@ -29,6 +29,8 @@ class Claim:
         numbers: Fitted numbers.
         ties: Effects that these data cannot exclude in its place.
         twins: Exact aliases, beside whatever else is claimed: no data could.
+        instead: Sets of effects that these data cannot exclude in place of this one and
+            another claimed one; single effects among them were not offered.
         gain: What leaving it out would cost.
         artefact: True if another step size or input hold explains it.
         sentence: What the effect is.
@@ -40,6 +42,7 @@ class Claim:
     numbers: dict[str, Number]
     ties: tuple[str, ...]
     twins: tuple[str, ...]
+    instead: tuple[str, ...]
     gain: float
     artefact: bool
     sentence: str
@@ -61,6 +64,7 @@ def verdicts(
     sets: Sequence[tuple[str, ...]],
     tolerance: float | None,
     blind: Sequence[Blind],
+    provisional: bool = False,
 ) -> tuple[Verdict, ...]:
     """All verdicts, most important first.
 
@@ -71,6 +75,7 @@ def verdicts(
         sets: Exactly dependent sets of effects, see ``residual.gap.claims.aliases``.
         tolerance: Forecast error that does not matter.
         blind: Effects that the log could hide.
+        provisional: True if there is one record only, so that its end had to confirm it.
     """
     found: list[Verdict] = []
     small = tolerance is not None and gap.before.value <= tolerance
@@ -99,14 +104,24 @@ def verdicts(
                     f"nothing that matters: the {gap.horizon_s:.3g} s error is "
                     f"{gap.before.value:.3g} {gap.unit}, within the tolerance of {tolerance:.3g}"),
         )  # fmt: skip
+    instead = tuple(dict.fromkeys(name for claim in real for name in claim.instead))
     if not sound:
         found.append(_unexplained(left, gap, len(claims)))
+    elif instead:
+        says = (
+            f"unexplained: no single effect on offer does it, and in place of "
+            f"{' with '.join(labels)} these data cannot exclude {' or '.join(instead)}"
+        )
+        found.append(Verdict("unexplained", "", "", {}, instead, "", says))
     if blind:
         names = ", ".join(f"{b.effect} (needs {b.needs})" for b in blind)
         found.append(
             Verdict("needs_data", "", "", {}, tuple(b.effect for b in blind), "",
                     f"this log could not show: {names}")
         )  # fmt: skip
+    if provisional:
+        word = "; provisional: one record only"
+        found = [dataclasses.replace(v, says=v.says + word) if v.effect else v for v in found]
     return tuple(found)
 
 
@@ -142,11 +157,14 @@ def _effect(
     )
     title = family((claim.label, *claim.ties)) if claim.ties else ""
     says = f"{claim.label}: {numbers}"
-    confirmed = (sound or removed >= 10) and (not claim.ties or bool(title))
+    sure = not claim.instead and (not claim.ties or bool(title))
+    confirmed = (sound or removed >= 10) and sure
     if claim.ties:
         says += f"; these data cannot exclude {', '.join(claim.ties)}"
         if title:
             says += f" ({title}, form undecided)"
+    if claim.instead:
+        says += f"; together they could be {' or '.join(claim.instead)}"
     if claim.twins:
         says += f"; the same motion as {', '.join(claim.twins)}"
     if together:
@@ -157,7 +175,13 @@ def _effect(
         says += "; a remainder is unexplained"
     kind: Kind = "confirmed" if confirmed else "ambiguous"
     return Verdict(
-        kind, claim.name, claim.where, claim.numbers, (*claim.twins, *claim.ties), title, says
+        kind,
+        claim.name,
+        claim.where,
+        claim.numbers,
+        (*claim.twins, *claim.ties, *claim.instead),
+        title,
+        says,
     )
 
 

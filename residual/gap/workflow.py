@@ -11,6 +11,7 @@ from residual.gap.adequacy import remainder
 from residual.gap.arena import Settings
 from residual.gap.candidates import candidates
 from residual.gap.claims import aliases, claim, evidence, hidden
+from residual.gap.holdout import split
 from residual.gap.measure import measure, prove
 from residual.gap.model import Model
 from residual.gap.quality import kinematics
@@ -139,8 +140,13 @@ def _find(
         for c in samples.measured
     )
     blind = hidden(found, pool)
+    if len(trajectories) == 1:
+        quality.append(
+            "one record only: its end was held out, which is the same experiment, so what is "
+            "confirmed is provisional until a second record agrees"
+        )
     return GapResult(
-        verdicts=verdicts(claims, left, gap, sets, tolerance, blind),
+        verdicts=verdicts(claims, left, gap, sets, tolerance, blind, len(trajectories) == 1),
         gap=gap,
         where=where,
         evidence=evidence(found),
@@ -171,28 +177,6 @@ class Clock:
         now = time.perf_counter()
         self.laps[stage] = now - self._last
         self._last = now
-
-
-def split(trajectories: Sequence[Trajectory]) -> tuple[list[Trajectory], list[Trajectory]]:
-    """Training and held-out runs: the last fifth of the runs, or the last part of each."""
-    count = len(trajectories)
-    if count >= 4:
-        last = max(1, round(0.2 * count))
-        return list(trajectories[:-last]), list(trajectories[-last:])
-    train, held = [], []
-    for run in trajectories:
-        cut = round(0.75 * len(run))
-        train.append(part(run, 0, cut))
-        held.append(part(run, cut, len(run)))
-    return train, held
-
-
-def part(run: Trajectory, start: int, stop: int) -> Trajectory:
-    """Samples ``start`` to ``stop`` of a run, both included."""
-    return Trajectory(
-        run.name, run.times[start : stop + 1], run.states[start : stop + 1],
-        run.actions[start:stop],
-    )  # fmt: skip
 
 
 def substeps_for(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> int:

@@ -118,24 +118,7 @@ def exact_aliases(
         rng: Source of the random states; a fixed seed by default.
         most: Largest set that is looked for.
     """
-    rng = rng or np.random.default_rng(0)
-    plain = simulator.with_effects(())
-    states = plain.smooth_states(96, rng)
-    inputs = np.empty((96, len(plain.action_channels)))  # a system may have none
-    for column, channel in enumerate(plain.action_channels):
-        inputs[:, column] = random_values(channel, 96, rng)
-    near: dict[str, Array] = {}
-    far: dict[str, Array] = {}
-    for effect in library(plain):
-        linear = isinstance(effect, JointEffect) and not isinstance(effect, DryFriction)
-        if linear or isinstance(effect, ParameterChange | ActuatorGain | ActuatorBias):
-            if len(effect.strengths()) != 1:
-                continue
-            response = _response(plain, effect, states, inputs, 1e-4)
-            if np.any(response):
-                near[str(effect)] = response
-                far[str(effect)] = _response(plain, effect, states, inputs, 3e-4)
-    columns, blurs = _columns(near, far)
+    columns, blurs = _linear(simulator, rng or np.random.default_rng(0))
     found: list[Alias] = []
     alike: dict[str, list[str]] = {}
     for name in columns:
@@ -156,6 +139,59 @@ def exact_aliases(
                 rest = ", ".join(names)
                 found.append(Alias(names, f"{rest}: any one is a combination of the others"))
     return tuple(found)
+
+
+def near_combinations(
+    simulator: HostSimulator,
+    names: Sequence[str],
+    share: float = 0.03,
+    rng: np.random.Generator | None = None,
+) -> tuple[str, ...]:
+    """Single effects that some effects imitate together, all but a small share of the motion.
+
+    A pendulum's mass, for example, is its inertia and its motor's resistance but for the
+    damping of the bearing, which is little beside the motor's.
+
+    Args:
+        simulator: A host, with or without effects.
+        names: The effects that act together, ``name@where``.
+        share: Part of the motion that may differ.
+        rng: As for ``exact_aliases``, like the effects that are compared.
+    """
+    columns, _ = _linear(simulator, rng or np.random.default_rng(0))
+    if not all(name in columns for name in names):
+        return ()
+    size = min(len(column) for column in columns.values())
+    matrix = np.stack([columns[name][:size] for name in names], axis=1)
+    found = []
+    for name, column in columns.items():
+        rest = column - matrix @ np.linalg.lstsq(matrix, column, rcond=None)[0]
+        if name not in names and np.linalg.norm(rest) < share:
+            found.append(name)
+    return tuple(found)
+
+
+def _linear(
+    simulator: HostSimulator, rng: np.random.Generator
+) -> tuple[dict[str, Array], dict[str, float]]:
+    """Change of the motion per strength of every effect that is linear in one, of unit length."""
+    plain = simulator.with_effects(())
+    states = plain.smooth_states(96, rng)
+    inputs = np.empty((96, len(plain.action_channels)))  # a system may have none
+    for column, channel in enumerate(plain.action_channels):
+        inputs[:, column] = random_values(channel, 96, rng)
+    near: dict[str, Array] = {}
+    far: dict[str, Array] = {}
+    for effect in library(plain):
+        linear = isinstance(effect, JointEffect) and not isinstance(effect, DryFriction)
+        if linear or isinstance(effect, ParameterChange | ActuatorGain | ActuatorBias):
+            if len(effect.strengths()) != 1:
+                continue
+            response = _response(plain, effect, states, inputs, 1e-4)
+            if np.any(response):
+                near[str(effect)] = response
+                far[str(effect)] = _response(plain, effect, states, inputs, 3e-4)
+    return _columns(near, far)
 
 
 def _columns(

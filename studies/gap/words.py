@@ -25,6 +25,8 @@ FLOOR, CEILING = "noise floor", "flexible estimator"
 
 def effect_name(label: str) -> str:
     """``viscous_friction@pivot`` as ``viscous friction at pivot``."""
+    if " with " in label:
+        return " with ".join(map(effect_name, label.split(" with ")))
     name, _, where = label.partition("@")
     return name.replace("_", " ") + (f" at {where.replace('_', ' ')}" if where else "")
 
@@ -165,6 +167,8 @@ def summary(result: GapResult) -> str:
             lines.append(f"{'THIS LOG CANNOT SHOW':<16} {names}")
             continue
         lines.append(f"{KINDS[verdict.kind].upper():<16} {headline(verdict, result)}")
+        if "provisional" in verdict.says:
+            lines.append(f"{'':<16} provisional: there is one record only")
         if verdict.effect and verdict.alternatives:
             same = set(twins(result).get(label_of(verdict), ()))
             ties = [name for name in verdict.alternatives if name not in same]

@@ -24,10 +24,10 @@ from residual.gap.adequacy import remainder
 from residual.gap.arena import Settings
 from residual.gap.candidates import candidates
 from residual.gap.claims import aliases
+from residual.gap.holdout import split
 from residual.gap.samples import Samples
 from residual.gap.search import search
 from residual.gap.signatures import gains
-from residual.gap.workflow import split
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
