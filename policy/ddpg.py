@@ -11,16 +11,15 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-import torch
 from numpy.typing import ArrayLike, NDArray
-from safetensors.torch import save
+from safetensors.numpy import save
 
 from policy.adam import Adam
-from policy.files import read_tensors, write_whole
+from policy.files import read_arrays, write_whole
 from policy.mlp import MlpPolicy
-from policy.networks import Actor, Critic
+from policy.networks import Actor, Critic, FlatNetwork, Inputs
 from policy.noise import OrnsteinUhlenbeck
-from policy.replay import Replay
+from policy.replay import Batch, Replay
 
 FORMAT = "simgap.ddpg.1"
 
@@ -158,26 +157,22 @@ class DDPG:
         self._critics = [Critic(*sizes) for _ in range(count)]
         self._critic_targets = [Critic(*sizes) for _ in range(count)]
         for network, target in self._pairs():
-            target.parameters.copy_(network.parameters)
-        self._actor_adam = Adam(self._actor.parameters, self._actor.gradient, c.actor_lr)
+            target.parameters[:] = network.parameters
+        self._actor_adam = _adam(self._actor, self._actor_target, c.actor_lr)
         self._critic_adams = [
-            Adam(critic.parameters, critic.gradient, c.critic_lr, c.critic_weight_decay)
-            for critic in self._critics
+            _adam(critic, target, c.critic_lr, c.critic_weight_decay)
+            for critic, target in zip(self._critics, self._critic_targets, strict=True)
         ]
-        # Gradients of the batch's mean squared error and of minus its mean value, per row.
-        self._mean_square = torch.tensor(2 / c.batch)
-        self._mean_value = torch.full((c.batch, 1), -1 / c.batch)
+        self._now, self._following = (Inputs(n_o, n_a, c.batch) for _ in range(2))
+        # Gradients of the batch's mean squared error and of minus its mean value, per column.
+        self._mean_square = np.float32(2 / c.batch)
+        self._mean_value = np.full((1, c.batch), -1 / c.batch, np.float32)
+        self._gamma = np.float32(c.gamma)
         self._noise = OrnsteinUhlenbeck(n_a, c.noise_sigma, c.noise_theta, rng)
         self.replay = Replay(c.replay, n_o, n_a)
         self.updates = 0
         self.policy = MlpPolicy(
-            {
-                f"{kind}{k}": getattr(layer, kind).numpy()
-                for k, layer in enumerate(self._actor.layers, start=1)
-                for kind in ("weight", "bias")
-            },
-            np.asarray(box.low, np.float32),
-            np.asarray(box.high, np.float32),
+            self._actor.layers(), np.asarray(box.low, np.float32), np.asarray(box.high, np.float32)
         )
 
     @classmethod
@@ -272,7 +267,6 @@ class DDPG:
             ):
                 return
 
-    @torch.inference_mode()
     def update(self) -> None:
         """One update of the critic and the actor from one batch of the replay.
 
@@ -280,30 +274,39 @@ class DDPG:
         Lillicrap et al. (2016) takes the actor's one critic step of size ``critic_lr`` later.
         """
         c = self.config
-        observations, actions, rewards, alive, following = self.replay.sample(c.batch, self._rng)
-        next_actions = self._actor_target.forward(following)
-        if c.target_noise:
-            smoothing = self._rng.normal(0, c.target_noise, tuple(next_actions.shape))
-            bounded = torch.from_numpy(smoothing).clamp_(-c.target_noise_clip, c.target_noise_clip)
-            next_actions.add_(bounded).clamp_(-1, 1)
-        values = [target.forward(following, next_actions) for target in self._critic_targets]
-        value = values[0] if len(values) == 1 else torch.minimum(*values)
-        goal = torch.addcmul(rewards, value, alive, value=c.gamma)
-        for critic in self._critics:
-            error = critic.forward(observations, actions).sub_(goal)
-            critic.backward(observations, actions, error.mul_(self._mean_square))
+        batch = self.replay.sample(c.batch, self._rng)
+        goal = self._goal(batch)
         self.updates += 1
         with_actor = self.updates % c.actor_delay == 0
+        now = self._now
+        now.observations[:] = batch.observations.T
+        now.actions[:] = batch.actions.T
+        for critic in self._critics:
+            error = critic.forward(now) - goal
+            critic.backward(now, error * self._mean_square)
         if with_actor:
-            chosen = self._actor.forward(observations)
-            ascent = self._critics[0].d_action(chosen, self._mean_value)
-            self._actor.backward(observations, ascent)
-            self._actor_adam.step()
+            self._actor.forward(now)
+            self._critics[0].forward(now)
+            ascent = self._critics[0].d_actions(self._mean_value)
+        share = c.tau if with_actor else 0.0
         for adam in self._critic_adams:
-            adam.step()
+            adam.step(share)
         if with_actor:
-            for network, target in self._pairs():
-                target.approach(network, c.tau)
+            self._actor.backward(now, ascent)
+            self._actor_adam.step(share)
+
+    def _goal(self, batch: Batch) -> NDArray[np.float32]:
+        """What the critics should say of the batch, shape (1, batch)."""
+        c, following = self.config, self._following
+        following.observations[:] = batch.next_observations.T
+        self._actor_target.forward(following)
+        if c.target_noise:
+            smoothing = self._rng.normal(0, c.target_noise, following.actions.T.shape).T
+            bounded = smoothing.clip(-c.target_noise_clip, c.target_noise_clip)
+            following.actions[:] = (following.actions + bounded).clip(-1, 1)
+        values = [target.forward(following) for target in self._critic_targets]
+        value = values[0] if len(values) == 1 else np.minimum(*values)
+        return batch.rewards.T + self._gamma * batch.alive.T * value
 
     def forget(self, replay: bool = False, optimiser: bool = False) -> None:
         """Drop the transitions seen, or the optimisers' moments, before learning elsewhere."""
@@ -313,26 +316,26 @@ class DDPG:
             for adam in (self._actor_adam, *self._critic_adams):
                 adam.reset()
 
-    def networks(self) -> dict[str, torch.Tensor]:
+    def networks(self) -> dict[str, NDArray[np.float32]]:
         """A copy of all networks, targets and optimiser moments by name, for ``restore``."""
-        return {name: tensor.clone() for name, tensor in self._tensors().items()}
+        return {name: array.copy() for name, array in self._arrays().items()}
 
-    def restore(self, networks: dict[str, torch.Tensor]) -> None:
+    def restore(self, networks: dict[str, NDArray[np.float32]]) -> None:
         """Return to a copy from ``networks``; replay and random state stay as they are.
 
         Raises:
             ValueError: The copy is from an agent with other networks.
         """
-        own = self._tensors()
-        shapes = {name: tuple(tensor.shape) for name, tensor in own.items()}
-        given = {name: tuple(tensor.shape) for name, tensor in networks.items()}
+        own = self._arrays()
+        shapes = {name: array.shape for name, array in own.items()}
+        given = {name: array.shape for name, array in networks.items()}
         if shapes != given:
             raise ValueError(
-                f"the networks have tensors {given}, expected {shapes}: "
+                f"the networks have arrays {given}, expected {shapes}: "
                 "the spaces and the config must be those they were learnt with"
             )
-        for name, tensor in own.items():
-            tensor.copy_(networks[name])
+        for name, array in own.items():
+            array[...] = networks[name]
 
     def save(self, path: str | Path, replay: bool = True) -> None:
         """Write the whole agent to a safetensors file; learning on after ``load`` is the same.
@@ -341,11 +344,9 @@ class DDPG:
             path: File to write; it appears whole or not at all.
             replay: Include the transitions. Without them a loaded agent warms up again.
         """
-        tensors = dict(self._tensors())
-        tensors["low"] = torch.from_numpy(self.policy.low)
-        tensors["high"] = torch.from_numpy(self.policy.high)
+        arrays = {**self._arrays(), "low": self.policy.low, "high": self.policy.high}
         if replay:
-            tensors["replay"] = self.replay.stored()
+            arrays["replay"] = self.replay.stored()
         metadata = {
             "format": FORMAT,
             "config": dataclasses.asdict(self.config),
@@ -355,7 +356,7 @@ class DDPG:
             "random": self._rng.bit_generator.state,
         }
         texts = {key: json.dumps(value) for key, value in metadata.items()}
-        write_whole(path, save(tensors, texts))
+        write_whole(path, save(arrays, texts))
 
     @classmethod
     def load(cls, path: str | Path) -> DDPG:
@@ -365,20 +366,20 @@ class DDPG:
             FileNotFoundError: There is no such file.
             ValueError: The file holds something else.
         """
-        tensors, metadata = read_tensors(path, "pt")
+        arrays, metadata = read_arrays(path)
         if metadata.get("format") != FORMAT:
             raise ValueError(
                 f"{path} has format {metadata.get('format')!r}, expected {FORMAT!r}: "
                 "a policy alone is read by MlpPolicy.load"
             )
-        low, high = tensors.pop("low").numpy(), tensors.pop("high").numpy()
-        rows = tensors.pop("replay", None)
+        low, high = arrays.pop("low"), arrays.pop("high")
+        rows = arrays.pop("replay", None)
         agent = cls(
             gymnasium.spaces.Box(-np.inf, np.inf, (metadata["observation_size"],)),
             gymnasium.spaces.Box(low, high),
             DDPGConfig(**metadata["config"]),
         )
-        agent.restore(tensors)
+        agent.restore(arrays)
         if rows is not None:
             agent.replay.restore(rows, metadata["position"])
         agent.updates = metadata["updates"]
@@ -397,15 +398,15 @@ class DDPG:
         critics = zip(self._critics, self._critic_targets, strict=True)
         return [(self._actor, self._actor_target), *critics]
 
-    def _tensors(self) -> dict[str, torch.Tensor]:
-        tensors = {}
+    def _arrays(self) -> dict[str, NDArray[np.float32]]:
+        arrays = {}
         names = ["actor", *(f"critic{k}" for k in range(1, len(self._critics) + 1))]
         adams = [self._actor_adam, *self._critic_adams]
         for name, (network, target), adam in zip(names, self._pairs(), adams, strict=True):
-            tensors[name] = network.parameters
-            tensors[f"{name}.target"] = target.parameters
-            tensors |= {f"{name}.adam.{key}": value for key, value in adam.state().items()}
-        return tensors
+            arrays[name] = network.parameters
+            arrays[f"{name}.target"] = target.parameters
+            arrays |= {f"{name}.adam.{key}": value for key, value in adam.state().items()}
+        return arrays
 
     def _check_env(self, env: gymnasium.Env[Any, Any]) -> None:
         for name, space, size in (
@@ -417,6 +418,13 @@ class DDPG:
                     f"the environment's {name} space is {space}, but the agent was made for "
                     f"{size} {name}(s): make a new agent, or wrap the environment"
                 )
+
+
+def _adam(
+    network: FlatNetwork, target: FlatNetwork, learning_rate: float, weight_decay: float = 0.0
+) -> Adam:
+    flat = network.parameters, network.gradient, target.parameters
+    return Adam(*flat, learning_rate, weight_decay)
 
 
 def _box(name: str, space: gymnasium.Space[Any]) -> gymnasium.spaces.Box:

@@ -1,4 +1,4 @@
-"""Reading and writing tensors safely: whole files only, and nothing in them is executed."""
+"""Reading and writing arrays safely: whole files only, and nothing in them is executed."""
 
 from __future__ import annotations
 
@@ -22,12 +22,8 @@ def write_whole(path: str | Path, content: bytes) -> None:
         draft.unlink(missing_ok=True)
 
 
-def read_tensors(path: str | Path, framework: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Read a safetensors file: tensors by name, and the metadata, each value JSON.
-
-    Args:
-        path: File to read.
-        framework: ``"np"`` for numpy arrays, ``"pt"`` for torch tensors.
+def read_arrays(path: str | Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Read a safetensors file: arrays by name, and the metadata, each value JSON.
 
     Raises:
         FileNotFoundError: There is no such file.
@@ -36,9 +32,9 @@ def read_tensors(path: str | Path, framework: str) -> tuple[dict[str, Any], dict
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path} is not a file")
     try:
-        with safe_open(path, framework) as file:
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        with safe_open(path, "np") as file:
+            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
             metadata = {key: json.loads(text) for key, text in (file.metadata() or {}).items()}
     except (SafetensorError, json.JSONDecodeError) as error:
         raise ValueError(f"{path} is not a safetensors file of this toolkit: {error}") from error
-    return tensors, metadata
+    return arrays, metadata

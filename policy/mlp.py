@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from safetensors.numpy import save
 
-from policy.files import read_tensors, write_whole
+from policy.files import read_arrays, write_whole
 
 FORMAT = "simgap.policy.1"
 
@@ -100,11 +100,11 @@ class MlpPolicy:
             FileNotFoundError: There is no such file.
             ValueError: The file holds something else.
         """
-        tensors, metadata = read_tensors(path, "np")
+        arrays, metadata = read_arrays(path)
         if metadata.get("format") != FORMAT:
             raise ValueError(
                 f"{path} has format {metadata.get('format')!r}, expected {FORMAT!r}: "
                 "load it with the class that saved it"
             )
-        low, high = tensors.pop("low"), tensors.pop("high")
-        return cls(tensors, low, high)
+        low, high = arrays.pop("low"), arrays.pop("high")
+        return cls(arrays, low, high)

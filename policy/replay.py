@@ -1,33 +1,34 @@
-"""Replay memory: the last transitions, in one preallocated tensor, sampled by index."""
+"""Replay memory: the last transitions, in one preallocated array, sampled by index."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-import torch
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float32]
 
 
 class Batch(NamedTuple):
-    """Transitions as float32 tensors with one row each, views into one tensor.
+    """Transitions as float32 arrays with one row each, views into one array.
 
     ``observations`` and ``next_observations`` have shape (n, n_o), ``actions`` (n, n_a),
     ``rewards`` and ``alive`` (n, 1). ``alive`` is 0 where the episode terminated in
     ``next_observations``, else 1; a time-out is not a termination.
     """
 
-    observations: torch.Tensor
-    actions: torch.Tensor
-    rewards: torch.Tensor
-    alive: torch.Tensor
-    next_observations: torch.Tensor
+    observations: Array
+    actions: Array
+    rewards: Array
+    alive: Array
+    next_observations: Array
 
 
 class Replay:
     """The last ``capacity`` transitions; the oldest is overwritten first.
 
-    A transition is one row of one tensor, so a batch is gathered in one call. Memory is
+    A transition is one row of one array, so a batch is gathered in one call. Memory is
     ``4 * capacity * (2 n_o + n_a + 2)`` bytes, claimed from the system as it fills.
 
     Args:
@@ -46,10 +47,10 @@ class Replay:
         self.size = 0
         self.position = 0
         self._sizes = [observation_size, action_size, 1, 1, observation_size]
-        self._rows = torch.empty(capacity, sum(self._sizes))
-        # Numpy's views of the same memory: writing one row through torch costs several times more.
-        edges = np.cumsum(self._sizes)[:-1]
-        self._columns = np.split(self._rows.numpy(), edges, axis=1)
+        self._rows = np.empty((capacity, sum(self._sizes)), np.float32)
+        ends = np.cumsum(self._sizes).tolist()
+        self._parts = [slice(end - size, end) for size, end in zip(self._sizes, ends, strict=True)]
+        self._columns = [self._rows[:, part] for part in self._parts]
 
     def __len__(self) -> int:
         return self.size
@@ -81,18 +82,18 @@ class Replay:
         """
         if self.size == 0:
             raise ValueError("the replay is empty: add transitions before sampling from it")
-        index = torch.from_numpy(rng.integers(self.size, size=size))
-        return Batch(*self._rows.index_select(0, index).split(self._sizes, dim=1))
+        rows = self._rows[rng.integers(self.size, size=size)]
+        return Batch(*[rows[:, part] for part in self._parts])
 
     def clear(self) -> None:
         """Forget all transitions."""
         self.size = self.position = 0
 
-    def stored(self) -> torch.Tensor:
+    def stored(self) -> Array:
         """The rows in use, in memory order, shape (size, 2 n_o + n_a + 2): for saving."""
         return self._rows[: self.size]
 
-    def restore(self, rows: torch.Tensor, position: int) -> None:
+    def restore(self, rows: Array, position: int) -> None:
         """Take over rows from ``stored`` and the place of the next write.
 
         Raises:

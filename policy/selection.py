@@ -15,7 +15,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-import torch
+from numpy.typing import NDArray
 
 from policy.ddpg import DDPG, Progress
 from policy.evaluate import Policy, evaluate
@@ -50,7 +50,7 @@ class Selection:
     """
 
     policy: MlpPolicy
-    networks: dict[str, torch.Tensor]
+    networks: dict[str, NDArray[np.float32]]
     best: Point
     curve: tuple[Point, ...]
 
@@ -115,7 +115,7 @@ def learn_and_select(
         raise ValueError("env and evaluation_env are one object: make the environment twice")
     c = agent.config
     curve: list[Point] = []
-    kept: list[tuple[MlpPolicy, dict[str, torch.Tensor], Point]] = []
+    kept: list[tuple[MlpPolicy, dict[str, NDArray[np.float32]], Point]] = []
     scored_at = -1
 
     def consider(step: int) -> bool:

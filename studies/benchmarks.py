@@ -36,7 +36,7 @@ NOTES = """\
   so that other programs on the machine hit both alike. Fits: processor time, median of 3 rounds
   (of 1 for GaussianProcessRegressor). Predictions: wall time, median over about one second.
 - DDPG: every step of the environment comes with one update of batch 64; networks 400 and 300
-  wide, float32. Sizes: `pendulum` has 3 observations and 1 action, `leo` 15 and 6. The environment
+  wide, float32. Sizes: `pendulum` has 3 observations and 1 action, `leo` 17 and 6. The environment
   costs next to nothing. "Share of its own matrix products": time of the bare products of an
   update over the time of the update. "Peak" is this machine's own sgemm of 1024 x 1024, measured
   in the same rounds.

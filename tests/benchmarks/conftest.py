@@ -12,7 +12,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 PACKAGES = (
-    "simgap", "torch", "scikit-learn", "gpytorch", "pymunk", "numpy", "scipy", "gymnasium",
+    "simgap", "torch", "scikit-learn", "gpytorch", "pymunk", "numpy", "scipy", "numba", "gymnasium",
     "stable-baselines3",
 )  # fmt: skip
 START = time.perf_counter()

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from policy.adam import Adam
-from policy.networks import Actor, Critic, FlatNetwork
+from policy.networks import Actor, Critic, FlatNetwork, Inputs
 
 sizes = st.tuples(
     st.integers(1, 80),  # observations: narrow and wide first layers
@@ -20,45 +20,33 @@ sizes = st.tuples(
 
 def spread(network: FlatNetwork, rng: np.random.Generator) -> None:
     """Give every parameter, biases and output layer too, a size that matters."""
-    values = rng.normal(size=network.parameters.shape) * 0.3
-    network.parameters.copy_(torch.from_numpy(values))
+    network.parameters[:] = rng.normal(size=network.parameters.shape) * 0.3
 
 
-def normal(rng: np.random.Generator, *shape: int) -> torch.Tensor:
-    return torch.from_numpy(rng.normal(size=shape)).float()
+def filled(rng: np.random.Generator, n_o: int, n_a: int, batch: int) -> Inputs:
+    inputs = Inputs(n_o, n_a, batch)
+    inputs.observations[:] = rng.normal(size=(n_o, batch))
+    inputs.actions[:] = rng.normal(size=(n_a, batch))
+    return inputs
 
 
-def autograd_layers(network: FlatNetwork) -> list[tuple[torch.Tensor, torch.Tensor | None]]:
-    copies = []
-    for layer in network.layers:
-        weight = layer.weight.clone().requires_grad_()
-        bias = None if layer.bias is None else layer.bias.clone().requires_grad_()
-        copies.append((weight, bias))
-    return copies
+def normal(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    return rng.normal(size=shape).astype(np.float32)
 
 
-def gradient_of(network: FlatNetwork, layers: list) -> list[tuple[torch.Tensor, torch.Tensor]]:
-    """Pairs (written by hand, from autograd) for every weight and bias."""
-    pairs = []
-    for layer, (weight, bias) in zip(network.layers, layers, strict=True):
-        pairs.append((layer._d_weight, weight.grad))
-        if bias is not None:
-            pairs.append((layer._d_bias, bias.grad))
-    return pairs
+def autograd_weights(network: FlatNetwork) -> list[torch.Tensor]:
+    return [torch.tensor(part, requires_grad=True) for part in network.weights]
 
 
-def actor_autograd(layers: list, observations: torch.Tensor) -> torch.Tensor:
-    (w1, b1), (w2, b2), (w3, b3) = layers
-    hidden = torch.relu(observations @ w1.T + b1)
-    return torch.tanh(torch.relu(hidden @ w2.T + b2) @ w3.T + b3)
-
-
-def critic_autograd(
-    layers: list, observations: torch.Tensor, actions: torch.Tensor
-) -> torch.Tensor:
-    (w1, b1), (wa, _), (w2, b2), (w3, b3) = layers
-    hidden = torch.relu(observations @ w1.T + actions @ wa.T + b1)
+def autograd(weights: list[torch.Tensor], rows: torch.Tensor) -> torch.Tensor:
+    entry, w2, b2, w3, b3 = weights
+    hidden = torch.relu(rows @ entry)
     return torch.relu(hidden @ w2.T + b2) @ w3.T + b3
+
+
+def assert_gradient(network: FlatNetwork, weights: list[torch.Tensor]) -> None:
+    for ours, theirs in zip(network.d_weights, weights, strict=True):
+        np.testing.assert_allclose(ours, theirs.grad, rtol=1e-4, atol=1e-4)
 
 
 @settings(max_examples=40, deadline=None)
@@ -68,15 +56,17 @@ def test_actor_matches_autograd(size):
     rng = np.random.default_rng(seed)
     actor = Actor(n_o, n_a, hidden, batch, rng)
     spread(actor, rng)
-    observations, d_actions = normal(rng, batch, n_o), normal(rng, batch, n_a)
-    layers = autograd_layers(actor)
-    expected = actor_autograd(layers, observations)
-    expected.backward(d_actions)
+    inputs, d_actions = filled(rng, n_o, n_a, batch), normal(rng, n_a, batch)
+    weights = autograd_weights(actor)
+    expected = torch.tanh(autograd(weights, torch.tensor(inputs.observed.T)))
+    expected.backward(torch.tensor(d_actions.T))
 
-    torch.testing.assert_close(actor.forward(observations), expected.detach(), rtol=1e-4, atol=1e-5)
-    actor.backward(observations, d_actions)
-    for ours, autograd in gradient_of(actor, layers):
-        torch.testing.assert_close(ours, autograd, rtol=1e-4, atol=1e-4)
+    observations = inputs.observations.copy()
+    actor.forward(inputs)
+    np.testing.assert_allclose(inputs.actions.T, expected.detach(), rtol=1e-4, atol=1e-5)
+    np.testing.assert_array_equal(inputs.observations, observations)
+    actor.backward(inputs, d_actions)
+    assert_gradient(actor, weights)
 
 
 @settings(max_examples=40, deadline=None)
@@ -86,47 +76,64 @@ def test_critic_matches_autograd(size):
     rng = np.random.default_rng(seed)
     critic = Critic(n_o, n_a, hidden, batch, rng)
     spread(critic, rng)
-    observations, actions = normal(rng, batch, n_o), normal(rng, batch, n_a)
-    others, d_values = normal(rng, batch, n_a).requires_grad_(), normal(rng, batch, 1)
-    layers = autograd_layers(critic)
-    expected = critic_autograd(layers, observations, actions)
-    expected.backward(d_values)
+    inputs, d_values = filled(rng, n_o, n_a, batch), normal(rng, 1, batch)
+    weights = autograd_weights(critic)
+    rows = torch.tensor(inputs.all.T, requires_grad=True)
+    expected = autograd(weights, rows)
+    expected.backward(torch.tensor(d_values.T))
+    assert rows.grad is not None
 
-    values = critic.forward(observations, actions)
-    torch.testing.assert_close(values, expected.detach(), rtol=1e-4, atol=1e-4)
-    critic.backward(observations, actions, d_values)
-    for ours, autograd in gradient_of(critic, layers):
-        torch.testing.assert_close(ours, autograd, rtol=1e-4, atol=1e-4)
-
-    # The action's gradient at other actions reuses the pass above.
-    gradient = critic.d_action(others.detach(), d_values)
-    critic_autograd(layers, observations, others).backward(d_values)
-    torch.testing.assert_close(gradient, others.grad, rtol=1e-4, atol=1e-4)
+    values = critic.forward(inputs)
+    np.testing.assert_allclose(values.T, expected.detach(), rtol=1e-4, atol=1e-4)
+    critic.backward(inputs, d_values)
+    assert_gradient(critic, weights)
+    kept = critic.gradient.copy()
+    d_actions = critic.d_actions(d_values)
+    np.testing.assert_allclose(d_actions.T, rows.grad[:, n_o + 1 :], rtol=1e-4, atol=1e-4)
+    np.testing.assert_array_equal(critic.gradient, kept)  # the actor's step leaves it alone
 
 
-def test_gradient_buffer_is_the_whole_gradient():
-    """No parameter lies outside the flat tensor, and none of it is left over."""
+def test_flat_arrays_hold_everything_once():
+    """No parameter lies outside the flat array, and none of it is left over."""
     rng = np.random.default_rng(0)
     for network in (Actor(3, 2, (40, 30), 8, rng), Critic(3, 2, (40, 30), 8, rng)):
-        parts = [p for layer in network.layers for p in (layer.weight, layer.bias)]
-        before = network.parameters.clone()
-        for part in parts:
-            if part is not None:
-                part.add_(1)
-        torch.testing.assert_close(network.parameters, before + 1)
+        before = network.parameters.copy()
+        for part in network.weights:
+            part += 1
+        np.testing.assert_array_equal(network.parameters, before + 1)
+
+
+def test_a_policy_sees_the_actor_learn():
+    actor = Actor(3, 2, (40, 30), 8, np.random.default_rng(0))
+    layers = actor.layers()
+    assert [layers[f"weight{k}"].shape for k in (1, 2, 3)] == [(40, 3), (30, 40), (2, 30)]
+    actor.parameters += 1
+    assert all((layers[f"bias{k}"] == 1).all() for k in (1, 2, 3))
 
 
 @pytest.mark.parametrize("weight_decay", [0.0, 1e-2])
 def test_adam_matches_torch(weight_decay):
-    generator = torch.Generator().manual_seed(0)
-    ours = torch.randn(50, generator=generator)
-    theirs = ours.clone().requires_grad_()
-    gradient = torch.zeros(50)
-    adam = Adam(ours, gradient, 1e-2, weight_decay)
+    rng = np.random.default_rng(0)
+    ours, gradient, target = normal(rng, 50), normal(rng, 50), np.zeros(50, np.float32)
+    theirs = torch.tensor(ours, requires_grad=True)
+    following = torch.zeros(50)
+    adam = Adam(ours, gradient, target, 1e-2, weight_decay)
     reference = torch.optim.Adam([theirs], lr=1e-2, weight_decay=weight_decay)
-    for _ in range(20):
-        gradient.copy_(torch.randn(50, generator=generator))
-        theirs.grad = gradient.clone()
-        adam.step()
+    for k in range(20):
+        gradient[:] = normal(rng, 50)
+        theirs.grad = torch.tensor(gradient)
         reference.step()
-    torch.testing.assert_close(ours, theirs.detach())
+        share = 0.1 * (k % 2)
+        adam.step(share)
+        following.lerp_(theirs.detach(), share)
+    np.testing.assert_allclose(ours, theirs.detach(), rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(target, following, rtol=1e-5, atol=1e-6)
+
+
+def test_what_is_not_finite_stays_visible():
+    """A network that has diverged must not look healthy: NaN goes through the rectifiers."""
+    critic = Critic(3, 1, (40, 30), 8, np.random.default_rng(0))
+    inputs = filled(np.random.default_rng(1), 3, 1, 8)
+    inputs.observations[0, 2] = np.nan
+    values = critic.forward(inputs)
+    assert np.isnan(values[0, 2]) and np.isfinite(np.delete(values, 2)).all()

@@ -19,7 +19,7 @@ def test_the_last_transitions_are_kept_whole(capacity, count):
     fill(replay, count)
     assert len(replay) == min(capacity, count)
     batch = replay.sample(2000, np.random.default_rng(0))
-    seen = batch.rewards[:, 0].numpy()
+    seen = batch.rewards[:, 0]
     assert set(seen) == set(range(max(0, count - capacity), count))
     np.testing.assert_array_equal(batch.observations, np.stack([seen, seen], 1))
     np.testing.assert_array_equal(batch.actions[:, 0], seen)
@@ -30,7 +30,7 @@ def test_the_last_transitions_are_kept_whole(capacity, count):
 def test_sampling_is_uniform():
     replay = Replay(10, 2, 1)
     fill(replay, 13)
-    seen = replay.sample(50_000, np.random.default_rng(0)).rewards[:, 0].numpy()
+    seen = replay.sample(50_000, np.random.default_rng(0)).rewards[:, 0]
     counts = np.unique(seen, return_counts=True)[1]
     np.testing.assert_allclose(counts, 5000, rtol=0.06)
 
@@ -39,7 +39,7 @@ def test_sampling_is_uniform():
 def test_restored_replay_goes_on_the_same(count):
     replay, other = Replay(10, 2, 1), Replay(10, 2, 1)
     fill(replay, count)
-    other.restore(replay.stored().clone(), replay.position)
+    other.restore(replay.stored().copy(), replay.position)
     for one in (replay, other):
         fill(one, 3, start=count)
     np.testing.assert_array_equal(replay.stored(), other.stored())
