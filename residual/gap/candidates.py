@@ -98,7 +98,7 @@ def candidates(
     for effect in effects:
         if effect.enters == "sensor" and effect.where not in measured:
             continue
-        known = effect.quantities(simulator)
+        known = _within_reach(effect, effect.quantities(simulator), simulator, samples)
         whole = {n: q for n, q in known.items() if q.integer and q.role == "shape"}
         for values in itertools.product(*(q.starts for q in whole.values())):
             fixed = effect.with_values(**dict(zip(whole, values, strict=True)))
@@ -106,6 +106,37 @@ def candidates(
             if effect.enters == "actuator" and effect.where in inputs:
                 reach = float(np.abs(samples.actions[:, inputs.index(effect.where)]).max())
             found.append(_candidate(fixed, known, reach))
+    return found
+
+
+def _within_reach(
+    effect: Effect, known: dict[str, Quantity], simulator: HostSimulator, samples: Samples
+) -> dict[str, Quantity]:
+    """Sizes of a joint's effect for the positions that were measured.
+
+    An angle that counts turns goes far beyond its channel's scale, where a cubic spring of usual
+    size would be a wall, and trial steps of that size would tell nothing.
+    """
+    joint = next((j for j in simulator.joints if j.name == effect.where), None)
+    if effect.enters != "joint" or joint is None:
+        return known
+    names = [channel.name for channel in simulator.physical_channels]
+    column = names.index(joint.position)
+    if column not in samples.measured:
+        return known
+    farthest = float(np.nanmax(np.abs(samples.seen[:, column])))
+    reach = max(1.0, farthest / simulator.physical_channels[column].scale)
+    found = {}
+    for field in dataclasses.fields(effect):
+        quantity = known.get(field.name)
+        if quantity is None:
+            continue
+        power = field.metadata["dimension"].get("position", 0)
+        factor = reach**power if power < 0 else 1.0
+        starts = tuple(factor * start for start in quantity.starts)
+        found[field.name] = dataclasses.replace(
+            quantity, scale=factor * quantity.scale, starts=starts
+        )
     return found
 
 

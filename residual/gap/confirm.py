@@ -202,11 +202,21 @@ def held_windows(samples: Samples, floor: Floor, scale: Array, longest: int) -> 
     return by_growth(samples, floor.slope.by_state[:, :width, :width], scale, longest)
 
 
-def earns_place(without: Array, with_it: Array) -> bool:
-    """Whether an effect lowers the held-out cost, window by window, beyond chance."""
+def earns_place(without: Array, with_it: Array, expected: float | None = None) -> bool:
+    """Whether an effect lowers the held-out cost, window by window, beyond chance.
+
+    Args:
+        without, with_it: Cost of every window.
+        expected: Fall of the cost in training, scaled to the size of the held-out data, if the
+            model leaves only noise; held-out data that are too few to prove a small effect then
+            suffice if they agree with that.
+    """
     change = without - with_it
     total = float(change.sum())
     spread = float(change.std(ddof=1)) * np.sqrt(len(change)) if len(change) > 2 else 0.0
     better, worse = np.maximum(change, 0).sum(), np.maximum(-change, 0).sum()
+    # A true gain g varies by 2 sqrt(g): one in a thousand falls this far short.
+    if expected is not None and total > max(0.0, expected - 3.1 * 2 * np.sqrt(max(expected, 0.0))):
+        return True
     # An effect that grows with distance or speed may show in one window alone.
     return total > 6.6 and bool(total > 2.0 * spread or worse < 0.2 * better)

@@ -63,6 +63,7 @@ def prove(found: Found, unseen: Samples, longest: int) -> tuple[Found, Proof]:
         rows = windows.index[windows.inside]
         size = int(np.isfinite(unseen.seen[rows][:, unseen.measured]).sum())
         proof = Proof(floor, before, after, max(size - physical * len(windows), 1))
+        share = size / arena.size
         weakest: Key | None = None
         if found.key:
             for drop in found.key:
@@ -72,7 +73,9 @@ def prove(found: Found, unseen: Samples, longest: int) -> tuple[Found, Proof]:
                     arena.refit(best, {smaller: [theta]}, most=True)
                 without = arena.tried[smaller]
                 other = np.minimum(cost(without.model.bind(without.theta)), cap)
-                fails = not confirm.earns_place(other, after)
+                expected = share * (without.merit - best.merit)
+                sound = float(after.sum()) < 1.2 * proof.freedom
+                fails = not confirm.earns_place(other, after, expected if sound else None)
                 if fails and (weakest is None or arena.score(smaller) < arena.score(weakest)):
                     weakest = smaller
         if weakest is None:
@@ -91,7 +94,7 @@ def measure(
     physical = len(simulator.physical_channels)
     path = proof.floor.nodes[:, :physical]
     jacobians = proof.floor.slope.by_state[:, :physical, :physical]
-    scheme = confirm.plan(unseen, jacobians, arena.scale, horizon)
+    scheme = confirm.plan(unseen, jacobians, foreseen(simulator, unseen, arena.scale), horizon)
 
     def run(
         simulator: HostSimulator, correction: confirm.Correction | None = None
@@ -161,6 +164,18 @@ def measure(
         float(np.sqrt(proof.before.sum() / proof.freedom)),
         float(np.sqrt(proof.after.sum() / proof.freedom)), scheme.left_out,
     ), tuple(rollouts)  # fmt: skip
+
+
+def foreseen(simulator: HostSimulator, samples: Samples, scale: Array) -> Array:
+    """Scales by which to judge how the error of a start state grows.
+
+    The variation of a position that nobody measured is not known, so its channel's scale stands
+    for it: what moves nothing that was measured must not forbid a forecast.
+    """
+    usual = [channel.scale for channel in simulator.physical_channels]
+    seen = np.isfinite(samples.seen[:, : len(usual)]).any(axis=0)
+    moving = np.array([c.kind == "rate" for c in simulator.physical_channels])
+    return np.where(seen | moving, scale, np.maximum(scale, usual))
 
 
 def order_of(found: Found) -> list[int]:

@@ -19,7 +19,7 @@ from residual.gap.candidates import Candidate
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from residual.gap.shooting import Fit
-from residual.gap.tournament import choose, rivals
+from residual.gap.tournament import choose, complete, rivals
 from residual.gap.windows import by_growth
 from sims.host import HostSimulator
 
@@ -126,4 +126,9 @@ def search(
         if not key:
             break
         theta = full.tried[key].theta
+    completed = complete(full, key)
+    if completed != key:
+        key = completed
+        model = Model(simulator, [candidates[i] for i in key])
+        floor, _ = survey(model, samples, full.tried[key].theta, floor.sigma, settings.finest)
     return Found(full, trial, key, floor, nominal_floor)

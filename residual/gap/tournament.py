@@ -64,6 +64,22 @@ def choose(arena: Arena, known: dict[Key, Array]) -> Key:
     return current
 
 
+def complete(arena: Arena, key: Key) -> Key:
+    """A set that was chosen on some runs, with what only all of them show.
+
+    Args:
+        arena: All runs, where the set and its rivals have been refitted.
+        key: The chosen set.
+    """
+    if not near_floor(arena, key):
+        return key
+    found = arena.signatures(key)
+    arena.calibrate(found)
+    if max((gain.value for gain in gains(found)), default=0.0) <= arena.threshold:
+        return key
+    return choose(arena, {key: arena.tried[key].theta})
+
+
 def challenged(arena: Arena, current: Key) -> Key:
     """The chosen set, or a pair that shares no member with it and does better.
 
