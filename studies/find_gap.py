@@ -139,6 +139,7 @@ def run(
         tolerance=study.tolerance,
         effects=effects,
         hold=study.hold,
+        measured_input=study.hold == "linear",
         horizon=study.horizon,
         rng=study.seed,
         n_jobs=jobs,

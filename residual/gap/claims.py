@@ -11,8 +11,10 @@ from residual.gap.adequacy import Remainder
 from residual.gap.candidates import Candidate, candidates
 from residual.gap.checks import integration
 from residual.gap.intervals import covariance
+from residual.gap.measure import Proof
 from residual.gap.result import Blind, Number, Rival
 from residual.gap.search import Found
+from residual.gap.shooting import Fit
 from residual.gap.verdicts import Claim
 from sims.effects.base import Effect
 from sims.effects.library import exact_aliases, library, near_combinations
@@ -22,6 +24,8 @@ from sims.host import HostSimulator
 #: are d standard errors apart, the difference is normal with mean -d^2 and deviation 2 d, and it
 #: exceeds z^2 with the largest probability at d = z: that of a normal beyond z, here 1e-3.
 TIE = float(norm.isf(1e-3)) ** 2
+#: Ratio of squared errors beyond which a rival is excluded while a remainder is left.
+CLEARLY = 1.5**2
 
 
 def aliases(
@@ -43,7 +47,9 @@ def aliases(
     return groups, tuple(sets)
 
 
-def claim(found: Found, left: Remainder, groups: dict[str, tuple[str, ...]]) -> list[Claim]:
+def claim(
+    found: Found, left: Remainder, groups: dict[str, tuple[str, ...]], proof: Proof
+) -> list[Claim]:
     """Numbers, intervals, rivals and numerics of every chosen effect, strongest first."""
     arena, best = found.arena, found.fit
     if not found.key:
@@ -78,7 +84,11 @@ def claim(found: Found, left: Remainder, groups: dict[str, tuple[str, ...]]) -> 
             if len(other) != len(found.key) or number in other:
                 continue
             difference = arena.score(other) - arena.score(found.key)
-            ratio = arena.tried[other].merit / best.merit
+            rival = arena.tried[other]
+            ratio = rival.merit / best.merit
+            if not left.adequate and CLEARLY < ratio < 4 * CLEARLY:
+                # Imperfection of either model decides; other data have to agree.
+                ratio = min(ratio, held_ratio(rival, proof))
             if excluded(difference, ratio, excess, left.adequate):
                 continue
             fresh = tuple(arena.candidates[i].label for i in other if i not in found.key)
@@ -124,7 +134,14 @@ def excluded(difference: float, ratio: float, excess: float, adequate: bool) -> 
     """Whether a rival is out: beyond chance, and, while a remainder is left, clearly worse."""
     if adequate:
         return difference > TIE * excess
-    return difference > TIE * excess and ratio > 1.5**2
+    return difference > TIE * excess and ratio > CLEARLY
+
+
+def held_ratio(rival: Fit, proof: Proof) -> float:
+    """Held-out cost of a rival over that of the chosen set."""
+    cap = 20 * max(float(np.median(proof.after)), 25.0)
+    cost = np.minimum(proof.cost(rival.model.bind(rival.theta)), cap)
+    return float(cost.sum() / max(float(proof.after.sum()), 1e-300))
 
 
 def evidence(found: Found) -> tuple[Rival, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +29,14 @@ class Proof:
         floor: Smoothed path around the corrected simulator.
         before, after: Cost of each window without and with the effects, (W,).
         freedom: Residuals less free start states.
+        cost: Cost of each window under another simulator.
     """
 
     floor: noise.Floor
     before: Array
     after: Array
     freedom: int
+    cost: Callable[[HostSimulator], Array]
 
 
 def prove(found: Found, unseen: Samples, longest: int) -> tuple[Found, Proof]:
@@ -62,7 +65,7 @@ def prove(found: Found, unseen: Samples, longest: int) -> tuple[Found, Proof]:
         before = np.minimum(cost(arena.simulator), 1e6 * cap)
         rows = windows.index[windows.inside]
         size = int(np.isfinite(unseen.seen[rows][:, unseen.measured]).sum())
-        proof = Proof(floor, before, after, max(size - physical * len(windows), 1))
+        proof = Proof(floor, before, after, max(size - physical * len(windows), 1), cost)
         share = size / arena.size
         weakest: Key | None = None
         if found.key:

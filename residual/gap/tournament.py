@@ -87,9 +87,10 @@ def challenged(arena: Arena, current: Key) -> Key:
     others: those that come close in the linear picture are refitted. They stay rivals if they
     do nearly as well.
     """
+    arena.refit(arena.tried[current], lookalikes(arena, current))
+    found, now = arena.signatures(current), arena.tried[current]
     if len(current) != 2 or not near_floor(arena, current):
         return current
-    found, now = arena.signatures(current), arena.tried[current]
     # As if the chosen pair were not there.
     residual = found.plain_residual + found.chosen @ now.theta
     whole = float(residual @ residual)
@@ -107,6 +108,43 @@ def challenged(arena: Arena, current: Key) -> Key:
     arena.refit(now, sets)
     best = min((k for k in arena.tried if len(k) == len(current)), key=arena.score)
     return best
+
+
+def lookalikes(arena: Arena, current: Key, most: int = 3) -> dict[Key, list[Array]]:
+    """Sets in which one member is replaced by an effect that moves nearly alike.
+
+    Near in the sense of the verdict (see ``claims.excluded``), with room for the linear picture.
+
+    Args:
+        arena: Where the set won.
+        current: The set.
+        most: Replacements tried for each member.
+    """
+    found, now = arena.signatures(current), arena.tried[current]
+    cost = float((now.weights * now.costs).sum())
+    slack = 3 * arena.threshold if near_floor(arena, current) else 2 * cost
+    owners = np.array([current[i] for i in now.model.owner])
+    sets: dict[Key, list[Array]] = {}
+    for drop in current:
+        gone = owners == drop
+        stay = found.chosen[:, ~gone]
+        matrix = project_out(stay, found.plain)
+        residual = found.plain_residual + found.chosen[:, gone] @ now.theta[gone]
+        residual = project_out(stay, residual[:, None])[:, 0]
+        own = float(residual @ residual) - cost
+        fresh: dict[Key, Array] = {}
+        for gain in gains(found, residual, matrix):
+            number = found.variants[gain.variants[0]].candidate
+            if number in current:
+                continue
+            if gain.value < own - slack or len(fresh) == most:
+                break
+            key, theta = arena.merged(current, [(number, gain.values[0])], drop=(drop,))
+            if key not in arena.tried:
+                fresh.setdefault(key, theta)
+        for key, theta in fresh.items():
+            sets.setdefault(key, []).append(theta)
+    return sets
 
 
 def worth(arena: Arena, smaller: Key, larger: Key) -> bool:
@@ -277,16 +315,22 @@ def backward(arena: Arena, best: Key) -> Key:
 
 
 def rivals(arena: Arena, key: Key, reach: float = 100.0) -> list[Key]:
-    """Refitted sets of the same size that come close in score, and the best without any member."""
+    """Refitted sets of the same size that come close in score, and the best without any member.
+
+    Close in cost is enough while a remainder is left, which may favour any of them.
+    """
     if not key:
         return []
     best = arena.score(key)
-    near = [
-        other
-        for other in arena.tried
-        if len(other) == len(key) and other != key and arena.score(other) - best < reach
-    ]
-    near.sort(key=arena.score)
+    if not near_floor(arena, key):
+        reach = max(reach, 1.5 * arena.tried[key].merit)
+    near: list[Key] = []
+    told = {tuple(arena.candidates[i].label for i in key)}
+    for other in sorted(arena.tried, key=arena.score):
+        labels = tuple(arena.candidates[i].label for i in other)
+        if len(other) == len(key) and arena.score(other) - best < reach and labels not in told:
+            told.add(labels)
+            near.append(other)
     unlike = [other for other in near if not set(other) & set(key)]
     close = near[: arena.settings.close]
     return close + [other for other in unlike[:1] if other not in close]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable, Iterable, Sequence
 
@@ -11,6 +12,7 @@ from residual.gap.adequacy import remainder
 from residual.gap.arena import Settings
 from residual.gap.candidates import candidates
 from residual.gap.claims import aliases, claim, evidence, hidden
+from residual.gap.contact.workflow import explain
 from residual.gap.holdout import split
 from residual.gap.measure import measure, prove
 from residual.gap.model import Model
@@ -18,6 +20,7 @@ from residual.gap.quality import kinematics
 from residual.gap.result import GapResult
 from residual.gap.samples import Hold, Samples
 from residual.gap.search import search
+from residual.gap.tournament import lookalikes
 from residual.gap.verdicts import verdicts
 from residual.gap.where import locate
 from residual.gap.workers import workers
@@ -103,20 +106,32 @@ def _find(
     unseen = Samples.join(held, substeps, hold)
     if not len(samples.measured):
         raise ValueError("no state channel was measured: every value in the trajectories is NaN")
-    horizon = 20 * simulator.dt if horizon is None else horizon
+    if horizon is None:
+        # After a few strikes of the ground no forecast of a walk means anything.
+        horizon = (10 if simulator.has_contacts else 20) * simulator.dt
     groups, sets = aliases(simulator, offered)
     kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
     pool = candidates(simulator, kept, samples)
     clock.lap("read")
 
     tell("looking for the gap")
+    if simulator.has_contacts:
+        found_there = explain(
+            simulator, samples, unseen, pool, groups, sets, quality, tolerance, horizon, rng, tell,
+            clock.lap, provisional=len(trajectories) == 1,
+        )  # fmt: skip
+        return dataclasses.replace(found_there, seconds=clock.laps)
     # Long enough for what the user cares about, and for slow effects in fast logs.
     longest = max(25, round(1.25 * horizon / float(np.median(samples.durations))))
     found = search(simulator, pool, samples, rng, settings, longest, tell)
     clock.lap("search")
 
     tell("confirming on held-out data")
+    before = found.key
     found, proof = prove(found, unseen, longest)
+    if found.key and found.key != before:
+        # What is left after something was dropped has rivals of its own.
+        found.arena.refit(found.fit, lookalikes(found.arena, found.key))
     clock.lap("confirm")
     left = remainder(
         found.fit, samples, found.arena.windows, found.arena.sigma, found.floor, found.arena.scale
@@ -125,7 +140,7 @@ def _find(
         found.arena.tried[()], samples, found.arena.windows, found.arena.sigma, found.floor,
         found.arena.scale,
     )  # fmt: skip
-    claims = claim(found, left, groups)
+    claims = claim(found, left, groups, proof)
     clock.lap("intervals")
     gap, rollouts = measure(found, proof, unseen, horizon, rng, ceiling)
     clock.lap("forecast")
