@@ -60,12 +60,15 @@ class HostSimulator(Simulator):
         joints: Where generalized forces can act.
         substeps: Sub-steps in one control period.
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
+        has_contacts: True if motion jumps at impacts, so that it can be compared with logs over
+            short windows only (``residual.gap.contact``).
     """
 
     effects: tuple[Effect, ...] = ()
     joints: tuple[Joint, ...]
     substeps: int
     has_drive_force: bool = False
+    has_contacts: bool = False
 
     @abc.abstractmethod
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:

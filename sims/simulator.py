@@ -48,7 +48,8 @@ class Channel:
 class Parameter:
     """A physical parameter that a simulator declares: value, unit, meaning and bounds.
 
-    ``value`` may be an array with one entry per row of a batch.
+    ``value`` may be an array with one entry per row of a batch. ``scale`` is a typical size, for
+    a parameter whose value is zero; otherwise the value tells.
     """
 
     value: float | Array
@@ -56,6 +57,7 @@ class Parameter:
     meaning: str
     low: float = -math.inf
     high: float = math.inf
+    scale: float = 1.0
 
 
 class Simulator(abc.ABC):

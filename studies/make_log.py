@@ -1,4 +1,4 @@
-"""Measure a pendulum that hides something, for a first try of find_gap without a log of your own.
+"""Measure a system that hides something, for a first try of find_gap without a log of your own.
 
 SciPy integrates the written-out equation of a pendulum with 0.090 kg instead of the 0.055 kg
 that sims.pendulum.Pendulum believes in, and noise is added as sensors do. One CSV file per run.
@@ -6,6 +6,11 @@ that sims.pendulum.Pendulum believes in, and noise is added as sensors do. One C
   python -m studies.make_log --output logs
   python -m studies.find_gap --simulator sims.pendulum.Pendulum --logs logs/*.csv --output gap
   python -m studies.make_log --output logs --truth.mass 0 --truth.viscous_friction 1e-4
+
+Or walks of the true Leo under a policy that studies.leo_gap learnt (docs/leo.md), simulated in
+steps of a fifth of the simulator's; one CSV file per episode, cut at its fall.
+
+  python -m studies.make_log --system leo --policy idealised.safetensors --output walks
 """
 
 from __future__ import annotations
@@ -20,7 +25,8 @@ from jsonargparse.typing import PositiveInt
 
 from sims.pendulum import IDEALISED_MASS, TRUE_MASS
 from studies.hidden.data import Truth, make_logs
-from studies.running.command import HelpFormatter, Parser
+from studies.leo.logs import write_walks
+from studies.running.command import HelpFormatter, Parser, fail
 from studies.running.files import atomic_write_text
 
 HIDDEN = Truth(mass=TRUE_MASS / IDEALISED_MASS - 1)
@@ -32,7 +38,13 @@ def build_parser() -> Parser:
         prog="python -m studies.make_log", description=__doc__, formatter_class=HelpFormatter
     )
     parser.add_argument("--output", type=Path, required=True, help="Folder for the CSV files.")
-    parser.add_function_arguments(write_logs, skip={"folder"})
+    parser.add_argument(
+        "--system", choices=("pendulum", "leo"), default="pendulum", help="What is measured."
+    )
+    parser.add_argument("--policy", type=Path, help="Leo: an agent that walks.")
+    parser.add_argument("--seed", type=int, default=0, help="Of motion and noise.")
+    parser.add_function_arguments(write_logs, skip={"folder", "seed"})
+    parser.add_function_arguments(write_walks, "walk", skip={"folder", "policy", "seed"})
     return parser
 
 
@@ -79,8 +91,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     parser = build_parser()
     given = parser.instantiate(parser.parse_args(arguments))
-    folder = given.pop("output")
-    paths = write_logs(folder, **vars(given))
+    folder, system, policy = given.pop("output"), given.pop("system"), given.pop("policy")
+    walk, seed = given.pop("walk"), given.pop("seed")
+    try:
+        if system == "pendulum":
+            paths = write_logs(folder, **vars(given), seed=seed)
+        elif policy is None:
+            raise ValueError("--system leo needs --policy, an agent that walks (docs/leo.md)")
+        else:
+            paths = write_walks(folder, policy, **vars(walk), seed=seed)
+    except (ValueError, OSError) as error:
+        fail(str(error))
     print(f"{len(paths)} runs: {paths[0]} to {paths[-1].name}")
 
 

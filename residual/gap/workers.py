@@ -6,7 +6,8 @@ import contextlib
 import contextvars
 import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -43,17 +44,26 @@ def integrate(host: HostSimulator, states: Array, inputs: Array, durations: Arra
     """``host.integrate``, in parallel over chunks of rows inside ``workers``."""
     pool = _POOL.get()
     if pool is None or len(states) < WORTH:
-        return _rows(host, states, inputs, durations)
+        return integrate_rows(host, states, inputs, durations)
     # Neighbouring rows may need more work than others, so every process gets several chunks.
     edges = np.linspace(0, len(states), 4 * pool.n_jobs + 1).astype(int)
     parts = pool(
-        delayed(_rows)(host.take(np.s_[a:b]), states[a:b], inputs[a:b], durations[a:b])
+        delayed(integrate_rows)(host.take(np.s_[a:b]), states[a:b], inputs[a:b], durations[a:b])
         for a, b in itertools.pairwise(edges)
     )
     return np.concatenate(parts)
 
 
-def _rows(host: HostSimulator, states: Array, inputs: Array, durations: Array) -> Array:
+def each(work: Callable[[Any], Any], pieces: Sequence[Any]) -> list[Any]:
+    """``work`` done on every piece, shared among processes inside ``workers``."""
+    pool = _POOL.get()
+    if pool is None or len(pieces) < 2:
+        return [work(piece) for piece in pieces]
+    return list(pool(delayed(work)(piece) for piece in pieces))
+
+
+def integrate_rows(host: HostSimulator, states: Array, inputs: Array, durations: Array) -> Array:
+    """``host.integrate`` in this process; a row that runs away is put far away."""
     # A trial that runs away is a number like any other here: it loses.
     try:
         with np.errstate(all="ignore"):
@@ -75,7 +85,7 @@ def _survivors(host: HostSimulator, states: Array, inputs: Array, durations: Arr
     half = len(states) // 2
     return np.concatenate(
         [
-            _rows(host.take(part), states[part], inputs[part], durations[part])
+            integrate_rows(host.take(part), states[part], inputs[part], durations[part])
             for part in (np.s_[:half], np.s_[half:])
         ]
     )

@@ -35,10 +35,10 @@ class ParameterChange(Effect):
         return self.parameter
 
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
-        """Unit and nominal size of the parameter (1 for a parameter that is zero)."""
+        """Unit and nominal size of the parameter (its scale for a parameter that is zero)."""
         parameter = place("parameter", self.parameter, simulator.parameters)
         size = float(np.max(np.abs(parameter.value)))
-        return {"parameter": (parameter.unit, size or 1.0)}
+        return {"parameter": (parameter.unit, size or parameter.scale)}
 
     def quantities(self, simulator: HostSimulator) -> dict[str, Quantity]:
         """As for every effect; bounds keep the parameter within its own."""

@@ -61,16 +61,22 @@ def leo_parameters(
         "thigh_mass": Parameter(THIGH.mass, "kg", "mass of each thigh", low=0.02),
         "shank_mass": Parameter(SHANK.mass, "kg", "mass of each shank", low=0.02),
         "foot_mass": Parameter(FOOT.mass, "kg", "mass of each foot", low=0.02),
-        "boom_mass": Parameter(0.0, "kg", "mass of the boom that the hip carries", low=0.0),
+        "boom_mass": Parameter(
+            0.0, "kg", "mass of the boom that the hip carries", low=0.0, scale=0.5
+        ),
         "gravity": Parameter(9.81, "m/s^2", "acceleration of gravity", low=0.0),
-        "slope": Parameter(0.0, "rad", "how steeply the ground rises forward", low=-1.0, high=1.0),
+        "slope": Parameter(
+            0.0, "rad", "how steeply the ground rises forward", low=-1.0, high=1.0, scale=0.1
+        ),
         "ground_friction": Parameter(10.0, "1", "friction of the soles on the ground", low=0.0),
         "torque_constant": Parameter(
             TORQUE_CONSTANT, "N m/A", "torque constant of each motor with its gear", low=1e-2
         ),
         "resistance": Parameter(RESISTANCE, "ohm", "resistance of each winding", low=1e-2),
         "supply": Parameter(1.0, "1", "share of the commanded voltage that arrives", low=0.0),
-        "friction": Parameter(friction, "N m s/rad", "viscous friction of all joints", low=0.0),
+        "friction": Parameter(
+            friction, "N m s/rad", "viscous friction of all joints", low=0.0, scale=0.3
+        ),
     }
 
 
@@ -101,6 +107,7 @@ class Leo(HostSimulator):
     name = "leo"
     joints = JOINTS
     has_drive_force = True
+    has_contacts = True
 
     def __init__(
         self,

@@ -1,0 +1,101 @@
+"""Fit of the strengths of some effects together with the start state of every window."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.contact.columns import chosen_changes
+from residual.gap.contact.quadratic import Quadratic, minimise
+from residual.gap.contact.shots import Aimed, Shots, aim, residual, shoot
+from residual.gap.contact.student import losses
+from residual.gap.model import Model
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Refined:
+    """A model fitted to windows.
+
+    Attributes:
+        model: Simulator with the effects.
+        theta: Their numbers, (p,).
+        aimed: The windows shot from their best start states.
+        loss: Robust loss of every window, (W,).
+    """
+
+    model: Model
+    theta: Array
+    aimed: Aimed
+    loss: Array
+
+    @property
+    def total(self) -> float:
+        """Sum of the losses."""
+        return float(self.loss.sum())
+
+
+def settle(
+    model: Model, theta: Array, shots: Shots, starts: Array, turns: int, slope: Array | None = None
+) -> Refined:
+    """Start states alone, the strengths as they are; see ``aim``."""
+    aimed = aim(model, theta, shots, starts, turns, slope=slope)
+    return Refined(model, theta, aimed, losses(aimed.costs, shots.freedom))
+
+
+def refine(
+    model: Model, theta: Array, shots: Shots, near: Aimed, turns: int = 3, settled: float = 3e-3
+) -> Refined:
+    """Strengths and start states in turns, each turn from a fresh derivative of both.
+
+    Args:
+        theta: First guess of the strengths, (p,).
+        near: The windows as shot by a similar model.
+        turns: At most so many.
+        settled: Stop when the loss falls by a smaller share.
+    """
+    theta = np.clip(theta, model.low, model.high)
+    best = settle(model, theta, shots, near.starts, 1, near.by_start)
+    for _ in range(turns if len(theta) else 0):
+        strengths, starts = step(best, shots)
+        fresh = settle(model, strengths, shots, starts, 1, best.aimed.by_start)
+        gain = best.total - fresh.total
+        if gain > 0:
+            best = fresh
+        if gain < settled * best.total:
+            break
+    return best
+
+
+def quadratic(found: Refined, shots: Shots, changes: Array) -> Quadratic:
+    """The windows as quadratic functions of changes (W, R, p) by the strengths."""
+    aimed = found.aimed
+    return Quadratic.of(
+        aimed.by_start, aimed.residual, changes, shots.freedom, found.model.low - found.theta
+    )
+
+
+def step(found: Refined, shots: Shots) -> tuple[Array, Array]:
+    """Strengths and start states a step of Gauss and Newton further, or a part of it."""
+    model, aimed = found.model, found.aimed
+    changes = chosen_changes(model, found.theta, shots, aimed)
+    _, (change,) = minimise(quadratic(found, shots, changes), [tuple(range(len(model)))])
+    full = np.clip(found.theta + change, model.low, model.high) - found.theta
+    inverse = np.linalg.pinv(aimed.by_start, rcond=1e-8)
+    shares = (1.0, 0.4, 0.15)
+    for share in shares:
+        move = share * full
+        target = aimed.residual - (changes @ move)
+        options = np.stack([aimed.starts, aimed.starts + (inverse @ target[..., None])[..., 0]])
+        outputs = shoot(model, found.theta + move, shots, options)
+        costs = np.stack(
+            [(residual(shots, *pair) ** 2).sum(1) for pair in zip(options, outputs, strict=True)]
+        )
+        # An impact may spoil the linear start of one window without spoiling the step.
+        starts = np.where((costs[0] < costs[1])[:, None], *options)
+        if losses(costs.min(axis=0), shots.freedom).sum() < found.total or share == shares[-1]:
+            break
+    return found.theta + move, starts

@@ -1,0 +1,79 @@
+"""Logs of a walking Leo as its sensors would write them: noisy encoders, rates if asked for."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from jsonargparse.typing import NonNegativeFloat, PositiveInt
+
+from policy.ddpg import DDPG
+from policy.evaluate import collect
+from policy.noise import OrnsteinUhlenbeck
+from sims.environment import SimulatorEnv
+from sims.leo import Leo, Walking
+from studies.running.files import atomic_write_text
+
+#: Sub-steps of 0.04 ms, a fifth of what find_gap explains the log with.
+SUBSTEPS = 150
+#: Noise of x and z in m, of angles in rad, and of rates in m/s and rad/s.
+PLACE, ANGLE, RATE = 1e-3, 2e-3, 0.1
+#: Transitions below which a walk tells next to nothing: it fell at once.
+SHORTEST = 14
+
+
+def write_walks(
+    folder: Path,
+    policy: Path,
+    torso_mass: float = 1.25,
+    friction: NonNegativeFloat = 0.03,
+    transitions: PositiveInt = 1000,
+    exploration: NonNegativeFloat = 0.08,
+    rates: bool = False,
+    seed: int = 0,
+) -> list[Path]:
+    """Write walks as CSV files, one for each episode, cut at its fall.
+
+    Args:
+        folder: Where to.
+        policy: An agent that walks: ``policies/idealised.safetensors`` of studies.leo_gap.
+        torso_mass: kg; 0.94226 is the idealised Leo.
+        friction: Viscous friction of all joints, N m s/rad.
+        transitions: Control steps of 0.03 s in all; those of episodes shorter than 14 steps are
+            not written.
+        exploration: Exploration noise, as ``--ddpg.noise_sigma``.
+        rates: Whether rates were measured too.
+        seed: Of starts, exploration and sensor noise.
+
+    Returns:
+        The files.
+    """
+    leo = Leo(torso_mass, friction, substeps=SUBSTEPS)
+    env = SimulatorEnv(leo, Walking(start_at="around"))
+    rng = np.random.default_rng(seed)
+    walker = DDPG.load(policy).policy
+    noise = OrnsteinUhlenbeck(6, exploration, 0.15, rng)
+    names = [channel.name for channel in leo.state_channels]
+    spread = np.repeat([PLACE, ANGLE, RATE], [2, 7, 9])
+    kept = len(names) if rates else 9
+    header = ",".join(["time", *names[:kept], *(c.name for c in leo.action_channels)])
+    paths: list[Path] = []
+    for run in collect(walker, env, transitions, 1000 * seed, noise):
+        if len(run.actions) < SHORTEST or run.states is None:
+            continue
+        seen = run.states + spread * rng.standard_normal(run.states.shape)
+        times = leo.dt * np.arange(len(seen))
+        # The last command is never applied; a log holds it all the same.
+        volts = np.vstack([run.actions, run.actions[-1:]])
+        text = io.StringIO()
+        table = np.column_stack([times, seen[:, :kept], volts])
+        np.savetxt(text, table, "%.9g", ",", header=header, comments="")
+        paths.append(folder / f"walk-{len(paths) + 1:02d}.csv")
+        atomic_write_text(paths[-1], text.getvalue())
+    if not paths:
+        raise ValueError(
+            f"every walk of {policy} fell within {SHORTEST} steps: give a policy that walks, or "
+            "less exploration"
+        )
+    return paths
