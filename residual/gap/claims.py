@@ -92,6 +92,11 @@ def claim(
             if excluded(difference, ratio, excess, left.adequate):
                 continue
             fresh = tuple(arena.candidates[i].label for i in other if i not in found.key)
+            if smaller in arena.tried and len(fresh) == 1:
+                # Beside a remainder many are near; a rival has to do what the effect does.
+                rest = arena.tried[smaller].merit
+                if rest - rival.merit < 0.5 * (rest - best.merit):
+                    continue
             known = ties if len(fresh) == 1 else instead
             name = " with ".join(fresh)
             if name not in known:

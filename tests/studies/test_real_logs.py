@@ -49,7 +49,11 @@ def test_the_cart_hangs_on_a_spring_and_is_damped_weakly(tmp_path):
 
 def test_the_heater_is_late(tmp_path):
     result = ask("heater", [DATA / "heater" / "data_step_test.csv"], tmp_path / "gap")
-    assert named(result) & {"delay", "actuator_lag"}
+    assert result.verdicts[0].effect in ("delay", "actuator_lag")
+    assert all("provisional" in v.says for v in result.verdicts if v.effect)
+    # A step of the input lies in the held-out end; 0.39 K is what the key's repair leaves.
+    assert result.gap.before.value > 1
+    assert result.gap.after.value <= 1.5 * 0.39
 
 
 def test_the_falling_phone_meets_drag(tmp_path):
@@ -59,12 +63,14 @@ def test_the_falling_phone_meets_drag(tmp_path):
     (drag,) = [v for v in result.verdicts if v.effect]
     assert drag.effect == "quadratic_drag"
     assert 0.03 < drag.parameters["coefficient"].value < 0.07
+    assert result.gap.horizon_s > 0.15
+    assert result.gap.after.value < 0.4 * result.gap.before.value
 
 
 @pytest.mark.long
 def test_the_second_pendulum_may_carry_more_mass(tmp_path):
     result = ask("pendulum_pair", [DATA / "pendulum-pair" / "run_b.csv"], tmp_path / "gap")
-    assert "payload" in named(result)
+    assert {"payload", "actuator_gain"} <= named(result)
     assert result.gap.after.value < 0.5 * result.gap.before.value
 
 
