@@ -1,6 +1,7 @@
 """Learning a controller in any Gymnasium environment with box spaces: DDPG, for one core."""
 
-from policy.ddpg import DDPG, DDPGConfig, Progress
+from policy.config import DDPGConfig
+from policy.ddpg import DDPG, Progress
 from policy.evaluate import Policy, Rollout, collect, evaluate, rollout
 from policy.mlp import MlpPolicy
 from policy.noise import OrnsteinUhlenbeck

@@ -22,7 +22,7 @@ from typing import Any
 
 from sklearn.base import BaseEstimator
 
-from policy.ddpg import DDPGConfig
+from policy.config import DDPGConfig
 from studies.learning.stages import Stages
 from studies.learning.steps import LearningSteps, Problem, describe, seeded
 from studies.running.files import read_json

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 from sklearn.base import BaseEstimator, clone
 
-from policy.ddpg import DDPG, DDPGConfig
+from policy.config import DDPGConfig
+from policy.ddpg import DDPG
 from policy.evaluate import Rollout, collect, rollout
 from policy.mlp import MlpPolicy
 from policy.noise import OrnsteinUhlenbeck

@@ -23,7 +23,7 @@ import yaml
 from jsonargparse.typing import NonNegativeFloat, PositiveInt
 from sklearn.base import BaseEstimator
 
-from policy.ddpg import DDPGConfig
+from policy.config import DDPGConfig
 from residual import DropoutNet
 from studies.learning.loop import Budget, learn_by_difference
 from studies.learning.stages import Stages

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from policy.ddpg import DDPGConfig
+from policy.config import DDPGConfig
 from residual import Linear
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp

@@ -1,0 +1,79 @@
+"""The settings of DDPG."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+
+@dataclasses.dataclass(frozen=True)
+class DDPGConfig:
+    """Settings of ``DDPG``; the defaults are the paper's, TD3's additions are off.
+
+    Args:
+        hidden: Widths of the two hidden layers of the actor and of the critic.
+        actor_lr: Adam's step size for the actor.
+        critic_lr: Adam's step size for the critic.
+        critic_weight_decay: Factor of the critic's parameters added to their gradient.
+        tau: Share of the way that the target networks move in each update.
+        gamma: Discount per step.
+        batch: Transitions per update.
+        replay: Transitions remembered; the oldest are overwritten.
+        noise_sigma: Exploration noise: standard deviation of its increment per step, in units
+            of the action normalised to [-1, 1].
+        noise_theta: Exploration noise: share forgotten per step.
+        reward_scale: Factor on the rewards that the critic learns; returns are reported
+            without it.
+        warm_up: Transitions that must be in the replay before updates start; until then the
+            current policy acts, with noise.
+        updates_per_step: Updates after each step of the environment.
+        twin_critics: Learn two critics and use the smaller target value (TD3).
+        target_noise: Standard deviation of the noise on the target's action (TD3: 0.2).
+        target_noise_clip: Bound on that noise.
+        actor_delay: Critic updates per update of the actor and the targets (TD3: 2).
+
+    Raises:
+        ValueError: A value lies outside its range; the message says which.
+    """
+
+    hidden: tuple[int, int] = (400, 300)
+    actor_lr: float = 1e-4
+    critic_lr: float = 1e-3
+    critic_weight_decay: float = 0.0
+    tau: float = 1e-3
+    gamma: float = 0.99
+    batch: int = 64
+    replay: int = 300_000
+    noise_sigma: float = 0.12
+    noise_theta: float = 0.15
+    reward_scale: float = 0.1
+    warm_up: int = 1000
+    updates_per_step: int = 1
+    twin_critics: bool = False
+    target_noise: float = 0.0
+    target_noise_clip: float = 0.5
+    actor_delay: int = 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "hidden", tuple(self.hidden))
+        if len(self.hidden) != 2:
+            raise ValueError(f"hidden is {self.hidden}, expected the widths of two layers")
+        for name, low, high in (
+            ("tau", 0, 1),
+            ("gamma", 0, 1),
+            ("noise_theta", 0, 1),
+            ("actor_lr", 0, math.inf),
+            ("critic_lr", 0, math.inf),
+            ("critic_weight_decay", 0, math.inf),
+            ("noise_sigma", 0, math.inf),
+            ("target_noise", 0, math.inf),
+            ("target_noise_clip", 0, math.inf),
+            ("batch", 1, math.inf),
+            ("warm_up", 0, math.inf),
+            ("updates_per_step", 0, math.inf),
+            ("actor_delay", 1, math.inf),
+            ("replay", self.batch, math.inf),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"{name} is {value}, expected a value from {low} to {high}")
