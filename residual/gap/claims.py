@@ -79,7 +79,8 @@ def claim(
             artefact = True
         smaller = tuple(i for i in found.key if i != number)
         alone = arena.score(smaller) if smaller in arena.tried else np.inf
-        ties, instead = [], []
+        ties: list[str] = []
+        instead: list[str] = []
         for other in arena.tried:
             if len(other) != len(found.key) or number in other:
                 continue
