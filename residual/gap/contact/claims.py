@@ -14,7 +14,7 @@ from residual.gap.contact.quadratic import minimise
 from residual.gap.contact.refine import Refined, quadratic, refine
 from residual.gap.contact.search import Key, Search
 from residual.gap.contact.shots import Shots
-from residual.gap.contact.student import weights
+from residual.gap.contact.student import losses, trimmed_drop, weights
 from residual.gap.result import Blind, Number, Rival
 from residual.gap.verdicts import Claim
 
@@ -32,6 +32,28 @@ def bootstrap(found: Refined, shots: Shots, rng: np.random.Generator, draws: int
     return np.std([minimise(around.take(pick), every)[1][0] for pick in picks], axis=0)
 
 
+def idle(found: Refined, shots: Shots, material: float) -> list[int]:
+    """Positions of the chosen effects whose absence costs less than a material effect.
+
+    All windows tell, by the quadratic model; the search has seen some of them only.
+    """
+    model = found.model
+    changes = chosen_changes(model, found.theta, shots, found.aimed)
+    around = quadratic(found, shots, changes)
+    lacking = []
+    for position in range(len(model.chosen)):
+        own = model.owner == position
+        there = around.moved(np.where(own, -found.theta, 0.0))
+        others = tuple(int(j) for j in np.flatnonzero(~own))
+        change = np.zeros(len(own))
+        if others:
+            change[list(others)] = minimise(there, [others])[1][0]
+        without = losses(there.costs(change), shots.freedom)
+        if trimmed_drop(without, found.loss) < material:
+            lacking.append(position)
+    return lacking
+
+
 def finer(found: Refined, shots: Shots) -> Array:
     """The strengths refitted at half the integration step, (p,)."""
     samples = dataclasses.replace(shots.samples, substeps=2 * shots.samples.substeps)
@@ -40,13 +62,18 @@ def finer(found: Refined, shots: Shots) -> Array:
 
 
 def challenge(search: Search, key: Key, most: int = 2) -> None:
-    """Refit what comes near the chosen set with one effect exchanged, and the set less each."""
+    """Refit what comes near the chosen set with one effect exchanged, ``most`` for each effect."""
     found, around = search.signatures(key)
     sets = search.ranked(key, found, around, len(key))
-    near = [p for p in sets if len(set(p.key) - set(key)) == 1 and p.key not in search.tried]
-    limit = search.tried[key].total * (1 + 3 * search.rules.material)
-    for proposal in [p for p in near if p.loss < limit][:most]:
-        search.refit(proposal, key)
+    limit = losses(around.c, around.freedom).sum() * (1 + 2 * search.rules.material)
+    near = [p for p in sets if p.loss < limit and p.key not in search.tried]
+    for gone in key:
+        instead = [p for p in near if set(key) - set(p.key) == {gone}]
+        for proposal in instead[:most]:
+            search.refit(proposal, key)
+    for rival in [k for k in search.tried if len(k) == len(key) and k != key]:
+        if search.drop(rival, key) < 3 * search.rules.material:
+            search.level(rival, key)
 
 
 def claims(

@@ -32,6 +32,23 @@ class Refined:
     aimed: Aimed
     loss: Array
 
+    def with_better(self, again: Refined) -> Refined:
+        """The better of two fits of the same strengths, window by window."""
+        won = again.loss < self.loss
+        mine, theirs = self.aimed, again.aimed
+        aimed = Aimed(
+            *(
+                np.where(won.reshape(-1, *([1] * (a.ndim - 1))), b, a)
+                for a, b in (
+                    (mine.starts, theirs.starts),
+                    (mine.shown, theirs.shown),
+                    (mine.residual, theirs.residual),
+                    (mine.by_start, theirs.by_start),
+                )
+            )
+        )
+        return dataclasses.replace(self, aimed=aimed, loss=np.where(won, again.loss, self.loss))
+
     @property
     def total(self) -> float:
         """Sum of the losses."""

@@ -118,31 +118,37 @@ class Search:
 
     def round(self, current: Key) -> Key:
         """The best of the current set, sets up to one larger, and sets with effects exchanged."""
-        self.repeat(current)
         for proposal in self.proposals(current)[: self.rules.tries]:
             self.refit(proposal, current)
         return self.best(current)
 
-    def repeat(self, key: Key) -> None:
-        """Give a set the same further iterations that its challengers get."""
-        now = self.tried[key]
-        again = settle(now.model, now.theta, self.shots, now.aimed.starts, 1, now.aimed.by_start)
-        if again.total < now.total:
-            self.tried[key] = again
+    def level(self, one: Key, other: Key) -> None:
+        """Let two sets try each other's start states, so that neither wins by its iterations.
+
+        A start state is found by search, and to go on searching lowers the loss of any set.
+        """
+        starts = {key: self.tried[key].aimed for key in (one, other)}
+        for key, near in ((one, starts[other]), (other, starts[one])):
+            now = self.tried[key]
+            again = settle(now.model, now.theta, self.shots, near.starts, 1, near.by_start)
+            self.tried[key] = now.with_better(again)
 
     def best(self, current: Key) -> Key:
         """The set that beats the current one: materially if larger, at all if not."""
         chosen = current
-        for key, found in self.tried.items():
-            if not 0 < len(key) <= self.rules.most:
-                continue
-            drop = trimmed_drop(self.tried[chosen].loss, found.loss)
-            if drop > self.rules.material * max(len(key) - len(chosen), 0):
-                chosen = key
+        rivals = [key for key in self.tried if 0 < len(key) <= self.rules.most]
+        for key in sorted(rivals, key=lambda key: (len(key), self.tried[key].total)):
+            if key != chosen and self.beats(key, chosen):
+                self.level(key, chosen)
+                chosen = key if self.beats(key, chosen) else chosen
         for smaller in [tuple(i for i in chosen if i != gone) for gone in chosen]:
-            if smaller in self.tried and self.drop(smaller, chosen) < self.rules.material:
+            if smaller in self.tried and not self.beats(chosen, smaller):
                 return smaller
         return chosen
+
+    def beats(self, key: Key, other: Key) -> bool:
+        """Whether a set lowers the loss of another enough for its size."""
+        return self.drop(other, key) > self.rules.material * max(len(key) - len(other), 0)
 
     def drop(self, smaller: Key, larger: Key) -> float:
         """Trimmed share by which one set lowers the loss of another."""

@@ -17,7 +17,7 @@ from residual.gap.contact import claims as told
 from residual.gap.contact.forecast import errors, forecast, median_span, noise_errors, plan
 from residual.gap.contact.noise import quieten, spread, with_noise
 from residual.gap.contact.refine import Refined, refine, settle
-from residual.gap.contact.search import Key, Rules, Search
+from residual.gap.contact.search import Key, Proposal, Rules, Search
 from residual.gap.contact.shots import Shots
 from residual.gap.contact.windows import lay_out, pieces, scales, some
 from residual.gap.model import Model
@@ -49,8 +49,8 @@ def explain(
     tell("refining on all windows")
     whole = lay_out(simulator, samples, some(cut, MEASURED_ON))
     whole = with_noise(whole, search.shots.sigma, scales(simulator))
+    key, full = prove(search, key, whole, tell)
     chosen = search.tried[key]
-    full = fit_all(chosen.model, chosen.theta, whole)
     sigma, error = spread(whole, full.aimed)
     told.challenge(search, key)
     fine = told.finer(chosen, search.shots) if key else np.zeros(0)
@@ -137,6 +137,23 @@ def name(
         search = Search(simulator, pool, shots, rules, tell)
         search.begin(key, theta, nominal, near)
     return search, key
+
+
+def prove(
+    search: Search, key: Key, whole: Shots, tell: Callable[[str], None]
+) -> tuple[Key, Refined]:
+    """The fit to all windows; effects that are not material there are left out."""
+    while True:
+        chosen = search.tried[key]
+        full = fit_all(chosen.model, chosen.theta, whole)
+        lacking = told.idle(full, whole, search.rules.material)
+        if not lacking:
+            return key, full
+        smaller = tuple(i for place, i in enumerate(key) if place != lacking[0])
+        tell(f"not material on all windows: {search.candidates[key[lacking[0]]].label}")
+        theta = chosen.theta[chosen.model.owner != lacking[0]]
+        search.refit(Proposal(smaller, theta, 0.0), key)
+        key = smaller
 
 
 def fit_all(model: Model, theta: Array, shots: Shots) -> Refined:
