@@ -206,6 +206,8 @@ class GapResult:
         threshold: Fall of the cost that an effect needs, and how much noise alone reached in
             simulated no-gap data (99.9 % point).
         seconds: Time spent, by stage.
+        robust: True if every window had one robust vote and forecast errors are medians over
+            forecasts (systems with contacts).
     """
 
     verdicts: tuple[Verdict, ...]
@@ -221,3 +223,4 @@ class GapResult:
     blind: tuple[Blind, ...]
     threshold: tuple[float, float]
     seconds: dict[str, float]
+    robust: bool = False

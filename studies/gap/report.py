@@ -174,11 +174,14 @@ def bars(result: GapResult, folder: Path) -> Figure:
         if gap.left_out > 0.005
         else ""
     )
+    error = "Root mean square error"
+    if result.robust:
+        error = "Median over forecasts of the root mean square error"
     return Figure(
         shrinking(result, folder / "gap.png"),
         f"The error falls from {gap.before.value:.3g} to {gap.after.value:.3g} {gap.unit}; noise "
         f"alone gives {gap.noise_floor.value:.3g}.",
-        f"Root mean square error of {gap.channel} over {seconds_text(gap.horizon_s)} on held-out "
+        f"{error} of {gap.channel} over {seconds_text(gap.horizon_s)} on held-out "
         "data, with the 95 % interval over forecasts. **Noise floor**: what the corrected "
         f"simulator would reach on its own data plus noise. **Flexible estimator**: the nominal "
         f"simulator plus a learnt correction without physics.{left_out}",
@@ -244,12 +247,19 @@ def evidence(result: GapResult) -> Table:
     for rival in result.evidence[:RIVALS]:
         judged = "chosen" if rival.chosen else "excluded" if rival.excluded else "not excluded"
         rows.append([set_name(rival.effects), float(rival.ratio), float(rival.excess), judged])
+    judged_by = (
+        "The score is chi-squared plus a price for each number; an effect had to lower it by "
+        f"{result.threshold[0]:.3g}, calibrated on data without a gap."
+    )
+    if result.robust:
+        judged_by = (
+            "The score is a robust loss in which every window has one vote; an effect had to lower "
+            f"it by {result.threshold[0]:.3g}, the windows that gain and lose most left out."
+        )
     return Table(
         ["explanation", "residual / noise", "score above the chosen", "judgement"],
         rows,
-        "Every explanation is refitted in full on the training data. The score is chi-squared "
-        "plus a price for each number; an effect had to lower it by "
-        f"{result.threshold[0]:.3g}, calibrated on data without a gap.",
+        f"Every explanation is refitted in full on the training data. {judged_by}",
         highlight=[i for i, rival in enumerate(result.evidence[:RIVALS]) if rival.chosen],
         heading="Evidence and runners-up",
     )

@@ -92,6 +92,7 @@ def explain(
         blind=blind,
         threshold=(rules.material * search.tried[key].total, 0.0),
         seconds={},
+        robust=True,
     )  # fmt: skip
 
 
