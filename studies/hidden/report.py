@@ -132,9 +132,12 @@ def headlines(data: pd.DataFrame) -> pd.DataFrame:
     )
     add("nothing hidden, yet a name", "at most 1 %", ours[nothing], named)
     add("nothing hidden, yet unexplained", "at most 3 %", ours[nothing], ours["unexplained"])
-    left = ours["unexplained"].astype(bool) | ours["first_alike"].eq(True)
+    # A doubt that names the removed effect could not be had if nobody knew of it.
+    inside = ours["doubted_for_it"].eq(True)
+    left = (ours["unexplained"].astype(bool) & ~inside) | ours["first_alike"].eq(True)
     add("removed from the library: unexplained, or a near-twin", "90 %", ours[removed], left)
-    add("removed: a confident wrong name", "", ours[removed], wrong)
+    add("removed: a confident wrong name, or doubted only by what was removed", "",
+        ours[removed], wrong | inside)  # fmt: skip
     outside = ours[ours["block"] == "outside"]
     add("outside of every library: unexplained", "", outside, ours["unexplained"])
     add("outside: a confident wrong name", "", outside, wrong)

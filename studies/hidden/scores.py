@@ -96,6 +96,12 @@ def score(
     sure = [v.effect for v in result.verdicts if v.effect and v.kind == "confirmed"]
     said = {name.split("@")[0] for v in result.verdicts if v.effect for name in v.alternatives}
     kinds = [v.kind for v in result.verdicts]
+    doubts = {
+        label.split("@")[0]
+        for v in result.verdicts
+        if v.kind == "unexplained"
+        for label in v.alternatives
+    }
     hidden = [*strengths, *(["outside"] if outside else [])]
     row = score_names(named, hidden)
     row["false_sure"] = score_names(sure, hidden)["false"]
@@ -108,6 +114,7 @@ def score(
         "kinds": kinds,
         "no_gap": "no_gap" in kinds,
         "unexplained": "unexplained" in kinds,
+        "doubted_for_it": any(same(name) & doubts for name in strengths),
         "covered": coverage(result, strengths) if row["exactly"] and row["first"] else [],
         "before": result.gap.windows_before,
         "after": result.gap.windows_after,
