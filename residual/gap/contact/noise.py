@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def first_guess(samples: Samples, nodes: Array) -> Array:
-    """A hundredth of what each measured channel moves in a few steps, (m,)."""
+    """A tenth of what each measured channel usually moves from sample to sample, (m,)."""
     steps = np.abs(np.diff(nodes[:, samples.measured], axis=0))
     inside = np.ones(len(steps), bool)
     inside[[stop - 1 for _, stop in samples.runs[:-1]]] = False

@@ -62,6 +62,7 @@ class Search:
 
     Attributes:
         tried: Every refitted set: sorted candidate numbers -> fit.
+        around: Columns of all candidates around a set, for those that were asked for.
     """
 
     def __init__(

@@ -70,8 +70,3 @@ def some(cut: list[tuple[int, int, int]], most: int) -> list[tuple[int, int, int
     if len(cut) <= most:
         return cut
     return [cut[int(i)] for i in np.linspace(0, len(cut) - 1, most).round()]
-
-
-def rows_of(shots: Shots) -> NDArray[np.int64]:
-    """First row of every window, (W,)."""
-    return shots.windows.index[:, 0]

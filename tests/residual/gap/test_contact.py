@@ -43,6 +43,7 @@ def struggle(system, rows, steps, seed):
 OFFERED = [ParameterChange(n) for n in ("torso_mass", "friction", "supply", "gravity", "slope")]
 
 
+@pytest.mark.long
 def test_two_effects_are_named_with_their_values():
     logs = struggle(reference.TRUE, rows=6, steps=22, seed=0)
     result = find_gap(Leo(), logs, effects=OFFERED, rng=0)
