@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure as Drawing
+from matplotlib.ticker import ScalarFormatter
 
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
@@ -26,6 +28,8 @@ from studies.reporting.figures import PALETTE, new_figure, save_figure, styled
 PAPER_RETURNS = {"idealised": -15508.0, "difference": -660.0}
 PAPER_FIXED_BUDGET = {"cold": "-20507.6 ± 2801.9", "warm": "-14087.2 ± 235.6",
                       "difference": "-657.2 ± 22.9"}  # fmt: skip
+# Errors below are drawn here, or a model without error would flatten all others.
+LEAST_SHOWN = 1e-5
 PAPER_FIXED_RETURN = {"cold": "82164 ± 7498", "warm": "23383 ± 2357", "difference": "3750"}
 
 
@@ -235,6 +239,12 @@ def difference_samples_to_target(rows: pd.DataFrame) -> dict[str, list[int]]:
     }
 
 
+def plain_ticks(axis: Axis) -> None:
+    """Numbers in place of powers of ten, where a logarithmic axis covers few of them."""
+    axis.set_major_formatter(ScalarFormatter())
+    axis.set_minor_formatter(ScalarFormatter())
+
+
 @styled()
 def budget_figure(rows: pd.DataFrame, errors: pd.DataFrame, optimum: float, path: Path) -> Drawing:
     """Minus the return, and the one-step error, against the budget by estimator."""
@@ -242,21 +252,21 @@ def budget_figure(rows: pd.DataFrame, errors: pd.DataFrame, optimum: float, path
     first = rows[(rows["name"] == "difference") & (rows["iteration"] == 1)]
     visited = errors[(errors["where"] == "visited") & (errors["iteration"] == 1)]
     numbers = []
-    for colour, (estimator, part) in zip(
-        PALETTE * 2, first.groupby("estimator", sort=False), strict=False
-    ):
+    groups = list(first.groupby("estimator", sort=False))
+    for place, (colour, (estimator, part)) in enumerate(zip(PALETTE * 2, groups, strict=False)):
         part = part.drop_duplicates(["true_samples", "seed"])
         means = {n: returns(group) for n, group in part.groupby("true_samples")}
-        budgets = list(means)
-        axes[0, 0].plot(budgets, [-m.value for m in means.values()], "o-", color=colour,
-                        label=estimator)  # fmt: skip
-        axes[0, 0].fill_between(budgets, [-m.high for m in means.values()],
-                                [-m.low for m in means.values()], color=colour, alpha=0.15,
-                                linewidth=0)  # fmt: skip
+        # Beside each other, or the intervals hide one another.
+        beside = 1.06 ** (place - (len(groups) - 1) / 2)
+        axes[0, 0].errorbar(
+            [n * beside for n in means], [-m.value for m in means.values()],
+            [m.half_width for m in means.values()], fmt="o-", color=colour, label=estimator,
+            elinewidth=1.2, capsize=2,
+        )  # fmt: skip
         own = visited[visited["estimator"] == estimator]
         channels = list(own.filter(like="one_step"))
         error = own.groupby("samples_per_update")[channels].mean().mean(axis=1)
-        axes[1, 0].plot(error.index, error, "o-", color=colour)
+        axes[1, 0].plot(error.index * beside, np.maximum(error, LEAST_SHOWN), "o-", color=colour)
         numbers += [
             {"estimator": estimator, "true_samples": n, "return": m.value,
              "half_width": m.half_width, "worst": m.worst, "one_step": error.get(n)}
@@ -264,7 +274,14 @@ def budget_figure(rows: pd.DataFrame, errors: pd.DataFrame, optimum: float, path
         ]  # fmt: skip
     axes[0, 0].axhline(-optimum, color="#6e7781", linestyle=(0, (4, 3)), linewidth=1.2)
     axes[0, 0].set(ylabel="minus the return", yscale="log", xscale="log")
-    axes[1, 0].set(ylabel="one-step error / gap", yscale="log", xlabel="true samples")
+    plain_ticks(axes[0, 0].yaxis)
+    axes[1, 0].set(
+        ylabel=f"one-step error / gap\n(at least {LEAST_SHOWN:g})",
+        yscale="log", xlabel="true samples",
+    )  # fmt: skip
+    axes[1, 0].set_xticks(sorted(first["true_samples"].unique()), minor=False)
+    axes[1, 0].set_xticks([], minor=True)
+    plain_ticks(axes[1, 0].xaxis)
     figure.legend(loc="outside upper left", ncols=3, handlelength=1.4)
     save_figure(figure, path, pd.DataFrame(numbers))
     return figure
