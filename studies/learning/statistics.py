@@ -36,9 +36,11 @@ class Mean:
         return self.value + np.nan_to_num(self.half_width)
 
     def __str__(self) -> str:
+        digits = 0 if abs(self.value) >= 100 else 1
         if self.count == 1:
-            return f"{self.value:.1f}"
-        return f"{self.value:.1f} ± {self.half_width:.1f}"
+            return f"{self.value:.{digits}f}"
+        # With spaces that do not break a line.
+        return f"{self.value:.{digits}f}\u00a0±\u00a0{self.half_width:.{digits}f}"
 
 
 def mean(values: Sequence[float]) -> Mean:

@@ -51,15 +51,17 @@ def write_grid_report(
     summary = summarise(rows, errors)
     sections: list[Section] = [headline(rows, optimum)]
     sections += failures_section(failures)
+    # The subtitle tells the number of seeds; as a column it only matters if some failed.
+    shown = summary if summary["seeds"].nunique() > 1 else summary.drop(columns="seeds")
     sections.append(
         Table(
-            list(summary.columns),
-            summary.astype(object).where(summary.notna(), None).values.tolist(),
+            list(shown.columns),
+            shown.astype(object).where(shown.notna(), None).values.tolist(),
             caption="Return on the true pendulum: mean over seeds with its 95 % interval. The "
             f"best return that physics allows is {optimum:.0f} (value iteration on a grid). Error: "
             "of one step where the policy goes, as a share of the gap, mean of both channels; in "
             "90 %: share of the truth inside the predicted 90 % interval.",
-            digits=4,
+            digits=2,
             heading="All policies",
         )
     )
@@ -83,7 +85,7 @@ def write_grid_report(
         f"{len(results)} trials, {len(set(rows['seed']))} seeds",
         sections,
     ).write(folder / "report.html")
-    return summary.to_string(index=False, na_rep="")
+    return summary.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
 
 
 @functools.cache
@@ -126,7 +128,7 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame) -> pd.DataFrame:
                 returns(part),
             )
             | {
-                "error": round(one_step, 4),
+                "error": one_step,
                 "in 90 %": round(seen["coverage90"].astype(float).mean(), 3),
                 "fit s": round(seen["fit_seconds"].mean(), 2),
             }
