@@ -116,7 +116,7 @@ def _targets(found: Sequence[Record]) -> str:
         what = "Gaussian process, fit at 3750 points: times faster than scikit-learn's"
         add(what, peer["seconds"] / own["seconds"], ".1f", LEAST_TIMES_GP)
         what = "the same: held-out error"
-        add(what, own["held_out_error"], ".2g", peer["held_out_error"], at_least=False)
+        add(what, own["held_out_error"], ".3g", peer["held_out_error"], at_least=False)
     for what, value, form, most in fit_scaling.targets(found):
         add(what, value, form, most, at_least=False)
     for name in OURS:
