@@ -11,11 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from residual.calibration import NINETY_PERCENT
 from residual.corrected import CorrectedSimulator
 from sims.simulator import Array, Simulator, state_difference
 
 HORIZONS = (0.25, 1.0)
-_NINETY_PERCENT = 1.6449  # two-sided quantile of the normal distribution
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +69,7 @@ def accuracy_along(
     predicted, spread = corrected.difference.predict(before, held, return_std=True)
     covered = None
     if spread is not None:
-        covered = float(np.mean(np.abs(truth - predicted) <= _NINETY_PERCENT * spread))
+        covered = float(np.mean(np.abs(truth - predicted) <= NINETY_PERCENT * spread))
     relative, absolute = {}, {}
     for horizon in horizons:
         steps = round(horizon / corrected.dt)

@@ -21,7 +21,7 @@ FEWEST_ROWS = 5 * FOLDS
 #: Coverage this close to 90 % is left as it is: a few dozen neighbourhoods tell no better.
 _TOLERANCE = 0.03
 _MOST = 4.0
-_NINETY_PERCENT = 1.6449  # two-sided quantile of the normal distribution
+NINETY_PERCENT = 1.6449  # two-sided quantile of the normal distribution
 
 
 def neighbourhoods(X: Array, random: np.random.RandomState) -> list[NDArray[np.intp]]:
@@ -69,7 +69,7 @@ def spread_factor(errors: Array, variances: Array, noise: float) -> float:
 
     def excess(logarithm: float) -> float:
         spread = np.sqrt(np.exp(2 * logarithm) * variances + noise)
-        return float(np.mean(np.abs(errors) <= _NINETY_PERCENT * spread)) - 0.9
+        return float(np.mean(np.abs(errors) <= NINETY_PERCENT * spread)) - 0.9
 
     if abs(excess(0.0)) <= _TOLERANCE:
         return 1.0

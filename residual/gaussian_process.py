@@ -123,9 +123,7 @@ class GaussianProcess(Estimator):
             )
 
     def _calibrate(self, random: np.random.RandomState) -> None:
-        folds = neighbourhoods(
-            self.points_ / np.exp(np.log(self.lengthscale_).mean(axis=0)), random
-        )
+        folds = neighbourhoods(self._in_length_scales(self.points_), random)
         for k, weights in enumerate(self.weights_):
             errors, variances = left_out(self._factor(k), weights, folds)
             latent = np.maximum(variances - self.noise_[k], 0.0)
@@ -154,13 +152,17 @@ class GaussianProcess(Estimator):
     def _choose(self, X: Array, random: np.random.RandomState) -> NDArray[np.intp]:
         """Spread-out rows: each the farthest, in mean length scales, from those before it."""
         some = random.permutation(len(X))[: max(_CANDIDATES, 2 * self.inducing)]
-        scaled = X[some] / np.exp(np.log(self.lengthscale_).mean(axis=0))
+        scaled = self._in_length_scales(X[some])
         chosen, distance = [0], np.full(len(some), np.inf)
         for _ in range(min(self.inducing, len(some)) - 1):
             offset = scaled - scaled[chosen[-1]]
             np.minimum(distance, np.einsum("ij,ij->i", offset, offset), out=distance)
             chosen.append(int(np.argmax(distance)))
         return some[chosen]
+
+    def _in_length_scales(self, X: Array) -> Array:
+        """Rows in units of the length scales' geometric mean over outputs."""
+        return X / np.exp(np.log(self.lengthscale_).mean(axis=0))
 
     def _summarise(self, X: Array, y: Array) -> None:
         self._kept = {}

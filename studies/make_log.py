@@ -15,7 +15,6 @@ steps of a fifth of the simulator's; one CSV file per episode, cut at its fall.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -27,7 +26,7 @@ from sims.pendulum import IDEALISED_MASS, TRUE_MASS
 from studies.hidden.data import Truth, make_logs
 from studies.leo.logs import write_walks
 from studies.running.command import HelpFormatter, Parser, fail
-from studies.running.files import atomic_write_text
+from studies.running.logs import write_log
 
 HIDDEN = Truth(mass=TRUE_MASS / IDEALISED_MASS - 1)
 
@@ -74,16 +73,10 @@ def write_logs(
     """
     paths = []
     for number, run in enumerate(make_logs(truth, seed, excitation, noise, runs, steps), start=1):
-        names = ["time", "angle", "rate", "voltage"]
-        # The last command is never applied; a log holds it all the same.
-        volts = np.vstack([run.actions, run.actions[-1:]])
-        table = np.column_stack([run.times, run.states, volts])
-        if not np.isfinite(run.states[:, 1]).any():
-            table, names = np.delete(table, 2, axis=1), [n for n in names if n != "rate"]
-        text = io.StringIO()
-        np.savetxt(text, table, "%.9g", ",", header=",".join(names), comments="")
+        measured = ["angle", "rate"] if np.isfinite(run.states[:, 1]).any() else ["angle"]
+        seen = run.states[:, : len(measured)]
         paths.append(folder / f"run-{number:02d}.csv")
-        atomic_write_text(paths[-1], text.getvalue())
+        write_log(paths[-1], [*measured, "voltage"], run.times, seen, run.actions)
     return paths
 
 

@@ -112,13 +112,17 @@ def _find(
     groups, sets = aliases(simulator, offered)
     kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
     pool = candidates(simulator, kept, samples)
+    channels = tuple(
+        (simulator.physical_channels[c].name, simulator.physical_channels[c].unit)
+        for c in samples.measured
+    )
     clock.lap("read")
 
     tell("looking for the gap")
     if simulator.has_contacts:
         found_there = explain(
-            simulator, samples, unseen, pool, groups, sets, quality, tolerance, horizon, rng, tell,
-            clock.lap, provisional=len(trajectories) == 1,
+            simulator, samples, unseen, channels, pool, groups, sets, quality, tolerance, horizon,
+            rng, tell, clock.lap, provisional=len(trajectories) == 1,
         )  # fmt: skip
         return dataclasses.replace(found_there, seconds=clock.laps)
     # Long enough for what the user cares about, and for slow effects in fast logs.
@@ -150,10 +154,6 @@ def _find(
         Model(simulator), samples, found.arena.windows, found.arena.tried[()], nominal_left.ratio,
         found.nominal_floor,
     )  # fmt: skip
-    channels = tuple(
-        (simulator.physical_channels[c].name, simulator.physical_channels[c].unit)
-        for c in samples.measured
-    )
     blind = hidden(found, pool)
     if len(trajectories) == 1:
         quality.append(

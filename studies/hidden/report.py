@@ -210,11 +210,6 @@ def summary(results: Sequence[Mapping[str, Any]]) -> str:
     return headlines(tidy(results)).to_string(index=False)
 
 
-def _table(frame: pd.DataFrame, heading: str, caption: str) -> Table:
-    plain = frame.astype(object).where(frame.notna(), None)
-    return Table(list(frame.columns), plain.values.tolist(), caption=caption, heading=heading)
-
-
 def write_report(
     results: Sequence[Mapping[str, Any]], output: Path, config: Mapping[str, Any]
 ) -> None:
@@ -234,7 +229,7 @@ def write_report(
     if (data["method"] == "find_gap").any():
         table = cells(data)
         atomic_write_text(output / "cells.csv", table.to_csv(index=False))
-        sections.append(_table(headlines(data), "In short", ""))
+        sections.append(Table.of(headlines(data), "In short", ""))
         counts = confusion_counts(data)
         if counts.size:
             drawn = confusion(counts)
@@ -248,7 +243,7 @@ def write_report(
                 )
             )
         sections.append(
-            _table(
+            Table.of(
                 table,
                 "Every cell",
                 f"Counts. Closed: the gap after is at most {CLOSED}; wrong: a confident name that "
@@ -258,7 +253,7 @@ def write_report(
     compared = rivals(data)
     atomic_write_text(output / "rivals.csv", compared.to_csv(index=False))
     sections.append(
-        _table(
+        Table.of(
             compared,
             "Beside other methods",
             "Near-twins count as right. pysindy differentiates over 50 ms, across the jumps of a "

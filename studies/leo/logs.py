@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from policy.evaluate import collect
 from policy.noise import OrnsteinUhlenbeck
 from sims.environment import SimulatorEnv
 from sims.leo import Leo, Walking
-from studies.running.files import atomic_write_text
+from studies.running.logs import write_log
 
 #: Sub-steps of 0.04 ms, a fifth of what find_gap explains the log with.
 SUBSTEPS = 150
@@ -57,20 +56,15 @@ def write_walks(
     names = [channel.name for channel in leo.state_channels]
     spread = np.repeat([PLACE, ANGLE, RATE], [2, 7, 9])
     kept = len(names) if rates else 9
-    header = ",".join(["time", *names[:kept], *(c.name for c in leo.action_channels)])
+    columns = [*names[:kept], *(channel.name for channel in leo.action_channels)]
     paths: list[Path] = []
     for run in collect(walker, env, transitions, 1000 * seed, noise):
         if len(run.actions) < SHORTEST or run.states is None:
             continue
         seen = run.states + spread * rng.standard_normal(run.states.shape)
         times = leo.dt * np.arange(len(seen))
-        # The last command is never applied; a log holds it all the same.
-        volts = np.vstack([run.actions, run.actions[-1:]])
-        text = io.StringIO()
-        table = np.column_stack([times, seen[:, :kept], volts])
-        np.savetxt(text, table, "%.9g", ",", header=header, comments="")
         paths.append(folder / f"walk-{len(paths) + 1:02d}.csv")
-        atomic_write_text(paths[-1], text.getvalue())
+        write_log(paths[-1], columns, times, seen[:, :kept], run.actions)
     if not paths:
         raise ValueError(
             f"every walk of {policy} fell within {SHORTEST} steps: give a policy that walks, or "

@@ -49,9 +49,8 @@ def write_grid_report(
     sections: list[Section] = [headline(rows)]
     sections += failures_section(failures)
     sections += [
-        Table(
-            list(summary.columns),
-            summary.astype(object).where(summary.notna(), None).values.tolist(),
+        Table.of(
+            summary,
             caption="On the true Leo: mean over seeds with its 95 % interval, each seed the mean "
             "of its starts. E is the motor work per metre, with the motor constant at the joint "
             "and with that of the bare motor, the reading that fits the paper's numbers.",

@@ -54,9 +54,8 @@ def write_grid_report(
     # The subtitle tells the number of seeds; as a column it only matters if some failed.
     shown = summary if summary["seeds"].nunique() > 1 else summary.drop(columns="seeds")
     sections.append(
-        Table(
-            list(shown.columns),
-            shown.astype(object).where(shown.notna(), None).values.tolist(),
+        Table.of(
+            shown,
             caption="Return on the true pendulum: mean over seeds with its 95 % interval. The "
             f"best return that physics allows is {optimum:.0f} (value iteration on a grid). Error: "
             "of one step where the policy goes, as a share of the gap, mean of both channels; in "

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar, Literal
 
+import pandas as pd
 from matplotlib.figure import Figure as MatplotlibFigure
 
 from studies.reporting.media import Media, load_media, narrowed, still
@@ -155,6 +156,12 @@ class Table(Section):
     caption: str = ""
     highlight: Sequence[int] = ()
     digits: int = 3
+
+    @classmethod
+    def of(cls, frame: pd.DataFrame, heading: str, caption: str, digits: int = 3) -> Table:
+        """A data frame without its index."""
+        rows = frame.astype(object).values.tolist()
+        return cls(list(frame.columns), rows, caption, digits=digits, heading=heading)
 
     def __post_init__(self) -> None:
         for number, row in enumerate(self.rows):

@@ -34,7 +34,8 @@ NAMED_ON, MEASURED_ON = 24, 100
 
 
 def explain(
-    simulator: HostSimulator, samples: Samples, unseen: Samples, pool: Sequence[Candidate],
+    simulator: HostSimulator, samples: Samples, unseen: Samples,
+    channels: tuple[tuple[str, str], ...], pool: Sequence[Candidate],
     groups: Mapping[str, tuple[str, ...]], sets: Sequence[tuple[str, ...]],
     quality: Sequence[str], tolerance: float | None, horizon: float, rng: np.random.Generator,
     tell: Callable[[str], None], lap: Callable[[str], None], rules: Rules | None = None,
@@ -69,13 +70,9 @@ def explain(
         "worse than noise allows, mostly by impacts, on which simulators differ: their weight "
         "was lowered",
     ]
-    channels = tuple(
-        (simulator.physical_channels[c].name, simulator.physical_channels[c].unit)
-        for c in samples.measured
-    )
     return GapResult(
         verdicts=verdicts(
-            made, told.remainder(full, whole), gap, sets, tolerance, blind, provisional
+            made, told.remainder(len(channels)), gap, sets, tolerance, blind, provisional
         ),
         gap=gap,
         where=where(search, samples, channels),
@@ -203,19 +200,18 @@ def measure(
             )
     if order:
         steps.append(Step(order[-1], shown_gap.after))
-    samples = unseen
-    owner = samples.owner
+    owner = unseen.owner
     rollouts = tuple(
         Rollout(
-            samples.names[owner[scheme.rows[k]]], samples.times[scheme.ahead[k]],
-            samples.seen[scheme.ahead[k]][:, samples.measured], shown_before[k], shown_after[k],
+            unseen.names[owner[scheme.rows[k]]], unseen.times[scheme.ahead[k]],
+            unseen.seen[scheme.ahead[k]][:, unseen.measured], shown_before[k], shown_after[k],
         )
         for k in np.unique(np.linspace(0, len(scheme.rows) - 1, 6).astype(int))
     )  # fmt: skip
 
     nominal = np.median(search.tried[()].aimed.costs / search.shots.freedom)
     left = np.median(search.tried[key].aimed.costs / search.shots.freedom)
-    step = float(np.median(samples.durations))
+    step = float(np.median(unseen.durations))
     return Gap(
         main, shown_gap.unit, scheme.steps * step, shown_gap.before, shown_gap.after,
         shown_gap.noise_floor, None, tuple(steps), by_channel, float(np.sqrt(nominal)),
