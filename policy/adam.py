@@ -10,6 +10,10 @@ from policy.memory import zeros
 
 Array = NDArray[np.float32]
 MEAN_KEPT, SQUARE_KEPT, TINY = 0.9, 0.999, 1e-8
+#: Moments below this move no parameter by as much as 1e-22 of a step size and count as zero. Those
+#: of units that have died would decay into denormal numbers, with which the pass takes half as
+#: long again.
+LEAST = 1e-30
 
 
 class Adam:
@@ -77,10 +81,12 @@ def _step(
 ) -> None:
     parameters, gradient, mean, square, target = arrays
     mean_kept, square_kept = np.float32(MEAN_KEPT), np.float32(SQUARE_KEPT)
-    one, tiny = np.float32(1), np.float32(TINY)
+    one, tiny, least, zero = np.float32(1), np.float32(TINY), np.float32(LEAST), np.float32(0)
     for i in range(parameters.size):
         slope = gradient[i] + decay * parameters[i]
-        mean[i] = mean_kept * mean[i] + (one - mean_kept) * slope
-        square[i] = square_kept * square[i] + (one - square_kept) * slope * slope
+        new_mean = mean_kept * mean[i] + (one - mean_kept) * slope
+        new_square = square_kept * square[i] + (one - square_kept) * slope * slope
+        mean[i] = zero if abs(new_mean) < least else new_mean  # NaN stays
+        square[i] = zero if new_square < least else new_square
         parameters[i] -= rate * mean[i] / (np.sqrt(square[i]) * square_scale + tiny)
         target[i] += share * (parameters[i] - target[i])
