@@ -10,8 +10,9 @@ from scipy.stats import chi2
 
 from residual.gap.noise import Floor, driven_states, push
 from residual.gap.samples import Samples
-from residual.gap.shooting import Fit, observe
+from residual.gap.shooting import Fit
 from residual.gap.signatures import flatten, project_out
+from residual.gap.slopes import observe
 from residual.gap.windows import Windows, carry
 from sims.host import HostSimulator
 

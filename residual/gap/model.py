@@ -75,7 +75,11 @@ class Model:
         return self.simulator.with_effects((*self.simulator.effects, *effects))
 
     def widen(self, samples: Samples, states: Array, theta: Array) -> Array:
-        """Physical states (n, n_physical) with the play of each backlash appended."""
+        """Physical states (n, n_physical) with the play of each backlash appended.
+
+        A play is a share of half its width, from -1 to 1: a closed one stays closed whatever
+        width is tried.
+        """
         if self.width == self.physical:
             return states
         host = self.bind(theta)
@@ -86,16 +90,14 @@ class Model:
             before = np.vstack([samples.actions[:1], samples.actions[:-1]])
             for start, _ in samples.runs:
                 before[start] = samples.actions[start]
-            full[:, self.physical :] = host.augment(states, before)[:, self.physical : self.width]
+            pushed = host.augment(states, before)[:, self.physical : self.width]
+            full[:, self.physical :] = pushed / _halves(host, 1)
         return full
 
     def scales(self, physical: Array) -> Array:
         """Typical variation of every state column, from that of the physical ones."""
-        names = [channel.name for channel in self.simulator.physical_channels]
-        joints = {joint.name: joint.position for joint in self.simulator.joints}
         effects = (*self.simulator.plays(), *(c.effect for c in self.chosen))
-        plays = [effect for effect in effects if isinstance(effect, Backlash)]
-        return np.append(physical, [0.1 * physical[names.index(joints[p.joint])] for p in plays])
+        return np.append(physical, [0.1 for effect in effects if isinstance(effect, Backlash)])
 
     def inputs(self, samples: Samples, theta: Array) -> Array:
         """Mean and rise of the input in every sub-step, (V, n, substeps, n_a, 2).
@@ -159,12 +161,9 @@ class Model:
             return np.stack(
                 [self._rowwise(*v, durations) for v in zip(states, driven, theta, strict=True)]
             )
-        host = self.bind(theta, each=n)
-        own = len(host.integrated_channels)
-        after = np.array(states.reshape(variants * n, width))
-        after[:, :own] = integrate(
-            host,
-            after[:, :own],
+        after = self._integrate(
+            self.bind(theta, each=n),
+            states.reshape(variants * n, width),
             driven.reshape(variants * n, *driven.shape[2:]),
             np.tile(durations, variants),
         )
@@ -172,10 +171,20 @@ class Model:
 
     def _rowwise(self, states: Array, driven: Array, theta: Array, durations: Array) -> Array:
         """One interval with the same numbers in all rows, which spares a bind for each row."""
-        host = self.bind(theta)
+        return self._integrate(self.bind(theta), states, driven, durations)
+
+    def _integrate(
+        self, host: HostSimulator, states: Array, driven: Array, durations: Array
+    ) -> Array:
         own = len(host.integrated_channels)
         after = np.array(states)
+        if own == self.physical:
+            after[:, :own] = integrate(host, after[:, :own], driven, durations)
+            return after
+        halves = _halves(host, len(states))
+        after[:, self.physical : own] *= halves
         after[:, :own] = integrate(host, after[:, :own], driven, durations)
+        after[:, self.physical : own] /= halves
         return after
 
     def sense(self, states: Array, theta: Array) -> Array:
@@ -192,10 +201,15 @@ class Model:
         """Open loop from states (k, width) at some rows, shape (k, steps + 1, width)."""
         driven = self.inputs(samples, theta[None])[0]
         host = self.bind(theta)
-        own = len(host.integrated_channels)
         path = np.repeat(states[:, None], steps + 1, axis=1)
         for k in range(steps):
-            path[:, k + 1, :own] = integrate(
-                host, path[:, k, :own], driven[rows + k], samples.durations[rows + k]
+            path[:, k + 1] = self._integrate(
+                host, path[:, k], driven[rows + k], samples.durations[rows + k]
             )
         return path
+
+
+def _halves(host: HostSimulator, rows: int) -> Array:
+    """Half the width of every play, (rows, n_plays); 1 in rows without play."""
+    widths = [np.broadcast_to(play.width, rows) for play in host.plays()]
+    return np.stack([np.where(width > 0, 0.5 * width, 1.0) for width in widths], axis=1)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from residual.gap.model import Model
 from residual.gap.samples import Samples
-from residual.gap.shooting import Slope, defects, misfit, observe, slopes
+from residual.gap.slopes import Slope, defects, misfit, observe, slopes
 from residual.gap.windows import Windows, carry, fixed
 
 Array = NDArray[np.float64]

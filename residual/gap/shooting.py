@@ -5,43 +5,25 @@ of Gauss-Newton then needs one sample interval from every node, all in one batch
 can run away: the nodes start at the measured path. The continuity defects are condensed out, so
 the unknowns are the effects' numbers and one start state for each window, and the start states
 are projected out (variable projection). At convergence the result is that of single shooting
-over each window. Source: Albersmeyer and Diehl, "The lifted Newton method and its application in
-optimization", SIAM J. Optim. 20 (2010).
+over each window. With no unknowns left every window is on its own, and goes back along its own
+step if that was too long. Source: Albersmeyer and Diehl, "The lifted Newton method and its
+application in optimization", SIAM J. Optim. 20 (2010).
 """
 
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.model import Model
 from residual.gap.samples import Samples
+from residual.gap.slopes import Slope, defects, misfit, observe, slopes
 from residual.gap.windows import Windows, carry
 
 Array = NDArray[np.float64]
-
-
-@dataclasses.dataclass(frozen=True)
-class Slope:
-    """Values and derivatives at every node, for one vector of unknowns.
-
-    Attributes:
-        after: Where each node arrives after its interval, (n, n_s).
-        by_state: Derivative of ``after`` by the node, (n, n_s, n_s).
-        by_knob: Derivative of ``after`` by the unknowns, (n, n_s, p).
-        shown: What the sensors show at the node, (n, n_s).
-        shown_by_state: Diagonal of its derivative by the node, (n, n_s).
-        shown_by_knob: Its derivative by the unknowns, (n, n_s, p).
-    """
-
-    after: Array
-    by_state: Array
-    by_knob: Array
-    shown: Array
-    shown_by_state: Array
-    shown_by_knob: Array
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,98 +63,6 @@ class Fit:
         return np.minimum(1.0, self.cap / np.maximum(self.costs, 1e-300))
 
 
-def slopes(
-    model: Model,
-    samples: Samples,
-    nodes: Array,
-    theta: Array,
-    widths: Array,
-    scale: Array,
-    by_state: Array | None = None,
-    rows: NDArray[np.int64] | None = None,
-) -> Slope:
-    """Everything at the nodes in one batch.
-
-    Args:
-        widths: Finite-difference width of every unknown.
-        scale: Typical variation of every state; a state is moved by 1e-4 of it.
-        by_state: Derivative by the state from an earlier call, to be used again.
-        rows: Samples that matter, if not all; the derivatives of the others are zero.
-    """
-    if rows is not None and len(rows) < len(nodes):
-        return _some(model, samples, nodes, theta, widths, scale, by_state, rows)
-    return _all(model, samples, nodes, theta, widths, scale, by_state, None)
-
-
-def _some(
-    model: Model, samples: Samples, nodes: Array, theta: Array, widths: Array, scale: Array,
-    by_state: Array | None, rows: NDArray[np.int64],
-) -> Slope:  # fmt: skip
-    known = None if by_state is None else by_state[rows]
-    part = _all(model, samples, nodes[rows], theta, widths, scale, known, rows)
-    full = {}
-    for field in dataclasses.fields(Slope):
-        values = getattr(part, field.name)
-        full[field.name] = np.zeros((len(nodes), *values.shape[1:]))
-        full[field.name][rows] = values
-    return Slope(**full)
-
-
-def _all(
-    model: Model, samples: Samples, nodes: Array, theta: Array, widths: Array, scale: Array,
-    by_state: Array | None, rows: NDArray[np.int64] | None,
-) -> Slope:  # fmt: skip
-    n, width = nodes.shape
-    p = len(theta)
-    moves = np.zeros((0, width)) if by_state is not None else 1e-4 * np.diag(scale)
-    up = np.where(theta + widths > model.high, -widths, widths)
-    thetas = np.vstack([theta[None], np.repeat(theta[None], len(moves), 0), theta + np.diag(up)])
-    states = np.repeat(nodes[None], 1 + len(moves) + p, axis=0)
-    states[1 : 1 + len(moves)] += moves[:, None, :]
-    after = model.advance(samples, states, thetas, rows)
-    base = after[0]
-    if by_state is None:
-        by_state = np.stack([(after[1 + i] - base) / moves[i, i] for i in range(width)], axis=-1)
-    by_knob = np.zeros((n, width, p))
-    for j in range(p):
-        by_knob[:, :, j] = (after[1 + len(moves) + j] - base) / up[j]
-    shown_by_state, shown_by_knob = np.ones((n, width)), np.zeros((n, width, p))
-    shown = nodes
-    if model.has_sensor:
-        moved = np.repeat(nodes[None], 2 + p, axis=0)
-        moved[1] += 1e-4 * scale
-        seen = model.sense(moved, np.vstack([theta[None], theta[None], theta + np.diag(up)]))
-        shown = seen[0]
-        shown_by_state = (seen[1] - shown) / (1e-4 * scale)
-        for j in range(p):
-            shown_by_knob[:, :, j] = (seen[2 + j] - shown) / up[j]
-    return Slope(base, by_state, by_knob, shown, shown_by_state, shown_by_knob)
-
-
-def observe(
-    samples: Samples, windows: Windows, slope: Slope, response: Array, sigma: Array
-) -> Array:
-    """Whitened output of a linear response (W, L, n_s, c) -> (W, L, m, c)."""
-    measured = samples.measured
-    valid = np.isfinite(samples.seen[:, measured])[windows.index] & windows.inside[..., None]
-    gain = slope.shown_by_state[:, measured][windows.index] / sigma
-    return response[:, :, measured] * (gain * valid)[..., None]
-
-
-def misfit(samples: Samples, windows: Windows, slope: Slope, sigma: Array) -> Array:
-    """Whitened difference of measurement and node, zero where nothing was measured, (W, L, m)."""
-    measured = samples.measured
-    gap = (samples.seen[:, measured] - slope.shown[:, measured])[windows.index] / sigma
-    return np.where(np.isfinite(gap) & windows.inside[..., None], gap, 0.0)
-
-
-def defects(samples: Samples, slope: Slope, nodes: Array) -> Array:
-    """How far each node's successor is from where the node arrives, (n, n_s)."""
-    gap = np.zeros_like(nodes)
-    gap[:-1] = slope.after[:-1] - nodes[1:]
-    return gap
-
-
 def fit(
     model: Model,
     samples: Samples,
@@ -206,27 +96,100 @@ def fit(
         by_state: Derivatives by state to start with.
         tolerance: Stop when the merit falls by less than this.
     """
-    free = model.free
-    start = np.zeros((nodes.shape[1], len(free)))
-    start[free, range(len(free))] = 1.0
-    ridge = 1e-2 / scale[free]
-    used = np.unique(windows.index[windows.inside])
-    memory = np.array([i for i in range(nodes.shape[1]) if i not in free], int)
+    count, f, p = len(windows), len(model.free), len(theta)
+    problem = _Problem(model, samples, windows, sigma, scale, cap)
     best: Fit | None = None
-    step_nodes = np.zeros_like(nodes)
+    moves = np.zeros((*windows.index.shape, nodes.shape[1]))
     step_theta = np.zeros_like(theta)
-    damping, made = 1e-6, 0
+    damping, failed = 1e-6, np.zeros(count, int)
     for turn in range(iterations + 1):
         width = model.step * max(widths * shrink**turn, 0.005)
-        slope = slopes(
-            model, samples, nodes, theta, width, scale, by_state if turn == 0 else None, used
-        )
+        now, tangent = problem.at(nodes, theta, width, by_state if turn == 0 else None, turn)
+        if best is None:
+            better, finished = np.ones(count, bool), False
+            best = now
+        else:
+            better = now.costs < best.costs if p == 0 else np.full(count, now.merit < best.merit)
+            merged = _merge(best, now, better, windows)
+            finished = bool(better.any()) and best.merit - merged.merit < tolerance
+            best = merged
+        failed = np.where(better, 0, failed + 1)
+        if (failed > 4).all():
+            break
+        if turn == iterations or (finished and turn >= min(iterations, 4)):
+            break
+        if better.any():
+            if p:
+                weight = np.minimum(1.0, cap / np.maximum(now.costs, 1e-300))
+                step_theta = _step(now.by_knob, now.projected, weight, theta, model, damping)
+            target = tangent.flat - tangent.columns[..., f:] @ step_theta
+            padded = np.concatenate([target, np.zeros((count, f))], axis=1)
+            right = tangent.basis.transpose(0, 2, 1) @ padded[..., None]
+            first = np.linalg.solve(tangent.triangle, right)[..., 0]
+            limit = 3 * scale[model.free]
+            short = (limit / np.maximum(np.abs(first), 1e-300)).min(1)
+            first = first * np.minimum(1.0, short)[:, None]
+            fresh = (
+                (tangent.response[..., :f] @ first[:, None, :, None])[..., 0]
+                + tangent.response[..., f : f + p] @ step_theta
+                + tangent.response[..., -1]
+            )
+            moves[better] = fresh[better]
+        # Back along the last step where it failed: the same direction, shorter.
+        factor = np.where(failed > 4, 0.0, 0.3**failed)
+        nodes = best.nodes.copy()
+        nodes[windows.index[windows.inside]] += (factor[:, None, None] * moves)[windows.inside]
+        theta = best.theta + (factor[0] * step_theta if p else 0.0)
+    assert best is not None
+    return best
+
+
+@dataclasses.dataclass(frozen=True)
+class _Tangent:
+    """What a step is computed from: see ``_Problem.at``."""
+
+    response: Array
+    columns: Array
+    flat: Array
+    basis: Array
+    triangle: Array
+
+
+class _Problem:
+    """The fit of one model to windows; arguments as for ``fit``."""
+
+    def __init__(
+        self, model: Model, samples: Samples, windows: Windows, sigma: Array, scale: Array,
+        cap: float,
+    ) -> None:  # fmt: skip
+        self.model, self.samples, self.windows = model, samples, windows
+        self.sigma, self.scale, self.cap = sigma, scale, cap
+        free, size = model.free, len(scale)
+        self.start = np.zeros((size, len(free)))
+        self.start[free, range(len(free))] = 1.0
+        self.ridge = 1e-2 / scale[free]
+        self.used = np.unique(windows.index[windows.inside])
+        # Memory is not free at a window's start: the interval before it tells.
+        self.memory = np.array([i for i in range(size) if i not in free], int)
+        first = windows.index[:, 0]
+        self.follows = np.flatnonzero(~np.isin(first, [start for start, _ in samples.runs]))
+        self.before = first[self.follows] - 1
+        if len(self.memory):
+            self.used = np.union1d(self.used, self.before)
+
+    def at(
+        self, nodes: Array, theta: Array, width: Array, by_state: Array | None, turn: int
+    ) -> tuple[Fit, _Tangent]:
+        """Costs and their linearisation at nodes and unknowns."""
+        model, samples, windows, sigma = self.model, self.samples, self.windows, self.sigma
+        f, p, count = len(model.free), len(theta), len(windows)
+        slope = slopes(model, samples, nodes, theta, width, self.scale, by_state, self.used)
         gaps = defects(samples, slope, nodes)
-        response = carry(
-            windows, slope.by_state, start, np.concatenate([slope.by_knob, gaps[..., None]], axis=2)
-        )
+        acting = np.concatenate([slope.by_knob, gaps[..., None]], axis=2)
+        begun = np.zeros((count, *acting.shape[1:]))
+        begun[np.ix_(self.follows, self.memory)] = acting[np.ix_(self.before, self.memory)]
+        response = carry(windows, slope.by_state, self.start, acting, begun)
         shown = observe(samples, windows, slope, response, sigma)
-        f, p = len(free), len(theta)
         if p and model.has_sensor:
             measured = samples.measured
             extra = slope.shown_by_knob[:, measured][windows.index] / sigma[:, None]
@@ -235,62 +198,50 @@ def fit(
             )
             shown[..., f : f + p] += extra * valid[..., None]
         residual = misfit(samples, windows, slope, sigma) - shown[..., -1]
-        count = len(windows)
         flat = residual.reshape(count, -1)
         columns = shown[..., :-1].reshape(count, flat.shape[1], f + p)
         costs = np.minimum((flat**2).sum(axis=1), 1e30)
-        merit = capped(costs, cap)
-        padded = np.concatenate(
-            [columns[..., :f], np.broadcast_to(np.diag(ridge), (count, f, f))], axis=1
-        )
-        basis, triangle = np.linalg.qr(padded)
+        ridges = np.broadcast_to(np.diag(self.ridge), (count, f, f))
+        basis, triangle = np.linalg.qr(np.concatenate([columns[..., :f], ridges], axis=1))
         basis_rows = basis[:, : flat.shape[1]]
         inner = basis_rows.transpose(0, 2, 1)
         projected = flat - (basis_rows @ (inner @ flat[..., None]))[..., 0]
         by_knob = columns[..., f:] - basis_rows @ (inner @ columns[..., f:])
-        better = best is None or merit < best.merit
-        finished = better and best is not None and best.merit - merit < tolerance
-        if better:
-            best = Fit(
-                theta, nodes, costs, merit, cap, residual, basis_rows, by_knob, projected, slope,
-                turn, model,
-            )  # fmt: skip
-            made = 0
-        elif made >= 4:
-            break
-        if turn == iterations or (finished and turn >= min(iterations, 4)):
-            break
-        if not better and best is not None:
-            # Back along the last step: the same direction, shorter.
-            made += 1
-            factor = 0.3**made
-            nodes, theta = best.nodes + factor * step_nodes, best.theta + factor * step_theta
-            continue
-        weight = np.minimum(1.0, cap / np.maximum(costs, 1e-300))
-        step_theta = _step(by_knob, projected, weight, theta, model, damping)
-        target = flat - columns[..., f:] @ step_theta
-        padded_target = np.concatenate([target, np.zeros((count, f))], axis=1)
-        right = basis.transpose(0, 2, 1) @ padded_target[..., None]
-        first = np.linalg.solve(triangle, right)[..., 0]
-        limit = 3 * scale[free]
-        first = first * np.minimum(1.0, (limit / np.maximum(np.abs(first), 1e-300)).min(1))[:, None]
-        moves = (
-            (response[..., :f] @ first[:, None, :, None])[..., 0]
-            + response[..., f : f + p] @ step_theta
-            + response[..., -1]
-        )
-        step_nodes = np.zeros_like(nodes)
-        step_nodes[windows.index[windows.inside]] = moves[windows.inside]
-        if len(memory):
-            for a, b in samples.runs:
-                fresh = np.setdiff1d(windows.index[:, 0], [a])
-                fresh = fresh[(fresh > a) & (fresh < b)]
-                step_nodes[np.ix_(fresh, memory)] = (
-                    slope.after[np.ix_(fresh - 1, memory)] - nodes[np.ix_(fresh, memory)]
-                )
-        nodes, theta = nodes + step_nodes, theta + step_theta
-    assert best is not None
-    return best
+        found = Fit(
+            theta, nodes, costs, capped(costs, self.cap), self.cap, residual, basis_rows, by_knob,
+            projected, slope, turn, model,
+        )  # fmt: skip
+        return found, _Tangent(response, columns, flat, basis, triangle)
+
+
+def _merge(old: Fit, new: Fit, better: NDArray[np.bool_], windows: Windows) -> Fit:
+    """The new fit in the windows where it is better, elsewhere the old one."""
+    if better.all():
+        return new
+    if not better.any():
+        return old
+    rows = windows.index[better][windows.inside[better]]
+
+    def taken(mine: Array, its: Array, where: NDArray[np.generic]) -> Array:
+        joined = mine.copy()
+        joined[where] = its[where]
+        return joined
+
+    slope = {
+        field.name: taken(getattr(old.slope, field.name), getattr(new.slope, field.name), rows)
+        for field in dataclasses.fields(Slope)
+    }
+    by_window = ("costs", "residual", "basis", "by_knob", "projected")
+    parts: dict[str, Any] = {
+        name: taken(getattr(old, name), getattr(new, name), better) for name in by_window
+    }
+    return dataclasses.replace(
+        new,
+        nodes=taken(old.nodes, new.nodes, rows),
+        merit=capped(parts["costs"], new.cap),
+        slope=Slope(**slope),
+        **parts,
+    )
 
 
 def capped(costs: Array, cap: float) -> float:

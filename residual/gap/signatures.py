@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from residual.gap.candidates import Candidate, Trial
 from residual.gap.model import Model
 from residual.gap.samples import Samples
-from residual.gap.shooting import Fit, observe
+from residual.gap.shooting import Fit
+from residual.gap.slopes import observe
 from residual.gap.windows import Windows, carry
 
 Array = NDArray[np.float64]

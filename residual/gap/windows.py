@@ -96,7 +96,9 @@ def by_growth(
     return Windows.cut(pieces)
 
 
-def carry(windows: Windows, jacobians: Array, start: Array, injected: Array) -> Array:
+def carry(
+    windows: Windows, jacobians: Array, start: Array, injected: Array, begun: Array | None = None
+) -> Array:
     """Linear response of the states inside every window.
 
     ``G[k + 1] = A[k] G[k] + injected[k]``, with ``G[0]`` = ``start`` for the first columns.
@@ -107,6 +109,7 @@ def carry(windows: Windows, jacobians: Array, start: Array, injected: Array) -> 
         start: Columns that start as perturbations of the first state, shape (n_s, f).
         injected: Columns that act at every step: (n, n_s, q) for every row of the table, or
             (W, L, n_s, q) for every place in a window.
+        begun: What the injected columns have done before the first state, (W, n_s, q).
 
     Returns:
         shape (W, L, n_s, f + q).
@@ -116,6 +119,8 @@ def carry(windows: Windows, jacobians: Array, start: Array, injected: Array) -> 
     q = injected.shape[-1]
     response = np.zeros((count, length, width, f + q))
     response[:, 0, :, :f] = start
+    if begun is not None:
+        response[:, 0, :, f:] = begun
     local = injected if injected.ndim == 4 else injected[windows.index]
     steps = jacobians[windows.index]
     # A trial that runs away stays finite and loses.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
 from residual.trajectories import Trajectory
+from studies.hidden.play import integrate_play
 
 Array = NDArray[np.float64]
 Excitation = Literal["strong", "weak", "policy"]
@@ -54,9 +55,9 @@ class Truth:
     """The pendulum with hidden effects; every field at its default is the nominal pendulum.
 
     Torques are in N m, ``mass``, ``inertia``, ``length`` and ``actuator_gain`` are relative
-    changes, ``resonance`` is a second mass on a spring (stiffness in N m/rad), an effect that no
-    library holds, and ``wind`` is a torque that follows the angle's sine twice a turn and decays
-    with speed.
+    changes, ``backlash`` is a width in rad, ``resonance`` is a second mass on a spring (stiffness
+    in N m/rad), an effect that no library holds, and ``wind`` is a torque that follows the angle's
+    sine twice a turn and decays with speed.
     """
 
     viscous_friction: float = 0.0
@@ -80,6 +81,7 @@ class Truth:
     saturation: float = np.inf
     delay: float = 0.0
     actuator_lag: float = 0.0
+    backlash: float = 0.0
     sensor_offset: float = 0.0
     sensor_scale: float = 0.0
     resonance: float = 0.0
@@ -101,24 +103,31 @@ class Truth:
             + self.wind * np.sin(2 * angle) * np.exp(-np.abs(rate) / 5)
         )
 
-    def derivative(self, state: Array, volts: Array) -> Array:
+    def applied(self, state: Array, volts: Array) -> Array:
+        """Volts at the motor under these commands."""
+        volts = state[2] if self.actuator_lag > 0 else volts
+        volts = np.sign(volts) * np.maximum(np.abs(volts) - self.dead_zone, 0)
+        volts = np.clip(volts, -self.saturation, self.saturation)
+        return (1 + self.actuator_gain) * volts + self.actuator_bias
+
+    def free_speed(self, state: Array, volts: Array) -> Array:
+        """Rate in rad/s at which the motor would run without load, seen from the joint."""
+        return self.applied(state, volts) / TORQUE_CONSTANT - state[1]
+
+    def derivative(self, state: Array, volts: Array, driven: bool = True) -> Array:
         """Time derivative of (angle, rate, lagged input, second angle, second rate)."""
         angle, rate, lagged, second, second_rate = state
         if self.actuator_lag > 0:
             lagged_dot = (volts - lagged) / self.actuator_lag
-            volts = lagged
         else:
             lagged_dot = np.zeros_like(lagged)
-        volts = np.sign(volts) * np.maximum(np.abs(volts) - self.dead_zone, 0)
-        volts = np.clip(volts, -self.saturation, self.saturation)
-        volts = (1 + self.actuator_gain) * volts + self.actuator_bias
-        current = (volts - TORQUE_CONSTANT * rate) / RESISTANCE
+        current = (self.applied(state, volts) - TORQUE_CONSTANT * rate) / RESISTANCE
         weight = MASS * (1 + self.mass) * GRAVITY * LENGTH * (1 + self.length)
         coupling = self.resonance * (second - angle) + 1e-2 * self.resonance * (second_rate - rate)
         torque = (
             weight * np.sin(angle)
             - DAMPING * rate
-            + TORQUE_CONSTANT * current
+            + TORQUE_CONSTANT * current * driven
             + self.torque(angle, rate)
             + coupling
         )
@@ -185,6 +194,7 @@ def simulate(
     states[0] = np.pi + rng.uniform(-0.3, 0.3, runs) * (1 if hanging else 10)
     states[1] = 0.0 if hanging else rng.uniform(-5, 5, runs)
     states[3:] = states[:2]
+    gaps = np.zeros(runs)
     limit = {"strong": 3.0, "weak": 0.8, "policy": 3.0}[excitation]
     volts = random_steps(rng, runs, steps, limit, 8)
     policy = swing_up(rng, runs)
@@ -199,8 +209,13 @@ def simulate(
             states[2] = volts[:, 0]
         pieces = [(part, k - int(whole) - 1), (DT - part, k - int(whole))]
         for seconds, source in pieces:
-            if seconds > 1e-12:
-                states = integrate(truth, states, volts[:, max(source, 0)], seconds)
+            if seconds <= 1e-12:
+                continue
+            command = volts[:, max(source, 0)]
+            if truth.backlash:
+                states = integrate_play(truth, states, gaps, command, seconds)
+            else:
+                states = integrate(truth, states, command, seconds)
         path[:, k + 1] = states[:2].T
     return path, volts
 

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from residual.gap.candidates import Trial, candidates
 from residual.gap.model import Model
 from residual.gap.samples import Samples
-from residual.gap.shooting import Fit, fit, slopes
+from residual.gap.shooting import Fit, fit
 from residual.gap.signatures import signatures
+from residual.gap.slopes import slopes
 from residual.gap.windows import Windows, by_growth
 from residual.trajectories import Trajectory
 from sims import effects as known
@@ -90,6 +91,7 @@ HIDDEN: Mapping[str, Hidden] = {
     "saturation": Hidden(lambda s: known.Saturation("voltage", LIMIT * (1 - s)), 0.1, most=0.95),
     "delay": Hidden(lambda s: known.Delay("voltage", s), 6e-3),
     "actuator_lag": Hidden(lambda s: known.ActuatorLag("voltage", s), 7e-3),
+    "backlash": Hidden(lambda s: known.Backlash("pivot", s), 0.05, most=0.6),
     "sensor_offset": Hidden(lambda s: known.SensorOffset("angle", s), 0.04, True),
     "sensor_scale": Hidden(lambda s: known.SensorScale("angle", s), 0.01, True, 0.5),
 }

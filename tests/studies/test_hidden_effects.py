@@ -6,12 +6,15 @@ import json
 import numpy as np
 import pytest
 
+from residual.gap import find_gap
 from residual.gap.adequacy import CHANCE, ERRORS
+from sims.effects import Backlash
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies import report
 from studies.hidden.calibration import run_set, table
 from studies.hidden.data import Truth, make_logs
+from studies.hidden.play import integrate_play
 from studies.hidden.report import share
 from studies.hidden.rivals import one_step, regression
 from studies.hidden.scores import score_names
@@ -33,6 +36,32 @@ def test_truth_holds_what_the_library_calls_by_the_same_name():
     assert truth({"saturation": 0.2}).saturation == pytest.approx(2.4)
 
 
+def test_play_moves_as_in_the_simulator():
+    width = 0.3
+    simulator = PendulumEquation().with_effects((Backlash("pivot", width),))
+    rng = np.random.default_rng(4)
+    volts = rng.uniform(-3, 3, (3, 40))
+    states = np.zeros((5, 3))
+    states[0], states[1] = rng.uniform(0, 6, 3), rng.uniform(-5, 5, 3)
+    gaps = np.zeros(3)
+    rows = np.column_stack([*states[:2], gaps])
+    crossed = 0
+    for k in range(volts.shape[1]):
+        before = gaps.copy()
+        states = integrate_play(Truth(backlash=width), states, gaps, volts[:, k], simulator.dt)
+        rows = simulator.step(rows, volts[:, k : k + 1])
+        crossed += int((np.abs(gaps - before) > 0.9 * width).sum())
+        np.testing.assert_allclose(rows[:, :2], states[:2].T, atol=2e-4)
+    assert crossed > 20
+
+
+def test_play_is_named_with_its_width():
+    logs = make_logs(Truth(backlash=0.35), 8, "strong", "A", 8)
+    (verdict,) = find_gap(PendulumEquation(), logs, ceiling=False).verdicts
+    assert (verdict.kind, verdict.effect) == ("confirmed", "backlash")
+    assert verdict.parameters["width"].low <= 0.35 <= verdict.parameters["width"].high
+
+
 def test_names_are_scored_with_the_twins_that_are_declared():
     assert score_names(["length"], ["mass"])["first"]
     lag = score_names(["actuator_lag"], ["delay"])
@@ -49,11 +78,12 @@ def test_share_has_an_exact_interval():
 
 
 def test_draws_are_balanced_over_effects_and_repeatable():
-    study = HiddenStudy([Block("single", [["any"]], [1.5, 3.0], ["strong"], ["A"], sets=18)])
+    count = len(HIDDEN)
+    study = HiddenStudy([Block("single", [["any"]], [1.5, 3.0], ["strong"], ["A"], sets=count)])
     cells = trials_of(study)
     assert sorted(cell["hidden"][0] for cell in cells) == sorted(HIDDEN)
     assert cells == trials_of(study)
-    assert len({cell["seed"] for cell in cells}) == 18
+    assert len({cell["seed"] for cell in cells}) == count
 
 
 def test_an_unknown_name_is_one_line_and_leaves_nothing(tmp_path, capsys):
