@@ -109,6 +109,7 @@ def claim(
                 tuple(ties), tuple(n for n in twins if n != candidate.label),
                 (*instead, *alone_instead),
                 alone - arena.score(found.key), artefact, candidate.effect.sentence,
+                number in proof.silent,
             )
         )  # fmt: skip
     return sorted(claims, key=lambda c: -c.gain)

@@ -220,3 +220,15 @@ def earns_place(without: Array, with_it: Array, expected: float | None = None) -
         return True
     # An effect that grows with distance or speed may show in one window alone.
     return total > 6.6 and bool(total > 2.0 * spread or worse < 0.2 * better)
+
+
+def is_silent(without: Array, with_it: Array, expected: float) -> bool:
+    """Whether held-out data do not show an effect at all, for or against it.
+
+    An effect that grows with the cube of the angle, say, is seen in the one run that went far.
+
+    Args:
+        without, with_it: Cost of every window.
+        expected: Fall of the cost in training, scaled to the size of the held-out data.
+    """
+    return bool(np.abs(without - with_it).sum() < 0.05 * expected)

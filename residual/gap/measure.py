@@ -30,6 +30,7 @@ class Proof:
         before, after: Cost of each window without and with the effects, (W,).
         freedom: Residuals less free start states.
         cost: Cost of each window under another simulator.
+        silent: Chosen candidates that held-out data show neither for nor against.
     """
 
     floor: noise.Floor
@@ -37,6 +38,7 @@ class Proof:
     after: Array
     freedom: int
     cost: Callable[[HostSimulator], Array]
+    silent: frozenset[int] = frozenset()
 
 
 def prove(found: Found, unseen: Samples, longest: int) -> tuple[Found, Proof]:
@@ -68,6 +70,7 @@ def prove(found: Found, unseen: Samples, longest: int) -> tuple[Found, Proof]:
         proof = Proof(floor, before, after, max(size - physical * len(windows), 1), cost)
         share = size / arena.size
         weakest: Key | None = None
+        silent = set()
         if found.key:
             for drop in found.key:
                 smaller = tuple(i for i in found.key if i != drop)
@@ -79,10 +82,12 @@ def prove(found: Found, unseen: Samples, longest: int) -> tuple[Found, Proof]:
                 expected = share * (without.merit - best.merit)
                 sound = float(after.sum()) < 1.2 * proof.freedom
                 fails = not confirm.earns_place(other, after, expected if sound else None)
-                if fails and (weakest is None or arena.score(smaller) < arena.score(weakest)):
+                if fails and sound and confirm.is_silent(other, after, expected):
+                    silent.add(drop)
+                elif fails and (weakest is None or arena.score(smaller) < arena.score(weakest)):
                     weakest = smaller
         if weakest is None:
-            return found, proof
+            return found, dataclasses.replace(proof, silent=frozenset(silent))
         found = dataclasses.replace(found, key=weakest)
 
 

@@ -34,6 +34,7 @@ class Claim:
         gain: What leaving it out would cost.
         artefact: True if another step size or input hold explains it.
         sentence: What the effect is.
+        silent: True if held-out data do not go where it shows.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Claim:
     gain: float
     artefact: bool
     sentence: str
+    silent: bool = False
 
 
 def family(labels: Sequence[str]) -> str:
@@ -157,7 +159,7 @@ def _effect(
     )
     title = family((claim.label, *claim.ties)) if claim.ties else ""
     says = f"{claim.label}: {numbers}"
-    sure = not claim.instead and (not claim.ties or bool(title))
+    sure = not claim.instead and not claim.silent and (not claim.ties or bool(title))
     confirmed = (sound or removed >= 10) and sure
     if claim.ties:
         says += f"; these data cannot exclude {', '.join(claim.ties)}"
@@ -171,6 +173,8 @@ def _effect(
         sets = " or ".join(" with ".join(names) for names in together[:2])
         more = f" (and {len(together) - 2} more such sets)" if len(together) > 2 else ""
         says += f"; {sets}, in one exact proportion, would move alike{more}"
+    if claim.silent:
+        says += "; held-out data do not go where it shows, so nothing confirms it"
     if not sound:
         says += "; a remainder is unexplained"
     kind: Kind = "confirmed" if confirmed else "ambiguous"

@@ -62,6 +62,14 @@ def test_play_is_named_with_its_width():
     assert verdict.parameters["width"].low <= 0.35 <= verdict.parameters["width"].high
 
 
+def test_what_only_one_run_shows_is_named_but_not_confirmed():
+    # One run turns far away from a cubic spring's centre, and it is not held out.
+    logs = make_logs(Truth(cubic_spring=5.923225897069604e-11), 42, "strong", "B")
+    (verdict,) = find_gap(PendulumEquation(), logs, ceiling=False).verdicts
+    assert (verdict.kind, verdict.effect) == ("ambiguous", "cubic_spring")
+    assert "do not go where it shows" in verdict.says
+
+
 def test_names_are_scored_with_the_twins_that_are_declared():
     assert score_names(["length"], ["mass"])["first"]
     lag = score_names(["actuator_lag"], ["delay"])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from residual.gap.confirm import earns_place
+from residual.gap.confirm import earns_place, is_silent
 from residual.gap.holdout import end_of_training
 from residual.gap.verdicts import dependent, family
 from residual.trajectories import Trajectory
@@ -50,6 +50,13 @@ def test_a_small_held_out_part_need_not_prove_what_training_shows():
     assert not earns_place(without, without - 0.1)
     assert not earns_place(without, without + 0.1, expected=4.0)
     assert not earns_place(without, without - 0.1, expected=400.0)
+
+
+def test_held_out_data_are_silent_only_if_they_speak_neither_for_nor_against():
+    without = 20 + np.random.default_rng(0).normal(size=30)
+    assert is_silent(without, without - 0.1, expected=400.0)
+    assert not is_silent(without, without - 0.1, expected=4.0)
+    assert not is_silent(without, without + 2.0, expected=400.0)
 
 
 def test_a_single_record_is_held_out_where_its_input_changes():
