@@ -194,6 +194,12 @@ class Arena:
             }
         return self._signatures[key]
 
+    def signatures_of_path(self, key: Key) -> Signatures:
+        """The same along the measured path, which a fitted set far from it does not follow."""
+        found = self.tried[key]
+        there = self._fit(found.model, self.nodes, found.theta, 0, None, 0.05)
+        return signatures(there, self.samples, self.windows, self.sigma, self.candidates)
+
     def merged(
         self, key: Key, additions: Sequence[tuple[int, Array]], drop: Key = ()
     ) -> tuple[Key, Array]:

@@ -38,7 +38,12 @@ def choose(arena: Arena, known: dict[Key, Array]) -> Key:
     for turn in range(2 * settings.most):
         found = arena.signatures(current)
         arena.calibrate(found)
-        sets = additions(arena, current, found, settings.singles if turn == 0 else 4)
+        singles = settings.singles if turn == 0 else 4
+        sets = additions(arena, current, found, singles)
+        if far_off(arena, current):
+            along = arena.signatures_of_path(current)
+            for key, starts in additions(arena, current, along, singles).items():
+                sets.setdefault(key, []).extend(starts)
         if current:
             for key, starts in exchanges(arena, current, found).items():
                 sets.setdefault(key, []).extend(starts)
@@ -161,6 +166,11 @@ def worth(arena: Arena, smaller: Key, larger: Key) -> bool:
 def near_floor(arena: Arena, key: Key) -> bool:
     """Whether a set leaves little more than noise."""
     return arena.tried[key].merit < 1.3 * arena.size
+
+
+def far_off(arena: Arena, key: Key) -> bool:
+    """Whether what a set leaves is so large that its path is not the measured one."""
+    return arena.tried[key].merit > 9 * arena.size
 
 
 def additions(

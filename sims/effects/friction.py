@@ -48,6 +48,8 @@ class CoulombFriction(DryFriction):
 class StribeckFriction(DryFriction):
     """Dry friction that drops from ``breakaway`` at rest to ``sliding`` beyond ``speed``.
 
+    It never rises: a breakaway below the sliding friction counts as equal to it.
+
     ``sliding + (breakaway - sliding) exp(-(v / speed)^2)``, see Armstrong-Helouvry, Dupont,
     Canudas de Wit, "A survey of models, analysis tools and compensation methods for the
     control of machines with friction", Automatica 30(7), 1994.
@@ -64,4 +66,6 @@ class StribeckFriction(DryFriction):
     def limit(self, v: Value) -> Value:
         """Size of the friction at rate ``v``."""
         ratio = v / self.speed
-        return self.sliding + (self.breakaway - self.sliding) * np.exp(-ratio * ratio)
+        return self.sliding + np.maximum(self.breakaway - self.sliding, 0.0) * np.exp(
+            -ratio * ratio
+        )
