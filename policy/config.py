@@ -12,6 +12,7 @@ class DDPGConfig:
 
     Args:
         hidden: Widths of the two hidden layers of the actor and of the critic.
+        action_layer: Hidden layer of the critic that the action enters, 1 or 2.
         actor_lr: Adam's step size for the actor.
         critic_lr: Adam's step size for the critic.
         critic_weight_decay: Factor of the critic's parameters added to their gradient.
@@ -37,6 +38,7 @@ class DDPGConfig:
     """
 
     hidden: tuple[int, int] = (400, 300)
+    action_layer: int = 1
     actor_lr: float = 1e-4
     critic_lr: float = 1e-3
     critic_weight_decay: float = 0.0
@@ -59,6 +61,7 @@ class DDPGConfig:
         if len(self.hidden) != 2:
             raise ValueError(f"hidden is {self.hidden}, expected the widths of two layers")
         for name, low, high in (
+            ("action_layer", 1, 2),
             ("tau", 0, 1),
             ("gamma", 0, 1),
             ("noise_theta", 0, 1),

@@ -5,9 +5,8 @@ one flat array (so that an optimiser step is one call), a pass writes into buffe
 allocated once, and no product is computed that is not used: the actor's step takes from the
 critic only the gradient with respect to the action.
 
-Both have two hidden layers of rectified linear units. The action enters the critic at the first
-layer and not, as in Lillicrap et al. (2016), at the second: clearly better swing-ups
-(docs/deviations.md).
+All have two hidden layers of rectified linear units. There are two critics, by where the action
+enters: docs/deviations.md says which is the better one where.
 """
 
 from __future__ import annotations
@@ -55,6 +54,7 @@ class FlatNetwork:
         hidden: Widths of the two hidden layers.
         outputs: Number of outputs.
         batch: Columns per pass.
+        late: Number of inputs of the second hidden layer beside the first one.
 
     Attributes:
         parameters: All parameters, shape (n,), float32; biases start at zero.
@@ -63,13 +63,15 @@ class FlatNetwork:
         d_weights: Views into ``gradient``.
     """
 
-    def __init__(self, inputs: int, hidden: tuple[int, int], outputs: int, batch: int) -> None:
-        sizes = (inputs, hidden, outputs)
+    def __init__(
+        self, inputs: int, hidden: tuple[int, int], outputs: int, batch: int, late: int = 0
+    ) -> None:
+        sizes = (inputs, hidden, outputs, late)
         self.parameters = zeros(passes.Weights.size(*sizes))
         self.gradient = zeros(*self.parameters.shape)
         self.weights = passes.Weights.of(self.parameters, *sizes)
         self.d_weights = passes.Weights.of(self.gradient, *sizes)
-        self._buffers = passes.Buffers.empty(hidden, outputs, batch)
+        self._buffers = passes.Buffers.empty(hidden, outputs, batch, late)
 
     def _start_hidden_and_last(self, rng: np.random.Generator) -> None:
         _, weight2, _, weight3, _ = self.weights
@@ -125,7 +127,7 @@ class Actor(FlatNetwork):
         passes.weight_gradients(self.d_weights, inputs.observed, d_output, self._buffers)
 
 
-class Critic(FlatNetwork):
+class EarlyCritic(FlatNetwork):
     """Observation and action in [-1, 1] -> value, both entering at the first layer.
 
     Args:
@@ -176,6 +178,47 @@ class Critic(FlatNetwork):
         passes.backward(self.weights, d_values, self._buffers)
         passes.product(self._action_entry, self._buffers.back1, self._d_actions)
         return self._d_actions
+
+
+class LateCritic(FlatNetwork):
+    """The same with the action entering at the second layer (Lillicrap et al., 2016).
+
+    Arguments as for ``EarlyCritic``.
+    """
+
+    def __init__(
+        self,
+        observation_size: int,
+        action_size: int,
+        hidden: tuple[int, int],
+        batch: int,
+        rng: np.random.Generator,
+    ) -> None:
+        super().__init__(observation_size + 1, hidden, 1, batch, late=action_size)
+        shape = (hidden[0], observation_size)
+        self.weights.entry[:-1] = _uniform(rng, shape, observation_size**-0.5).T
+        self._start_hidden_and_last(rng)
+        self._actions = self._buffers.hidden1[hidden[0] :]
+        self._d_actions = self._buffers.back1[hidden[0] :]
+
+    def forward(self, inputs: Inputs) -> Array:
+        """Values, shape (1, n); the buffer is overwritten by the next call."""
+        self._actions[:] = inputs.actions
+        passes.forward(self.weights, inputs.observed, self._buffers)
+        return self._buffers.output
+
+    def backward(self, inputs: Inputs, d_values: Array) -> None:
+        """Fill ``gradient`` after ``forward``, as ``EarlyCritic.backward``."""
+        passes.backward(self.weights, d_values, self._buffers)
+        passes.weight_gradients(self.d_weights, inputs.observed, d_values, self._buffers)
+
+    def d_actions(self, d_values: Array) -> Array:
+        """Gradient with respect to the actions, as ``EarlyCritic.d_actions``; a buffer."""
+        passes.backward(self.weights, d_values, self._buffers)
+        return self._d_actions
+
+
+Critic = EarlyCritic | LateCritic
 
 
 def _uniform(rng: np.random.Generator, shape: tuple[int, ...], half_width: float) -> Array:

@@ -21,8 +21,8 @@ class Weights(NamedTuple):
     """Views into the flat parameters of a network, or into its flat gradient.
 
     ``entry`` (inputs, h_1) is the first layer transposed, its bias being the row of a constant
-    input; ``weight2`` (h_2, h_1), ``bias2`` (h_2,), ``weight3`` (outputs, h_2), ``bias3``
-    (outputs,).
+    input; ``weight2`` (h_2, h_1 + late), ``bias2`` (h_2,), ``weight3`` (outputs, h_2), ``bias3``
+    (outputs,). ``late`` inputs enter beside the first layer's output.
     """
 
     entry: Array
@@ -32,23 +32,29 @@ class Weights(NamedTuple):
     bias3: Array
 
     @classmethod
-    def of(cls, flat: Array, inputs: int, hidden: tuple[int, int], outputs: int) -> Weights:
+    def of(
+        cls, flat: Array, inputs: int, hidden: tuple[int, int], outputs: int, late: int
+    ) -> Weights:
         """Views into an array of ``size`` elements."""
         first, second = hidden
-        shapes = [(inputs, first), (second, first), (second,), (outputs, second), (outputs,)]
+        shapes = [(inputs, first), (second, first + late), (second,), (outputs, second), (outputs,)]
         ends = np.cumsum([np.prod(shape) for shape in shapes])
         parts = np.split(flat, ends[:-1])
         return cls(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
 
     @staticmethod
-    def size(inputs: int, hidden: tuple[int, int], outputs: int) -> int:
+    def size(inputs: int, hidden: tuple[int, int], outputs: int, late: int) -> int:
         """Number of parameters."""
         first, second = hidden
-        return inputs * first + (first + 1) * second + (second + 1) * outputs
+        return inputs * first + (first + late + 1) * second + (second + 1) * outputs
 
 
 class Buffers(NamedTuple):
-    """What passes over n columns write: layers (width, n), and the gradients that reach them."""
+    """What passes over n columns write: layers (width, n), and the gradients that reach them.
+
+    Late inputs are the last rows of ``hidden1``, to be filled before a pass forward, and their
+    gradients those of ``back1``.
+    """
 
     hidden1: Array
     hidden2: Array
@@ -57,17 +63,19 @@ class Buffers(NamedTuple):
     back2: Array
 
     @classmethod
-    def empty(cls, hidden: tuple[int, int], outputs: int, columns: int) -> Buffers:
+    def empty(cls, hidden: tuple[int, int], outputs: int, columns: int, late: int) -> Buffers:
         """Memory for passes over ``columns`` columns."""
-        widths = (*hidden, outputs, *hidden)
+        layers = (hidden[0] + late, hidden[1])
+        widths = (*layers, outputs, *layers)
         return cls(*(zeros(width, columns) for width in widths))
 
 
 @compiled
 def forward(w: Weights, inputs: Array, b: Buffers) -> None:
     """From inputs, shape (inputs, n), to ``b.output``."""
-    np.dot(w.entry.T, inputs, b.hidden1)
-    _rectify(b.hidden1)
+    first = b.hidden1[: w.entry.shape[1]]
+    np.dot(w.entry.T, inputs, first)
+    _rectify(first)
     np.dot(w.weight2, b.hidden1, b.hidden2)
     _add(b.hidden2, w.bias2)
     _rectify(b.hidden2)
@@ -81,7 +89,8 @@ def backward(w: Weights, d_output: Array, b: Buffers) -> None:
     np.dot(w.weight3.T, d_output, b.back2)
     _through_rectifier(b.back2, b.hidden2)
     np.dot(w.weight2.T, b.back2, b.back1)
-    _through_rectifier(b.back1, b.hidden1)
+    width = w.entry.shape[1]
+    _through_rectifier(b.back1[:width], b.hidden1[:width])
 
 
 @compiled
@@ -91,7 +100,7 @@ def weight_gradients(gradient: Weights, inputs: Array, d_output: Array, b: Buffe
     _row_sums(d_output, gradient.bias3)
     np.dot(b.back2, b.hidden1.T, gradient.weight2)
     _row_sums(b.back2, gradient.bias2)
-    np.dot(inputs, b.back1.T, gradient.entry)
+    np.dot(inputs, b.back1[: gradient.entry.shape[1]].T, gradient.entry)
 
 
 @compiled

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from policy.config import DDPGConfig
 from policy.evaluate import Rollout
 from sims.leo import Leo, Walking, measure_walk
 from sims.leo.body import clearance
@@ -67,6 +68,8 @@ class LeoTrial(GapTrial):
             control_steps=15_000,
         )
     )
+    # As in the authors' code: on Leo better walks come of it (docs/deviations.md).
+    ddpg: DDPGConfig = dataclasses.field(default_factory=lambda: DDPGConfig(action_layer=2))
     simulator: Simulator | None = None
 
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from policy.adam import Adam
-from policy.networks import Actor, Critic, FlatNetwork, Inputs
+from policy.networks import Actor, EarlyCritic, FlatNetwork, Inputs, LateCritic
 
 sizes = st.tuples(
     st.integers(1, 80),  # observations: narrow and wide first layers
@@ -39,8 +39,10 @@ def autograd_weights(network: FlatNetwork) -> list[torch.Tensor]:
 
 
 def autograd(weights: list[torch.Tensor], rows: torch.Tensor) -> torch.Tensor:
+    """Inputs that the first layer has no weights for enter at the second."""
     entry, w2, b2, w3, b3 = weights
-    hidden = torch.relu(rows @ entry)
+    hidden = torch.relu(rows[:, : len(entry)] @ entry)
+    hidden = torch.cat([hidden, rows[:, len(entry) :]], dim=1)
     return torch.relu(hidden @ w2.T + b2) @ w3.T + b3
 
 
@@ -69,12 +71,13 @@ def test_actor_matches_autograd(size):
     assert_gradient(actor, weights)
 
 
+@pytest.mark.parametrize("kind", [EarlyCritic, LateCritic])
 @settings(max_examples=40, deadline=None)
-@given(sizes)
-def test_critic_matches_autograd(size):
+@given(size=sizes)
+def test_critic_matches_autograd(kind, size):
     n_o, n_a, hidden, batch, seed = size
     rng = np.random.default_rng(seed)
-    critic = Critic(n_o, n_a, hidden, batch, rng)
+    critic = kind(n_o, n_a, hidden, batch, rng)
     spread(critic, rng)
     inputs, d_values = filled(rng, n_o, n_a, batch), normal(rng, 1, batch)
     weights = autograd_weights(critic)
@@ -96,7 +99,8 @@ def test_critic_matches_autograd(size):
 def test_flat_arrays_hold_everything_once():
     """No parameter lies outside the flat array, and none of it is left over."""
     rng = np.random.default_rng(0)
-    for network in (Actor(3, 2, (40, 30), 8, rng), Critic(3, 2, (40, 30), 8, rng)):
+    for kind in (Actor, EarlyCritic, LateCritic):
+        network = kind(3, 2, (40, 30), 8, rng)
         before = network.parameters.copy()
         for part in network.weights:
             part += 1
@@ -132,7 +136,7 @@ def test_adam_matches_torch(weight_decay):
 
 def test_what_is_not_finite_stays_visible():
     """A network that has diverged must not look healthy: NaN goes through the rectifiers."""
-    critic = Critic(3, 1, (40, 30), 8, np.random.default_rng(0))
+    critic = EarlyCritic(3, 1, (40, 30), 8, np.random.default_rng(0))
     inputs = filled(np.random.default_rng(1), 3, 1, 8)
     inputs.observations[0, 2] = np.nan
     values = critic.forward(inputs)
