@@ -81,7 +81,9 @@ def prove(found: Found, unseen: Samples, longest: int) -> tuple[Found, Proof]:
                 other = np.minimum(cost(without.model.bind(without.theta)), cap)
                 expected = share * (without.merit - best.merit)
                 sound = float(after.sum()) < 1.2 * proof.freedom
-                fails = not confirm.earns_place(other, after, expected if sound else None)
+                # On all training runs it may not be worth its numbers, as it was on some.
+                fails = arena.score(smaller) < arena.score(found.key)
+                fails |= not confirm.earns_place(other, after, expected if sound else None)
                 if fails and sound and confirm.is_silent(other, after, expected):
                     silent.add(drop)
                 elif fails and (weakest is None or arena.score(smaller) < arena.score(weakest)):

@@ -101,7 +101,7 @@ class Saturation(StaticActuatorEffect):
     """Commands are cut at ``+-level``; an infinite level is no saturation."""
 
     level: Value = number(
-        math.inf, low=1e-6, nominal=math.inf, input=1, starts=(0.97, 0.85, 0.65, 0.4)
+        math.inf, low=1e-6, nominal=math.inf, input=1, starts=(0.99, 0.97, 0.85, 0.65, 0.4)
     )
 
     name: ClassVar[str] = "saturation"
