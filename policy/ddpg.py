@@ -18,7 +18,7 @@ from policy.adam import Adam
 from policy.config import DDPGConfig
 from policy.files import read_arrays, write_whole
 from policy.mlp import MlpPolicy
-from policy.networks import Actor, Critic, EarlyCritic, FlatNetwork, Inputs, LateCritic
+from policy.networks import Actor, Critic, FlatNetwork, Inputs
 from policy.noise import OrnsteinUhlenbeck
 from policy.replay import Batch, Replay
 
@@ -82,9 +82,8 @@ class DDPG:
         sizes = (n_o, n_a, c.hidden, c.batch, rng)
         self._actor, self._actor_target = Actor(*sizes), Actor(*sizes)
         count = 2 if c.twin_critics else 1
-        critic = EarlyCritic if c.action_layer == 1 else LateCritic
-        self._critics: list[Critic] = [critic(*sizes) for _ in range(count)]
-        self._critic_targets: list[Critic] = [critic(*sizes) for _ in range(count)]
+        self._critics = [Critic(*sizes, c.action_layer) for _ in range(count)]
+        self._critic_targets = [Critic(*sizes, c.action_layer) for _ in range(count)]
         for network, target in self._pairs():
             target.parameters[:] = network.parameters
         self._actor_adam = _adam(self._actor, self._actor_target, c.actor_lr)

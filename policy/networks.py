@@ -5,8 +5,8 @@ one flat array (so that an optimiser step is one call), a pass writes into buffe
 allocated once, and no product is computed that is not used: the actor's step takes from the
 critic only the gradient with respect to the action.
 
-All have two hidden layers of rectified linear units. There are two critics, by where the action
-enters: docs/deviations.md says which is the better one where.
+Both have two hidden layers of rectified linear units. Where the action enters the critic is a
+choice: docs/deviations.md says what each brings.
 """
 
 from __future__ import annotations
@@ -73,8 +73,17 @@ class FlatNetwork:
         self.d_weights = passes.Weights.of(self.gradient, *sizes)
         self._buffers = passes.Buffers.empty(hidden, outputs, batch, late)
 
-    def _start_hidden_and_last(self, rng: np.random.Generator) -> None:
+    def _start(self, rng: np.random.Generator, *entries: Array) -> None:
+        """Weights uniform within 1/sqrt(inputs), the last ones within 3e-3; biases stay zero.
+
+        Args:
+            rng: Their source.
+            entries: Rows of ``weights.entry`` that take inputs other than the constant.
+        """
         _, weight2, _, weight3, _ = self.weights
+        half_width = sum(len(rows) for rows in entries) ** -0.5
+        for rows in entries:
+            rows[:] = _uniform(rng, rows.T.shape, half_width).T
         weight2[:] = _uniform(rng, weight2.shape, weight2.shape[1] ** -0.5)
         weight3[:] = _uniform(rng, weight3.shape, LAST_HALF_WIDTH)
 
@@ -99,9 +108,7 @@ class Actor(FlatNetwork):
         rng: np.random.Generator,
     ) -> None:
         super().__init__(observation_size + 1, hidden, action_size, batch)
-        entry = self.weights.entry
-        entry[:-1] = _uniform(rng, (hidden[0], observation_size), observation_size**-0.5).T
-        self._start_hidden_and_last(rng)
+        self._start(rng, self.weights.entry[:-1])
 
     def layers(self) -> dict[str, Array]:
         """``weight1`` (h_1, n_o), ``bias1`` and so on, as ``MlpPolicy`` wants them: live views."""
@@ -127,8 +134,8 @@ class Actor(FlatNetwork):
         passes.weight_gradients(self.d_weights, inputs.observed, d_output, self._buffers)
 
 
-class EarlyCritic(FlatNetwork):
-    """Observation and action in [-1, 1] -> value, both entering at the first layer.
+class Critic(FlatNetwork):
+    """Observation and action in [-1, 1] -> value.
 
     Args:
         observation_size: n_o.
@@ -136,6 +143,7 @@ class EarlyCritic(FlatNetwork):
         hidden: Widths of the two hidden layers.
         batch: Columns per pass.
         rng: Source of the initial weights: uniform within 1/sqrt(inputs), output within 3e-3.
+        action_layer: Hidden layer that the action enters: 1, or 2 as in Lillicrap et al. (2016).
     """
 
     def __init__(
@@ -145,18 +153,24 @@ class EarlyCritic(FlatNetwork):
         hidden: tuple[int, int],
         batch: int,
         rng: np.random.Generator,
+        action_layer: int = 1,
     ) -> None:
-        super().__init__(observation_size + 1 + action_size, hidden, 1, batch)
-        half_width = (observation_size + action_size) ** -0.5
-        self._action_entry = self.weights.entry[observation_size + 1 :]
-        for rows in (self.weights.entry[:observation_size], self._action_entry):
-            rows[:] = _uniform(rng, rows.T.shape, half_width).T
-        self._start_hidden_and_last(rng)
-        self._d_actions = zeros(action_size, batch)
+        self._late = action_layer == 2
+        early, late = (0, action_size) if self._late else (action_size, 0)
+        super().__init__(observation_size + 1 + early, hidden, 1, batch, late)
+        entry = self.weights.entry
+        self._action_entry = entry[observation_size + 1 :]
+        self._start(rng, entry[:observation_size], self._action_entry)
+        self._late_actions = self._buffers.hidden1[hidden[0] :]
+        self._d_actions = (
+            self._buffers.back1[hidden[0] :] if self._late else zeros(action_size, batch)
+        )
 
     def forward(self, inputs: Inputs) -> Array:
         """Values, shape (1, n); the buffer is overwritten by the next call."""
-        passes.forward(self.weights, inputs.all, self._buffers)
+        if self._late:
+            self._late_actions[:] = inputs.actions
+        passes.forward(self.weights, self._entering(inputs), self._buffers)
         return self._buffers.output
 
     def backward(self, inputs: Inputs, d_values: Array) -> None:
@@ -167,58 +181,24 @@ class EarlyCritic(FlatNetwork):
             d_values: Gradient of the loss with respect to the values, (1, n).
         """
         passes.backward(self.weights, d_values, self._buffers)
-        passes.weight_gradients(self.d_weights, inputs.all, d_values, self._buffers)
+        entering = self._entering(inputs)
+        passes.weight_gradients(self.d_weights, entering, d_values, self._buffers)
 
     def d_actions(self, d_values: Array) -> Array:
         """Gradient with respect to the actions of the last ``forward``, shape (n_a, n).
+
+        The buffer is overwritten by the next call, or by ``backward``.
 
         Args:
             d_values: Gradient of the loss with respect to the values, (1, n).
         """
         passes.backward(self.weights, d_values, self._buffers)
-        passes.product(self._action_entry, self._buffers.back1, self._d_actions)
+        if not self._late:
+            passes.product(self._action_entry, self._buffers.back1, self._d_actions)
         return self._d_actions
 
-
-class LateCritic(FlatNetwork):
-    """The same with the action entering at the second layer (Lillicrap et al., 2016).
-
-    Arguments as for ``EarlyCritic``.
-    """
-
-    def __init__(
-        self,
-        observation_size: int,
-        action_size: int,
-        hidden: tuple[int, int],
-        batch: int,
-        rng: np.random.Generator,
-    ) -> None:
-        super().__init__(observation_size + 1, hidden, 1, batch, late=action_size)
-        shape = (hidden[0], observation_size)
-        self.weights.entry[:-1] = _uniform(rng, shape, observation_size**-0.5).T
-        self._start_hidden_and_last(rng)
-        self._actions = self._buffers.hidden1[hidden[0] :]
-        self._d_actions = self._buffers.back1[hidden[0] :]
-
-    def forward(self, inputs: Inputs) -> Array:
-        """Values, shape (1, n); the buffer is overwritten by the next call."""
-        self._actions[:] = inputs.actions
-        passes.forward(self.weights, inputs.observed, self._buffers)
-        return self._buffers.output
-
-    def backward(self, inputs: Inputs, d_values: Array) -> None:
-        """Fill ``gradient`` after ``forward``, as ``EarlyCritic.backward``."""
-        passes.backward(self.weights, d_values, self._buffers)
-        passes.weight_gradients(self.d_weights, inputs.observed, d_values, self._buffers)
-
-    def d_actions(self, d_values: Array) -> Array:
-        """Gradient with respect to the actions, as ``EarlyCritic.d_actions``; a buffer."""
-        passes.backward(self.weights, d_values, self._buffers)
-        return self._d_actions
-
-
-Critic = EarlyCritic | LateCritic
+    def _entering(self, inputs: Inputs) -> Array:
+        return inputs.observed if self._late else inputs.all
 
 
 def _uniform(rng: np.random.Generator, shape: tuple[int, ...], half_width: float) -> Array:

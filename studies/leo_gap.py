@@ -68,7 +68,7 @@ class LeoTrial(GapTrial):
             control_steps=15_000,
         )
     )
-    # As in the authors' code: on Leo better walks come of it (docs/deviations.md).
+    # As in the authors' code; docs/leo.md says what each choice brought.
     ddpg: DDPGConfig = dataclasses.field(default_factory=lambda: DDPGConfig(action_layer=2))
     simulator: Simulator | None = None
 

@@ -66,6 +66,5 @@ class StribeckFriction(DryFriction):
     def limit(self, v: Value) -> Value:
         """Size of the friction at rate ``v``."""
         ratio = v / self.speed
-        return self.sliding + np.maximum(self.breakaway - self.sliding, 0.0) * np.exp(
-            -ratio * ratio
-        )
+        excess = np.maximum(self.breakaway - self.sliding, 0.0)
+        return self.sliding + excess * np.exp(-ratio * ratio)

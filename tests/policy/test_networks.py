@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from policy.adam import Adam
-from policy.networks import Actor, EarlyCritic, FlatNetwork, Inputs, LateCritic
+from policy.networks import Actor, Critic, FlatNetwork, Inputs
 
 sizes = st.tuples(
     st.integers(1, 80),  # observations: narrow and wide first layers
@@ -71,13 +71,13 @@ def test_actor_matches_autograd(size):
     assert_gradient(actor, weights)
 
 
-@pytest.mark.parametrize("kind", [EarlyCritic, LateCritic])
+@pytest.mark.parametrize("action_layer", [1, 2])
 @settings(max_examples=40, deadline=None)
 @given(size=sizes)
-def test_critic_matches_autograd(kind, size):
+def test_critic_matches_autograd(action_layer, size):
     n_o, n_a, hidden, batch, seed = size
     rng = np.random.default_rng(seed)
-    critic = kind(n_o, n_a, hidden, batch, rng)
+    critic = Critic(n_o, n_a, hidden, batch, rng, action_layer)
     spread(critic, rng)
     inputs, d_values = filled(rng, n_o, n_a, batch), normal(rng, 1, batch)
     weights = autograd_weights(critic)
@@ -99,8 +99,8 @@ def test_critic_matches_autograd(kind, size):
 def test_flat_arrays_hold_everything_once():
     """No parameter lies outside the flat array, and none of it is left over."""
     rng = np.random.default_rng(0)
-    for kind in (Actor, EarlyCritic, LateCritic):
-        network = kind(3, 2, (40, 30), 8, rng)
+    sizes = (3, 2, (40, 30), 8, rng)
+    for network in (Actor(*sizes), Critic(*sizes), Critic(*sizes, action_layer=2)):
         before = network.parameters.copy()
         for part in network.weights:
             part += 1
@@ -136,7 +136,7 @@ def test_adam_matches_torch(weight_decay):
 
 def test_what_is_not_finite_stays_visible():
     """A network that has diverged must not look healthy: NaN goes through the rectifiers."""
-    critic = EarlyCritic(3, 1, (40, 30), 8, np.random.default_rng(0))
+    critic = Critic(3, 1, (40, 30), 8, np.random.default_rng(0))
     inputs = filled(np.random.default_rng(1), 3, 1, 8)
     inputs.observations[0, 2] = np.nan
     values = critic.forward(inputs)
