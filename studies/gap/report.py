@@ -99,10 +99,12 @@ def banner(answer: Answer, result: GapResult) -> Verdict:
             text.append(f"No motion can tell it from **{names_of(same)}**.")
         if answer.kind == "confirmed":
             text.append("Confirmed on held-out data.")
-        if answer.effect and "provisional" in answer.says:
-            text.append("Provisional: there is one record only, whose end was held out.")
+        elif "nothing confirms it" in answer.says:
+            text.append("Held-out data do not go where it shows, so nothing confirms it.")
         elif not ties:
             text.append("A remainder is unexplained, so take this as a lead.")
+        if "provisional" in answer.says:
+            text.append("Provisional: there is one record only, whose end was held out.")
     elif answer.kind == "unexplained" and answer.says.startswith("unexplained: no single"):
         text.append("Together they reach the noise, but so do others: take the names as leads.")
     elif answer.kind == "unexplained":

@@ -80,6 +80,9 @@ def test_the_report_is_one_page_with_the_verdict_first(found):
     assert pictures == {path.stem for path in (folder / "figures").glob("*.csv")}
     assert len(lines) > 3
     assert not list(folder.parent.glob(".partial*"))
+    # A confirmed effect is no lead.
+    assert "Confirmed on held-out data." in page
+    assert "take this as a lead" not in page
 
 
 def test_the_same_settings_give_the_same_numbers(found, logs, tmp_path):
