@@ -4,7 +4,8 @@ Returns oscillate by hundreds from one evaluation to the next, so the last polic
 choice. The one with the best single rollout is also risky: on a corrected simulator it may
 live from an error of the correction. The rule here averages one rollout without noise, or a
 few from different starts, and a few with a little noise, all in the environment that the agent
-learns in.
+learns in. The best of many noisy scores is partly luck, so the best few can be scored once more,
+from other starts; that second score alone then decides.
 """
 
 from __future__ import annotations
@@ -47,12 +48,24 @@ class Selection:
         networks: The agent's networks at that moment, for ``DDPG.restore``.
         best: Its evaluation.
         curve: All evaluations in order.
+        final: Mean return of the policy in the final, if there was one: it was
+            chosen among the finalists only, so it is hardly flattered by luck.
     """
 
     policy: MlpPolicy
     networks: dict[str, NDArray[np.float32]]
     best: Point
     curve: tuple[Point, ...]
+    final: float | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """A policy with the agent's networks and its evaluation."""
+
+    policy: MlpPolicy
+    networks: dict[str, NDArray[np.float32]]
+    point: Point
 
 
 def score(
@@ -89,6 +102,8 @@ def learn_and_select(
     callback: Callable[[Point], bool | None] | None = None,
     random_steps: int = 0,
     episodes: int = 1,
+    finalists: int = 1,
+    final_episodes: int = 0,
 ) -> Selection:
     """Learn, score the policy now and then, and keep the best.
 
@@ -110,12 +125,16 @@ def learn_and_select(
         callback: Called with every evaluation; learning stops if it returns True.
         random_steps: As in ``DDPG.learn``.
         episodes: Rollouts without noise per evaluation, each from its own start state.
+        finalists: So many of the best policies are rolled out once more at the end.
+        final_episodes: Rollouts of each finalist, without noise and from other starts; their mean
+            decides. With 0 the best score does.
     """
     if env.unwrapped is evaluation_env.unwrapped:
         raise ValueError("env and evaluation_env are one object: make the environment twice")
     c = agent.config
     curve: list[Point] = []
-    kept: list[tuple[MlpPolicy, dict[str, NDArray[np.float32]], Point]] = []
+    most = finalists if final_episodes else 1
+    kept: list[Candidate] = []
     scored_at = -1
 
     def consider(step: int) -> bool:
@@ -126,8 +145,10 @@ def learn_and_select(
         scores = score(agent.policy, evaluation_env, noisy, sigma, c.noise_theta, seed, episodes)
         point = Point(step, *scores)
         curve.append(point)
-        if not kept or point.score > kept[0][2].score:
-            kept[:] = [(agent.policy.copy(), agent.networks(), point)]
+        if len(kept) < most or point.score > kept[-1].point.score:
+            kept.append(Candidate(agent.policy.copy(), agent.networks(), point))
+            # Of equals the earlier one: the sort is stable.
+            kept[:] = sorted(kept, key=lambda one: -one.point.score)[:most]
         return bool(callback and callback(point))
 
     def on_progress(progress: Progress) -> bool:
@@ -135,5 +156,14 @@ def learn_and_select(
 
     if not consider(0):
         agent.learn(env, steps, on_progress, every, random_steps)
-    policy, networks, best = kept[0]
-    return Selection(policy, networks, best, tuple(curve))
+    final: float | None = None
+    chosen = kept[0]
+    if final_episodes:
+        fresh = seed + episodes + noisy
+        means = [
+            float(evaluate(one.policy, evaluation_env, final_episodes, fresh).mean())
+            for one in kept
+        ]
+        final = max(means)
+        chosen = kept[means.index(final)]
+    return Selection(chosen.policy, chosen.networks, chosen.point, tuple(curve), final)

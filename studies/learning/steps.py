@@ -54,6 +54,9 @@ class PolicyTests:
         episodes: Rollouts without noise per test, each from its own start state.
         noisy: Rollouts with a little noise per test on a model; they keep a policy from being
             chosen for one lucky path through the model's errors.
+        finalists: So many of the best policies of a training are tested once more at its end.
+        final_episodes: Rollouts of each of them, from other starts; 0 for no final.
+        true_episodes: Rollouts of the policy kept on the true system: the result.
         visited_seconds: Accuracy is measured over the first seconds of fresh rollouts.
         visited_rollouts: How many of those.
         visited_stride: Open-loop predictions start at every so many-th state of them.
@@ -63,6 +66,9 @@ class PolicyTests:
     every_true: int = 250
     episodes: int = 1
     noisy: int = 3
+    finalists: int = 1
+    final_episodes: int = 0
+    true_episodes: int = 1
     # Later a good policy balances, where there is next to nothing to predict.
     visited_seconds: float = 2.0
     visited_rollouts: int = 5
@@ -292,6 +298,8 @@ class LearningSteps:
                 callback=report,
                 random_steps=random_steps,
                 episodes=tests.episodes,
+                finalists=tests.finalists,
+                final_episodes=tests.final_episodes,
             )
         seconds = time.perf_counter() - begin
         agent.restore(selection.networks)
@@ -301,7 +309,9 @@ class LearningSteps:
         )
         outcome = {
             "simulated_steps": steps,
-            "return_model": selection.best.deterministic,
+            "return_model": (
+                selection.best.deterministic if selection.final is None else selection.final
+            ),
             "seconds": seconds,
         }
         atomic_write_json(folder / "summary.json", outcome | self._test(folder, selection.policy))
@@ -309,7 +319,9 @@ class LearningSteps:
     def _test(self, folder: Path, policy: MlpPolicy) -> dict[str, Any]:
         """Rollouts on the true system, the first of them kept: the mean return and measures."""
         env = self.problem.environment(self.problem.true)
-        runs = [rollout(policy, env, self.seed + k) for k in range(self.problem.tests.episodes)]
+        runs = [
+            rollout(policy, env, self.seed + k) for k in range(self.problem.tests.true_episodes)
+        ]
         first = runs[0]
         np.savez_compressed(
             folder / "rollout.npz",

@@ -56,12 +56,17 @@ def write_grid_report(
             "and with that of the bare motor, the reading that fits the paper's numbers.",
             heading="All policies (Table III)",
         ),
-        Figure(
-            updates_figure(rows, folder / "figures" / "updates.png"),
-            "Return on the true Leo after each update, with and without a difference model.",
-            "Mean over seeds and its 95 % interval (paper, figure 8).",
-            heading="Return by update",
-        ),
+    ]
+    if rows["iteration"].max() > 0:
+        sections.append(
+            Figure(
+                updates_figure(rows, folder / "figures" / "updates.png"),
+                "Return on the true Leo after each update, with and without a difference model.",
+                "Mean over seeds and its 95 % interval (paper, figure 8).",
+                heading="Return by update",
+            )
+        )
+    sections += [
         samples_section(rows, results),
         KeyValues(dict(results[0]["versions"]), heading="Versions"),
     ]

@@ -81,6 +81,29 @@ def test_selection_keeps_the_best_and_can_go_back():
     np.testing.assert_array_equal(agent.act(rows), selection.policy.act(rows))
 
 
+def test_the_final_decides_among_the_best():
+    agent = DDPG.for_env(Reach(), SMALL, seed=1)
+    rule = dict(every=100, noisy=0, seed=5)
+    copies = {}
+
+    def keep(point):
+        copies[point.step] = agent.policy.copy()
+
+    found = learn_and_select(
+        agent, Reach(), Reach(), 1000, **rule, callback=keep, finalists=3, final_episodes=4
+    )
+    best = sorted(found.curve, key=lambda point: -point.score)[:3]
+    # The tests of this rule start from seed 5, the final from the seeds after it.
+    means = [evaluate(copies[point.step], Reach(), 4, 6).mean() for point in best]
+    assert len(set(means)) == 3
+    assert found.final == max(means)
+    assert found.best == best[int(np.argmax(means))]
+    alone = learn_and_select(
+        DDPG.for_env(Reach(), SMALL, seed=1), Reach(), Reach(), 1000, **rule, finalists=3
+    )
+    assert alone.final is None and alone.best == best[0]
+
+
 def test_score_averages_one_quiet_and_some_noisy_rollouts():
     noise = OrnsteinUhlenbeck(1, 0.3, 0.2, np.random.default_rng(4))
     quiet, noisy = evaluate(Push(), Reach(), 1, 4), evaluate(Push(), Reach(), 2, 5, noise)

@@ -43,7 +43,7 @@ def test_every_policy_is_walked_on_the_true_leo_from_several_starts(results):
     }  # fmt: skip
     for key in (("idealised", 0), ("difference", 1), ("control", 1), ("true", 0)):
         tests = named[key]["tests"]
-        assert len(tests) == leo_gap.TESTS.episodes
+        assert len(tests) == leo_gap.TESTS.true_episodes
         assert named[key]["return_true"] == pytest.approx(np.mean([t["return"] for t in tests]))
         for test in tests:
             assert test["fell"] == (test["seconds"] < 20.0)
