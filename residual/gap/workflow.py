@@ -98,6 +98,11 @@ def _find(
 ) -> GapResult:  # fmt: skip
     clock = Clock()
     trajectories, quality = kinematics(simulator, trajectories)
+    if len(trajectories) == 1:
+        quality.append(
+            "one record only: its end was held out, which is the same experiment, so what is "
+            "confirmed is provisional until a second record agrees"
+        )
     train, held = split(trajectories)
     if not len(train[0].actions):
         raise ValueError("the first trajectory has no steps")
@@ -155,11 +160,6 @@ def _find(
         found.nominal_floor,
     )  # fmt: skip
     blind = hidden(found, pool)
-    if len(trajectories) == 1:
-        quality.append(
-            "one record only: its end was held out, which is the same experiment, so what is "
-            "confirmed is provisional until a second record agrees"
-        )
     return GapResult(
         verdicts=verdicts(claims, left, gap, sets, tolerance, blind, len(trajectories) == 1),
         gap=gap,

@@ -95,12 +95,20 @@ def quadratic(found: Refined, shots: Shots, changes: Array) -> Quadratic:
     )
 
 
+def newton(found: Refined, shots: Shots, changes: Array | None = None) -> Array:
+    """Full step of the strengths by the quadratic model, within their bounds, (p,)."""
+    model = found.model
+    if changes is None:
+        changes = chosen_changes(model, found.theta, shots, found.aimed)
+    _, (change,) = minimise(quadratic(found, shots, changes), [tuple(range(len(model)))])
+    return np.clip(found.theta + change, model.low, model.high) - found.theta
+
+
 def step(found: Refined, shots: Shots) -> tuple[Array, Array]:
     """Strengths and start states a step of Gauss and Newton further, or a part of it."""
     model, aimed = found.model, found.aimed
     changes = chosen_changes(model, found.theta, shots, aimed)
-    _, (change,) = minimise(quadratic(found, shots, changes), [tuple(range(len(model)))])
-    full = np.clip(found.theta + change, model.low, model.high) - found.theta
+    full = newton(found, shots, changes)
     inverse = np.linalg.pinv(aimed.by_start, rcond=1e-8)
     shares = (1.0, 0.4, 0.15)
     for share in shares:
@@ -112,7 +120,7 @@ def step(found: Refined, shots: Shots) -> tuple[Array, Array]:
             [(residual(shots, *pair) ** 2).sum(1) for pair in zip(options, outputs, strict=True)]
         )
         # An impact may spoil the linear start of one window without spoiling the step.
-        starts = np.where((costs[0] < costs[1])[:, None], *options)
+        starts = np.where((costs[0] < costs[1])[:, None], options[0], options[1])
         if losses(costs.min(axis=0), shots.freedom).sum() < found.total or share == shares[-1]:
             break
     return found.theta + move, starts
