@@ -74,6 +74,26 @@ class Replay:
         self.position = (row + 1) % self.capacity
         self.size = max(self.size, row + 1)
 
+    def extend(
+        self,
+        observations: ArrayLike,
+        actions: ArrayLike,
+        rewards: ArrayLike,
+        next_observations: ArrayLike,
+        terminated: ArrayLike,
+    ) -> None:
+        """Store n transitions in order: shapes (n, n_o), (n, n_a), (n,), (n, n_o), (n,)."""
+        alive = ~np.asarray(terminated, bool)
+        parts = (observations, actions, rewards, alive, next_observations)
+        count = len(alive)
+        rows = (self.position + np.arange(count)) % self.capacity
+        # Of more than fit the last remain.
+        kept = slice(max(count - self.capacity, 0), None)
+        for column, part in zip(self._columns, parts, strict=True):
+            column[rows[kept]] = np.reshape(part, (count, -1))[kept]
+        self.size = min(self.size + count, self.capacity)
+        self.position = (self.position + count) % self.capacity
+
     def sample(self, size: int, rng: np.random.Generator) -> Batch:
         """Draw ``size`` transitions uniformly, with replacement.
 

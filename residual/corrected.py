@@ -41,8 +41,11 @@ class CorrectedSimulator(Simulator):
     def step(self, states: ArrayLike, actions: ArrayLike) -> Array:
         """f(s, a) + d(s, a) for every row; rates are kept within 8 times their scale."""
         states, actions = self.check_rows(states, actions)
-        next_states = self.simulator.step(states, actions)
-        next_states += self.difference.predict(states, actions)
+        return self.correct(states, actions, self.simulator.step(states, actions))
+
+    def correct(self, states: Array, actions: Array, next_states: Array) -> Array:
+        """What ``step`` makes of next states (n, n_s) that the idealised simulator gave."""
+        next_states = next_states + self.difference.predict(states, actions)
         for column, limit in self._limits:
             next_states[:, column].clip(-limit, limit, out=next_states[:, column])
         return next_states

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -73,6 +73,8 @@ class LeoTrial(GapTrial):
     )
     # As in the authors' code; docs/leo.md says what each choice brought.
     ddpg: DDPGConfig = dataclasses.field(default_factory=lambda: DDPGConfig(action_layer=2))
+    # With the paper's rule walks collapse at every update before they recover.
+    replay: Literal["first", "all"] = "all"
     simulator: Simulator | None = None
 
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from sklearn.base import BaseEstimator
 
@@ -86,6 +86,7 @@ def learn_by_difference(
     stages: Stages,
     progress: Progress,
     caution: float = 0.0,
+    replay: Literal["first", "all"] = "first",
 ) -> Outcome:
     """The loop of the paper, then the baselines that the budget asks for.
 
@@ -99,6 +100,10 @@ def learn_by_difference(
         progress: Told what is going on.
         caution: Reward lost per step for each multiple of the typical spread of the difference
             model; 0 learns as in the paper.
+        replay: What a training after an update learns from beside its own transitions:
+            ``"first"`` as in the paper, from the second update on those of the first;
+            ``"all"`` those of all trainings on the simulator so far, relabelled with the newest
+            difference model. The control learns from its own in the same way.
 
     Returns:
         Records, and the folders that hold the policies and the models.
@@ -120,6 +125,7 @@ def learn_by_difference(
     samples: list[Path] = []
     accuracy: list[Record] = []
     policy, first = idealised, None
+    earlier = [idealised] if replay == "all" else []
     for iteration in range(1, budget.iterations + 1):
         collected = stages.run(
             "collect",
@@ -141,6 +147,7 @@ def learn_by_difference(
                 "policy": policy,
                 "steps": budget.difference_steps,
                 **({"caution": caution} if caution else {}),
+                **({"earlier": list(earlier)} if earlier else {}),
             },
             lambda folder: steps.train_corrected(
                 folder,
@@ -149,9 +156,13 @@ def learn_by_difference(
                 first,  # noqa: B023
                 budget.difference_steps,
                 caution,
+                earlier,
             ),
         )
-        first = first or policy
+        if replay == "all":
+            earlier.append(policy)
+        else:
+            first = first or policy
         measured = stages.run(
             "measure",
             {"model": model, "policy": policy, "seed": seed},
@@ -164,13 +175,29 @@ def learn_by_difference(
         accuracy.append(seen | errors | read_json(model / "fit.json"))
 
     policy, first = idealised, None
+    earlier = [idealised] if replay == "all" else []
     for iteration in range(1, budget.iterations + 1 if budget.control_steps else 1):
         policy = stages.run(
             "control",
-            {**common, "policy": policy, "round": iteration, "steps": budget.control_steps},
-            lambda folder: steps.train_control(folder, policy, first, budget.control_steps),  # noqa: B023
+            {
+                **common,
+                "policy": policy,
+                "round": iteration,
+                "steps": budget.control_steps,
+                **({"earlier": list(earlier)} if earlier else {}),
+            },
+            lambda folder: steps.train_control(
+                folder,
+                policy,  # noqa: B023
+                first,  # noqa: B023
+                budget.control_steps,
+                earlier,
+            ),
         )
-        first = first or policy
+        if replay == "all":
+            earlier.append(policy)
+        else:
+            first = first or policy
         folders[f"control-{iteration}"] = policy
         policies.append(steps.record(policy, "control") | {"iteration": iteration})
 

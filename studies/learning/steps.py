@@ -34,6 +34,7 @@ from residual.trajectories import Transitions
 from sims.environment import SimulatorEnv
 from sims.simulator import Array, Simulator
 from sims.tasks import Task
+from studies.learning.simulated import FILE, Recorder, remember
 from studies.running.files import atomic_write_json, read_json
 from studies.running.progress import Progress
 
@@ -156,12 +157,14 @@ class LearningSteps:
         first: Path | None,
         steps: int,
         caution: float = 0.0,
+        earlier: Sequence[Path] = (),
     ) -> None:
         """DDPG on the corrected simulator, from the last policy's networks.
 
-        From the second update on, the replay begins with the first update's transitions
-        (paper, section III-C). With ``caution`` the reward is less where the difference model
-        is unsure; see ``residual.caution``.
+        From the second update on, the replay begins with the transitions of ``first``, the first
+        update (paper, section III-C); or, from the first on, with those of all trainings in
+        ``earlier``, relabelled with the difference model. With ``caution`` the reward is less
+        where the difference model is unsure; see ``residual.caution``.
         """
         corrected = self.corrected(model)
         task = self.problem.task
@@ -170,12 +173,21 @@ class LearningSteps:
             task = CautiousTask.around(task, corrected.difference, data, caution)
         env = SimulatorEnv(corrected, task), SimulatorEnv(corrected, task)
         agent = self._continued(policy, first)
+        remember(agent, env[0], earlier)
         self._train(folder, agent, env, steps, "train on the corrected model")
 
-    def train_control(self, folder: Path, policy: Path, first: Path | None, steps: int) -> None:
+    def train_control(
+        self,
+        folder: Path,
+        policy: Path,
+        first: Path | None,
+        steps: int,
+        earlier: Sequence[Path] = (),
+    ) -> None:
         """As ``train_corrected``, without a difference model: what more training alone brings."""
         agent = self._continued(policy, first)
         env = self._environments(self.problem.idealised)
+        remember(agent, env[0], earlier)
         self._train(folder, agent, env, steps, "train on, no difference model")
 
     def train_on_true(self, folder: Path, start: Path | None, steps: int) -> None:
@@ -279,6 +291,7 @@ class LearningSteps:
         env, tested = environments
         on_true = env.simulator is self.problem.true
         tests = self.problem.tests
+        recorded = Recorder(env)
         begin = time.perf_counter()
         with self.progress.task(title, steps) as tell:
 
@@ -288,7 +301,7 @@ class LearningSteps:
 
             selection = learn_and_select(
                 agent,
-                env,
+                recorded,
                 tested,
                 steps,
                 every=tests.every_true if on_true else tests.every,
@@ -304,6 +317,8 @@ class LearningSteps:
         seconds = time.perf_counter() - begin
         agent.restore(selection.networks)
         agent.save(folder / "agent.safetensors")
+        if not on_true:
+            recorded.save(folder / FILE, env.simulator)
         atomic_write_json(
             folder / "curve.json", [dataclasses.asdict(point) for point in selection.curve]
         )

@@ -15,7 +15,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import threadpoolctl
 import torch
@@ -56,6 +56,9 @@ class GapTrial:
         ddpg: Settings of DDPG, the same for every policy.
         caution: Reward lost per step, on the corrected simulator, for each multiple of the
             difference model's typical standard deviation; 0 learns as in the paper.
+        replay: What a training after an update learns from beside its own transitions: "first",
+            as in the paper, from the second update on those of the first; "all", those of all
+            trainings on the simulator so far, relabelled with the newest difference model.
     """
 
     estimator: BaseEstimator = dataclasses.field(default_factory=DropoutNet)
@@ -63,6 +66,7 @@ class GapTrial:
     budget: Budget = dataclasses.field(default_factory=Budget)
     ddpg: DDPGConfig = dataclasses.field(default_factory=DDPGConfig)
     caution: NonNegativeFloat = 0.0
+    replay: Literal["first", "all"] = "first"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -290,6 +294,7 @@ def run_trial(
         stages,
         progress,
         trial.caution,
+        trial.replay,
     )
     for name, source in outcome.folders.items():
         copy_file(source / "agent.safetensors", folder / "policies" / f"{name}.safetensors")

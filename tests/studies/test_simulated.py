@@ -1,0 +1,78 @@
+"""What was simulated is learnt from again as the newest difference model would have it."""
+
+import numpy as np
+import pytest
+
+from policy import DDPG, DDPGConfig
+from policy.replay import Replay
+from residual import DifferenceModel, Linear
+from residual.corrected import CorrectedSimulator
+from residual.trajectories import Transitions
+from sims.environment import SimulatorEnv
+from sims.pendulum import Pendulum
+from sims.tasks import SwingUp
+from studies.learning.simulated import FILE, Recorder, remember
+
+SMALL = DDPGConfig(hidden=(8, 8), batch=8, warm_up=10_000, replay=20_000)
+
+
+def correction(seed):
+    """A simulator with a difference learnt from random rows of the true pendulum."""
+    rng = np.random.default_rng(seed)
+    states, actions = rng.uniform(-2, 2, (50, 2)), rng.uniform(-3, 3, (50, 1))
+    after = Pendulum.true().step(states, actions)
+    data = Transitions(states, actions, after, np.zeros(50, np.int64))
+    return CorrectedSimulator(Pendulum(), DifferenceModel(Linear(), Pendulum()).fit(data))
+
+
+def learnt_in(simulator, folder, steps=300):
+    env = SimulatorEnv(simulator, SwingUp())
+    recorded = Recorder(env)
+    agent = DDPG.for_env(env, SMALL)
+    agent.learn(recorded, steps)
+    recorded.save(folder / FILE, simulator)
+    return agent
+
+
+def rows(agent):
+    return agent.replay.stored()
+
+
+@pytest.mark.parametrize("simulator", [Pendulum(), correction(0)], ids=["plain", "corrected"])
+def test_the_same_simulator_gives_back_the_replay(simulator, tmp_path):
+    agent = learnt_in(simulator, tmp_path)
+    again = DDPG.for_env(SimulatorEnv(simulator, SwingUp()), SMALL)
+    remember(again, SimulatorEnv(simulator, SwingUp()), [tmp_path])
+    np.testing.assert_allclose(rows(again), rows(agent), atol=2e-5)
+
+
+def test_another_simulator_says_what_it_would_have_done(tmp_path):
+    for k, simulator in enumerate([Pendulum(), correction(0)]):
+        (tmp_path / str(k)).mkdir()
+        learnt_in(simulator, tmp_path / str(k))
+    newest = correction(1)
+    env = SimulatorEnv(newest, SwingUp())
+    agent = DDPG.for_env(env, SMALL)
+    remember(agent, env, [tmp_path / "0", tmp_path / "1"])
+    assert len(agent.replay) == 600
+    stored = rows(agent)
+    for row in stored[[0, 150, 299, 300, 450, 599]]:
+        state = [np.arctan2(row[1], row[0]), row[2] * Pendulum().state_channels[1].scale]
+        env.reset(seed=0, options={"state": state})
+        observation, reward, terminated, _, _ = env.step(row[3:4] * env.action_space.high)
+        np.testing.assert_allclose(row[6:], observation, atol=2e-5)
+        assert row[4] == pytest.approx(0.1 * reward, abs=2e-4)
+        assert bool(row[5]) is not terminated
+
+
+def test_the_replay_keeps_the_last_of_what_it_is_given():
+    one, many = Replay(7, 2, 1), Replay(7, 2, 1)
+    rng = np.random.default_rng(0)
+    for count in (3, 6, 20):
+        block = rng.standard_normal((count, 6))
+        ended = rng.random(count) < 0.3
+        for row, end in zip(block, ended, strict=True):
+            one.add(row[:2], row[2:3], row[3], row[4:], bool(end))
+        many.extend(block[:, :2], block[:, 2:3], block[:, 3], block[:, 4:], ended)
+        assert (len(many), many.position) == (len(one), one.position)
+        np.testing.assert_array_equal(many.stored(), one.stored())
