@@ -2,34 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from residual.estimator import Array, Estimator
-from residual.gap.adequacy import remainder
-from residual.gap.arena import Settings
-from residual.gap.candidates import candidates
-from residual.gap.claims import aliases
-from residual.gap.intervals import covariance
-from residual.gap.samples import Samples
-from residual.gap.search import Found, search
-from residual.trajectories import Trajectory
+from residual.gap.rows import SHORTEST, chains, look, pieces
 from sims.effects.base import Effect
-from sims.effects.library import library, typical
+from sims.effects.library import library
 from sims.host import HostSimulator
-from sims.simulator import Simulator, wrap
-
-#: Rows that must follow each other before anything is looked for, and the longest piece.
-SHORTEST, LONGEST = 12, 50
-#: Enough to name an effect, and little enough to be done in seconds on a simulator that steps
-#: row by row. Samples of a simulator are exact but for the difference of integrators.
-SETTINGS = Settings(
-    singles=4, pairs=1, swaps=2, nominal_turns=4, more_turns=4, runs=4, close=1, finest=1e-4
-)
+from sims.simulator import Simulator
 
 
 class NamedEffects(Estimator):
@@ -98,24 +81,15 @@ class NamedEffects(Estimator):
                 "transitions in the order in which they were observed, not shuffled"
             )
         found = look(simulator, runs)
-        chosen = self._bound(found)
-        left = difference - self._change(X, chosen)
+        left = difference - self._change(X, found.effects)
         alone = np.sqrt((difference**2).mean(axis=0))
         self.residual_ = np.sqrt((left**2).mean(axis=0))
-        rest = remainder(
-            found.fit, found.arena.samples, found.arena.windows, found.arena.sigma, found.floor,
-            found.arena.scale,
-        )  # fmt: skip
-        if chosen and (self.residual_ <= alone).all():
-            self.effects_ = chosen
-            self.numbers_ = tuple(
-                (int(i), knob.field)
-                for i, knob in zip(found.fit.model.owner, found.fit.model.knobs, strict=True)
-            )
-            self.covariance_ = covariance(found.fit, found.arena.windows, found.arena.size)
+        if found.effects and (self.residual_ <= alone).all():
+            self.effects_, self.numbers_ = found.effects, found.numbers
+            self.covariance_ = found.covariance
         else:
             self.residual_ = alone
-        self.says_ = self._words(float(rest.ratio.max()), rest.adequate and bool(self.effects_))
+        self.says_ = self._words(found.ratio, found.adequate and bool(self.effects_))
 
     def _predict(self, X: Array, return_std: bool) -> tuple[Array, Array | None]:
         mean = self._change(X, self.effects_)
@@ -143,10 +117,6 @@ class NamedEffects(Estimator):
         other = simulator.with_effects((*simulator.effects, *effects))
         states, actions = X[:, :width], X[:, width:]
         return other.step(states, actions) - simulator.step(states, actions)
-
-    def _bound(self, found: Found) -> tuple[Effect, ...]:
-        known = len(self._host().effects)
-        return found.fit.model.bind(found.fit.theta).effects[known:]
 
     def _host(self) -> HostSimulator:
         if self.simulator is None:
@@ -205,75 +175,3 @@ class NamedEffects(Estimator):
         self.says_ = str(values["says"])
         p = len(self.numbers_)
         self.covariance_ = np.asarray(self.covariance_, float).reshape(p, p)
-
-
-def chains(simulator: HostSimulator, X: Array, difference: Array) -> list[Trajectory]:
-    """Rows that follow each other, joined: the next state of a row is the state of the next row.
-
-    Args:
-        simulator: Predicts the next state.
-        X: Rows [states, actions], (n, n_s + n_a).
-        difference: Next state less the simulator's, (n, n_s).
-
-    Returns:
-        Trajectories of at least ``SHORTEST`` steps, physical channels only, angles unwrapped.
-    """
-    channels = simulator.physical_channels
-    width, physical = len(simulator.state_channels), len(channels)
-    states, actions = X[:, :width], X[:, width:]
-    following = (simulator.step(states, actions) + difference)[:, :physical]
-    gap = following[:-1] - states[1:, :physical]
-    for i, channel in enumerate(channels):
-        if channel.angle:
-            gap[:, i] = wrap(gap[:, i])
-    size = np.array([channel.scale for channel in channels])
-    # The next state has been through a subtraction and an addition, so some bits are lost.
-    joined = (np.abs(gap) <= 1e-9 * (size + np.abs(states[1:, :physical]))).all(axis=1)
-    edges = [0, *(np.flatnonzero(~joined) + 1).tolist(), len(X)]
-    found = []
-    for start, stop in itertools.pairwise(edges):
-        if stop - start < SHORTEST:
-            continue
-        path = np.vstack([states[start:stop, :physical], following[stop - 1 : stop]])
-        for i, channel in enumerate(channels):
-            if channel.angle:
-                path[:, i] = np.unwrap(path[:, i])
-        times = simulator.dt * np.arange(len(path), dtype=float)
-        found.append(Trajectory(f"row {start}", times, path, actions[start:stop]))
-    return found
-
-
-def pieces(runs: list[Trajectory], most_rows: int) -> list[Trajectory]:
-    """Runs cut into pieces of at most ``LONGEST`` steps, spread evenly if there are too many."""
-    cut = []
-    for run in runs:
-        count = max(1, round(len(run) / LONGEST))
-        edges = np.linspace(0, len(run), count + 1).astype(int)
-        for a, b in itertools.pairwise(edges):
-            cut.append(
-                Trajectory(run.name, run.times[a : b + 1], run.states[a : b + 1], run.actions[a:b])
-            )
-    keep = max(1, most_rows // LONGEST)
-    if len(cut) <= keep:
-        return cut
-    chosen: NDArray[np.int64] = np.linspace(0, len(cut) - 1, keep).round().astype(int)
-    return [cut[i] for i in chosen]
-
-
-def look(simulator: HostSimulator, runs: list[Trajectory]) -> Found:
-    """Search for missing effects without memory."""
-    width = len(simulator.state_channels)
-    offered = [
-        effect
-        for effect in library(simulator)
-        if len(_hosting(simulator, effect).state_channels) == width
-    ]
-    groups, _ = aliases(simulator, offered)
-    kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
-    samples = Samples.join(runs, simulator.substeps)
-    pool = candidates(simulator, kept, samples)
-    return search(simulator, pool, samples, np.random.default_rng(0), SETTINGS)
-
-
-def _hosting(simulator: HostSimulator, effect: Effect) -> HostSimulator:
-    return simulator.with_effects((*simulator.effects, typical(effect, simulator)))

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from residual import DifferenceModel, NamedEffects, load, save
-from residual.named_effects import SHORTEST
+from residual.gap.rows import SHORTEST
 from residual.trajectories import Transitions
 from sims.effects import CoulombFriction, Delay
+from sims.leo import Leo, Walking
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 
@@ -128,3 +129,26 @@ def test_shuffled_rows_get_one_clear_error():
 def test_it_says_so_without_a_simulator():
     with pytest.raises(ValueError, match="has no simulator"):
         NamedEffects().fit(np.zeros((20, 3)), np.zeros((20, 2)))
+
+
+@pytest.mark.long
+def test_a_heavier_torso_and_friction_are_found_in_rows_of_a_struggling_leo():
+    rng = np.random.default_rng(0)
+    true, task = Leo.true(), Walking(start_at="around")
+    count, steps = 12, 26
+    path = np.array([task.start(rng) for _ in range(count)])
+    noise, parts = np.zeros((count, 6)), []
+    for _ in range(steps):
+        noise += -0.15 * noise + 0.2 * rng.standard_normal(noise.shape)
+        volts = 8.6 * np.clip(noise, -1, 1)
+        following = true.step(path, volts)
+        parts.append((path, volts, following))
+        path = following
+    # Row by row in time, one struggle after the other.
+    columns = (
+        np.stack(part, axis=1).reshape(count * steps, -1) for part in zip(*parts, strict=True)
+    )
+    data = Transitions(*columns, np.repeat(np.arange(count), steps))
+    model = DifferenceModel(NamedEffects(), Leo()).fit(data)
+    found = {effect.parameter: effect.change for effect in model.fitted().effects_}
+    assert found == pytest.approx({"torso_mass": 1.25 - 0.94226, "friction": 0.03}, rel=2e-3)

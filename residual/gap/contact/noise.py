@@ -14,6 +14,9 @@ from residual.gap.samples import Samples
 
 Array = NDArray[np.float64]
 
+#: Noise is never less than this share of a channel's typical size, not even in a simulator's rows.
+FINEST = 1e-5
+
 
 def first_guess(samples: Samples, nodes: Array) -> Array:
     """A tenth of what each measured channel usually moves from sample to sample, (m,)."""
@@ -49,6 +52,7 @@ def with_noise(shots: Shots, sigma: Array, scale: Array) -> Shots:
     what such an error makes of it over an interval.
     """
     samples = shots.samples
+    sigma = np.maximum(sigma, FINEST * scale[samples.measured])
     moves = np.array(shots.moves)
     moves[samples.measured] = 0.25 * np.minimum(sigma, 0.02 * scale[samples.measured])
     return dataclasses.replace(shots, sigma=sigma, moves=moves)
