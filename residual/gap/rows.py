@@ -130,8 +130,10 @@ def look(simulator: HostSimulator, runs: list[Trajectory]) -> Named:
     found = search(simulator, pool, samples, np.random.default_rng(0), SETTINGS)
     arena = found.arena
     rest = remainder(found.fit, arena.samples, arena.windows, arena.sigma, found.floor, arena.scale)
-    spread = covariance(found.fit, arena.windows, arena.size)
     effects, numbers = _bound(found.fit.model, found.fit.theta)
+    spread = np.zeros((0, 0))
+    if numbers:
+        spread = covariance(found.fit, arena.windows, arena.size)
     return Named(effects, numbers, spread, float(rest.ratio.max()), rest.adequate)
 
 
