@@ -17,8 +17,9 @@ import numpy as np
 
 from policy.ddpg import DDPG
 from residual.corrected import CorrectedSimulator
+from residual.difference import DifferenceModel
 from sims.environment import SimulatorEnv, observe
-from sims.simulator import Array, Simulator
+from sims.simulator import Array
 
 FILE = "simulated.npz"
 _ROWS = 8192  # predicted at a time
@@ -46,19 +47,19 @@ class Recorder(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._state = following
         return step
 
-    def save(self, path: Path, simulator: Simulator) -> None:
+    def save(self, path: Path, difference: DifferenceModel | None = None) -> None:
         """Write what the idealised simulator said, in single precision: learning needs no more.
 
         Args:
             path: Of the file.
-            simulator: That of the environment; a corrected one's difference is taken off again.
+            difference: Of the corrected simulator, if it was one: taken off again.
         """
         if not self._rows:
             return
         states, actions, following = (np.array(part) for part in zip(*self._rows, strict=True))
-        if isinstance(simulator, CorrectedSimulator):
+        if difference is not None:
             for part in _pieces(len(states)):
-                following[part] -= simulator.difference.predict(states[part], actions[part])
+                following[part] -= difference.predict(states[part], actions[part])
         np.savez(
             path,
             states=states.astype(np.float32),
@@ -67,13 +68,19 @@ class Recorder(gymnasium.Wrapper[Any, Any, Any, Any]):
         )
 
 
-def remember(agent: DDPG, env: SimulatorEnv, folders: Sequence[Path]) -> None:
+def remember(
+    agent: DDPG,
+    env: SimulatorEnv,
+    folders: Sequence[Path],
+    corrected: CorrectedSimulator | None = None,
+) -> None:
     """Fill an agent's replay with all that was simulated, as ``env`` would have it.
 
     Args:
         agent: Gets the transitions.
-        env: What the agent is to learn in: its simulator, corrected or not, and its task.
+        env: What the agent is to learn in.
         folders: Of the trainings whose ``simulated.npz`` are read, in their order.
+        corrected: The simulator of ``env``, if it is a corrected one.
     """
     low, high = agent.policy.low, agent.policy.high
     simulator, task = env.simulator, env.task
@@ -84,8 +91,8 @@ def remember(agent: DDPG, env: SimulatorEnv, folders: Sequence[Path]) -> None:
             columns = [data[name].astype(float) for name in ("states", "actions", "next_states")]
         for part in _pieces(len(columns[0])):
             states, actions, following = (column[part] for column in columns)
-            if isinstance(simulator, CorrectedSimulator):
-                following = simulator.correct(states, actions, following)
+            if corrected is not None:
+                following = corrected.correct(states, actions, following)
             agent.replay.extend(
                 observe(simulator, states),
                 2 * (actions - low) / (high - low) - 1,

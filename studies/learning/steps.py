@@ -173,8 +173,15 @@ class LearningSteps:
             task = CautiousTask.around(task, corrected.difference, data, caution)
         env = SimulatorEnv(corrected, task), SimulatorEnv(corrected, task)
         agent = self._continued(policy, first)
-        remember(agent, env[0], earlier)
-        self._train(folder, agent, env, steps, "train on the corrected model")
+        remember(agent, env[0], earlier, corrected)
+        self._train(
+            folder,
+            agent,
+            env,
+            steps,
+            "train on the corrected model",
+            difference=corrected.difference,
+        )
 
     def train_control(
         self,
@@ -287,6 +294,7 @@ class LearningSteps:
         steps: int,
         title: str,
         random_steps: int = 0,
+        difference: DifferenceModel | None = None,
     ) -> None:
         env, tested = environments
         on_true = env.simulator is self.problem.true
@@ -318,7 +326,7 @@ class LearningSteps:
         agent.restore(selection.networks)
         agent.save(folder / "agent.safetensors")
         if not on_true:
-            recorded.save(folder / FILE, env.simulator)
+            recorded.save(folder / FILE, difference)
         atomic_write_json(
             folder / "curve.json", [dataclasses.asdict(point) for point in selection.curve]
         )

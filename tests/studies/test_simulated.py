@@ -30,7 +30,7 @@ def learnt_in(simulator, folder, steps=300):
     recorded = Recorder(env)
     agent = DDPG.for_env(env, SMALL)
     agent.learn(recorded, steps)
-    recorded.save(folder / FILE, simulator)
+    recorded.save(folder / FILE, getattr(simulator, "difference", None))
     return agent
 
 
@@ -42,7 +42,8 @@ def rows(agent):
 def test_the_same_simulator_gives_back_the_replay(simulator, tmp_path):
     agent = learnt_in(simulator, tmp_path)
     again = DDPG.for_env(SimulatorEnv(simulator, SwingUp()), SMALL)
-    remember(again, SimulatorEnv(simulator, SwingUp()), [tmp_path])
+    corrected = simulator if isinstance(simulator, CorrectedSimulator) else None
+    remember(again, SimulatorEnv(simulator, SwingUp()), [tmp_path], corrected)
     np.testing.assert_allclose(rows(again), rows(agent), atol=2e-5)
 
 
@@ -53,7 +54,7 @@ def test_another_simulator_says_what_it_would_have_done(tmp_path):
     newest = correction(1)
     env = SimulatorEnv(newest, SwingUp())
     agent = DDPG.for_env(env, SMALL)
-    remember(agent, env, [tmp_path / "0", tmp_path / "1"])
+    remember(agent, env, [tmp_path / "0", tmp_path / "1"], newest)
     assert len(agent.replay) == 600
     stored = rows(agent)
     for row in stored[[0, 150, 299, 300, 450, 599]]:
