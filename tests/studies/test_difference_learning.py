@@ -20,7 +20,9 @@ def outcome(tmp_path_factory):
         idealised=PendulumEquation(),
         true=PendulumEquation.true(),
         task=SwingUp(horizon=30, start_at="anywhere"),
-        tests=PolicyTests(every=60, every_true=60, episodes=3, noisy=1, visited_seconds=1.0),
+        tests=PolicyTests(
+            every=60, every_true=60, episodes=3, true_episodes=3, noisy=1, visited_seconds=1.0
+        ),
         measures=lambda run: {"turned": float(np.ptp(run.states[:, 0]))},
     )
     budget = Budget(
