@@ -299,7 +299,7 @@ class LearningSteps:
         env, tested = environments
         on_true = env.simulator is self.problem.true
         tests = self.problem.tests
-        recorded = Recorder(env)
+        recorder = None if on_true else Recorder(env)
         begin = time.perf_counter()
         with self.progress.task(title, steps) as tell:
 
@@ -309,7 +309,7 @@ class LearningSteps:
 
             selection = learn_and_select(
                 agent,
-                recorded,
+                recorder or env,
                 tested,
                 steps,
                 every=tests.every_true if on_true else tests.every,
@@ -325,8 +325,8 @@ class LearningSteps:
         seconds = time.perf_counter() - begin
         agent.restore(selection.networks)
         agent.save(folder / "agent.safetensors")
-        if not on_true:
-            recorded.save(folder / FILE, difference)
+        if recorder:
+            recorder.save(folder / FILE, difference)
         atomic_write_json(
             folder / "curve.json", [dataclasses.asdict(point) for point in selection.curve]
         )
