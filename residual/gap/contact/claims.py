@@ -70,7 +70,7 @@ def challenge(search: Search, key: Key, most: int = 2) -> None:
     for gone in key:
         instead = [p for p in near if set(key) - set(p.key) == {gone}]
         for proposal in instead[:most]:
-            search.refit(proposal, key)
+            search.refit(proposal, search.tried[key].aimed)
     for rival in [k for k in search.tried if len(k) == len(key) and k != key]:
         if search.drop(rival, key) < 3 * search.rules.material:
             search.level(rival, key)

@@ -91,15 +91,13 @@ class Search:
             )
         return self.around[key]
 
-    def refit(self, proposal: Proposal, base: Key) -> None:
+    def refit(self, proposal: Proposal, near: Aimed) -> None:
         """Refit a set from the start states of another."""
         if proposal.key in self.tried:
             return
+        model = self.model(proposal.key)
+        found = refine(model, proposal.theta, self.shots, near, self.rules.turns)
         names = " + ".join(self.candidates[i].label for i in proposal.key)
-        found = refine(
-            self.model(proposal.key), proposal.theta, self.shots, self.tried[base].aimed,
-            self.rules.turns,
-        )  # fmt: skip
         self.tell(f"  {names}: {100 * found.total / self.tried[()].total:.1f} % of the misfit")
         self.tried[proposal.key] = found
 
@@ -120,7 +118,7 @@ class Search:
     def round(self, current: Key) -> Key:
         """The best of the current set, sets up to one larger, and sets with effects exchanged."""
         for proposal in self.proposals(current)[: self.rules.tries]:
-            self.refit(proposal, current)
+            self.refit(proposal, self.tried[current].aimed)
         return self.best(current)
 
     def level(self, one: Key, other: Key) -> None:
@@ -195,16 +193,17 @@ class Search:
                 continue
             loss, coefficients = minimise(there, sets)
             for n in np.argsort(loss)[:20]:
-                proposals.append(self._proposal(sets[n], coefficients[n], found, theta, loss[n]))
+                proposals.append(self.proposal(sets[n], coefficients[n], found, theta, loss[n]))
         best: dict[Key, Proposal] = {}
         for proposal in sorted(proposals, key=lambda p: p.loss):
             best.setdefault(proposal.key, proposal)
         return list(best.values())[:20]
 
-    def _proposal(
+    def proposal(
         self, chosen: tuple[int, ...], coefficients: Array, found: list[Column], theta: Array,
         loss: float,
     ) -> Proposal:  # fmt: skip
+        """A set of columns with the strengths that their coefficients stand for."""
         values: dict[int, Array] = {}
         for j, coefficient in zip(chosen, coefficients, strict=True):
             column = found[j]

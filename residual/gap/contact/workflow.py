@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from residual.gap.candidates import Candidate
 from residual.gap.contact import claims as told
+from residual.gap.contact.exchange import exchange
 from residual.gap.contact.forecast import errors, forecast, median_span, noise_errors, plan
 from residual.gap.contact.noise import quieten, spread, with_noise
-from residual.gap.contact.refine import Refined, newton, settle
+from residual.gap.contact.refine import Refined, renew
 from residual.gap.contact.search import Key, Proposal, Rules, Search
 from residual.gap.contact.shots import Shots
 from residual.gap.contact.windows import lay_out, pieces, scales, some
@@ -122,7 +123,9 @@ def name(
     for _ in range(2 * rules.most):
         search = Search(simulator, pool, shots, rules, tell)
         search.begin(key, theta, nominal, near)
-        fresh = search.round(key)
+        fresh = exchange(search, key)
+        if fresh == key:
+            fresh = search.round(key)
         if fresh == key:
             break
         key = fresh
@@ -145,27 +148,15 @@ def prove(
     """The fit to all windows; effects that are not material there are left out."""
     while True:
         chosen = search.tried[key]
-        full = fit_all(chosen.model, chosen.theta, whole)
+        full = renew(chosen.model, chosen.theta, whole, whole.guess, FULL_STEPS)
         lacking = told.idle(full, whole, search.rules.material)
         if not lacking:
             return key, full
         smaller = tuple(i for place, i in enumerate(key) if place != lacking[0])
         tell(f"not material on all windows: {search.candidates[key[lacking[0]]].label}")
         theta = chosen.theta[chosen.model.owner != lacking[0]]
-        search.refit(Proposal(smaller, theta, 0.0), key)
+        search.refit(Proposal(smaller, theta, 0.0), chosen.aimed)
         key = smaller
-
-
-def fit_all(model: Model, theta: Array, shots: Shots) -> Refined:
-    """Strengths and start states of all windows, from measured starts.
-
-    Every full step of the strengths is followed by start states sought afresh. Start states that
-    have settled hold the strengths back: along the kinks of impacts a better strength looks
-    worse at first, so that a descent from 2 % off ends 2 % off.
-    """
-    for _ in range(FULL_STEPS if len(theta) else 0):
-        theta = theta + newton(settle(model, theta, shots, shots.guess, 2), shots)
-    return settle(model, theta, shots, shots.guess, 2)
 
 
 def measure(

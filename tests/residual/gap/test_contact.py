@@ -8,8 +8,16 @@ import pytest
 from scipy.optimize import minimize
 
 from residual.gap import find_gap
+from residual.gap.candidates import candidates
+from residual.gap.contact.exchange import ALIKE, cosines, exchange
+from residual.gap.contact.noise import quieten
 from residual.gap.contact.quadratic import Quadratic, minimise
+from residual.gap.contact.search import Proposal, Rules, Search
 from residual.gap.contact.student import losses, trimmed_drop
+from residual.gap.contact.windows import lay_out, pieces, scales
+from residual.gap.model import Model
+from residual.gap.samples import Samples
+from residual.gap.workflow import substeps_for
 from residual.trajectories import Trajectory
 from sims.effects.parameter import ParameterChange
 from sims.leo import Leo, Walking
@@ -18,8 +26,8 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "sims"))
 import leo_reference as reference
 
 
-def struggle(system, rows, steps, seed):
-    """Logs (encoders only) of the reference under drunken voltages, from Leo's start pose."""
+def struggle(system, rows, steps, seed, rates=False):
+    """Logs of the reference under drunken voltages, from Leo's start pose."""
     rng = np.random.default_rng(seed)
     task = Walking(start_at="around")
     state = np.array([task.start(rng) for _ in range(rows)])
@@ -31,7 +39,9 @@ def struggle(system, rows, steps, seed):
         state = reference.step(state, actions[-1], system, h=3e-4)
         states.append(state)
     seen = np.stack(states, axis=1)
-    seen += np.repeat([1e-3, 2e-3, np.nan], [2, 7, 9]) * rng.standard_normal(seen.shape)
+    seen += np.repeat([1e-3, 2e-3, 0.1 if rates else np.nan], [2, 7, 9]) * rng.standard_normal(
+        seen.shape
+    )
     times = 0.03 * np.arange(steps + 1)
     volts = np.stack(actions, axis=1)
     return [
@@ -61,6 +71,25 @@ def test_no_gap_no_name():
     result = find_gap(Leo(), logs, effects=OFFERED, rng=0)
     assert result.effects == ()
     assert result.verdicts[0].kind == "no_gap"
+
+
+def test_what_imitates_an_effect_makes_way_for_it():
+    """A search that has settled on a lower supply takes friction in its place."""
+    logs = struggle(reference.TRUE, rows=4, steps=12, seed=2, rates=True)
+    samples = Samples.join(logs, substeps_for(Leo(), logs), "zero")
+    offered = [ParameterChange(n) for n in ("torso_mass", "friction", "supply")]
+    shots = lay_out(Leo(), samples, pieces(samples))
+    shots, aimed = quieten(Model(Leo()), np.zeros(0), shots, shots.guess, scales(Leo()), 2)
+    search = Search(Leo(), candidates(Leo(), offered, samples), shots, Rules(), lambda _: None)
+    search.begin((), np.zeros(0), aimed.starts, None)
+    search.refit(Proposal((0, 2), np.array([0.2, -0.07]), 0.0), search.tried[()].aimed)
+    found, around = search.signatures((0, 2))
+    owners = [column.candidate for column in found]
+    assert abs(cosines(around)[owners.index(1), owners.index(2)]) > ALIKE
+    assert exchange(search, (0, 2)) == (0, 1)
+    mass, friction = search.tried[0, 1].theta
+    assert abs(mass - 0.308) < abs(search.tried[0, 2].theta[0] - 0.308)
+    assert friction == pytest.approx(0.03, rel=0.1)
 
 
 def test_the_robust_loss_of_a_set_is_its_least():
