@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -26,8 +26,10 @@ from policy.evaluate import Rollout
 from sims.leo import Leo, Walking, measure_walk
 from sims.leo.body import clearance
 from sims.simulator import Array, Simulator
+from studies.learning.earlier import ReplayRule
 from studies.learning.loop import Budget
-from studies.learning.steps import PolicyTests, Problem, visited
+from studies.learning.problem import PolicyTests, Problem
+from studies.learning.steps import visited
 from studies.learning.study import GapStudy, GapTrial, run_command
 from studies.learning.study import build_parser as parser_of
 from studies.leo.report import policy_table, write_report
@@ -74,7 +76,7 @@ class LeoTrial(GapTrial):
     # As in the authors' code; docs/leo.md says what each choice brought.
     ddpg: DDPGConfig = dataclasses.field(default_factory=lambda: DDPGConfig(action_layer=2))
     # With the paper's rule walks collapse at every update before they recover.
-    replay: Literal["first", "all"] = "all"
+    replay: ReplayRule = "all"
     simulator: Simulator | None = None
 
 

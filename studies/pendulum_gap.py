@@ -24,7 +24,7 @@ from typing import Any
 from sims.pendulum import Pendulum
 from sims.simulator import Simulator
 from sims.tasks import SwingUp
-from studies.learning.steps import Problem
+from studies.learning.problem import Problem
 from studies.learning.study import GapStudy, GapTrial, run_command
 from studies.learning.study import build_parser as parser_of
 from studies.pendulum.report import policy_table, write_report

@@ -18,13 +18,16 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from sklearn.base import BaseEstimator
 
 from policy.config import DDPGConfig
+from studies.learning.earlier import Earlier, ReplayRule
+from studies.learning.problem import Problem
+from studies.learning.seeds import describe, seeded
 from studies.learning.stages import Stages
-from studies.learning.steps import LearningSteps, Problem, describe, seeded
+from studies.learning.steps import LearningSteps
 from studies.running.files import read_json
 from studies.running.progress import Progress
 
@@ -86,7 +89,7 @@ def learn_by_difference(
     stages: Stages,
     progress: Progress,
     caution: float = 0.0,
-    replay: Literal["first", "all"] = "first",
+    replay: ReplayRule = "first",
 ) -> Outcome:
     """The loop of the paper, then the baselines that the budget asks for.
 
@@ -100,17 +103,20 @@ def learn_by_difference(
         progress: Told what is going on.
         caution: Reward lost per step for each multiple of the typical spread of the difference
             model; 0 learns as in the paper.
-        replay: What a training after an update learns from beside its own transitions:
-            ``"first"`` as in the paper, from the second update on those of the first;
-            ``"all"`` those of all trainings on the simulator so far, relabelled with the newest
-            difference model. The control learns from its own in the same way.
+        replay: What a training after an update learns from beside its own transitions, see
+            ``Earlier``; the control learns from its own in the same way.
 
     Returns:
         Records, and the folders that hold the policies and the models.
     """
     estimator = seeded(estimator, seed)
-    steps = LearningSteps(problem, estimator, ddpg, seed, progress)
-    common = {"problem": problem.description, "ddpg": dataclasses.asdict(ddpg), "seed": seed}
+    steps = LearningSteps(problem, estimator, ddpg, seed, progress, replay)
+    common = {
+        "problem": problem.description,
+        "ddpg": dataclasses.asdict(ddpg),
+        "seed": seed,
+        "replay": replay,
+    }
     named = describe(estimator)
 
     idealised = stages.run(
@@ -124,13 +130,17 @@ def learn_by_difference(
     models: list[Path] = []
     samples: list[Path] = []
     accuracy: list[Record] = []
-    policy, first = idealised, None
-    earlier = [idealised] if replay == "all" else []
+    policy, earlier = idealised, Earlier.begin(idealised, replay)
     for iteration in range(1, budget.iterations + 1):
         collected = stages.run(
             "collect",
-            {**common, "policy": policy, "samples": budget.true_samples, "round": iteration},
-            lambda folder: steps.collect(folder, policy, budget.true_samples, iteration),  # noqa: B023
+            {
+                **common,
+                "policy": earlier.policy,
+                "samples": budget.true_samples,
+                "round": iteration,
+            },
+            lambda folder: steps.collect(folder, earlier.policy, budget.true_samples, iteration),  # noqa: B023
         )
         samples.append(collected)
         model = stages.run(
@@ -143,26 +153,20 @@ def learn_by_difference(
             "train",
             {
                 **common,
+                **earlier.settings(),
                 "model": model,
-                "policy": policy,
                 "steps": budget.difference_steps,
                 **({"caution": caution} if caution else {}),
-                **({"earlier": list(earlier)} if earlier else {}),
             },
             lambda folder: steps.train_corrected(
                 folder,
                 model,  # noqa: B023
-                policy,  # noqa: B023
-                first,  # noqa: B023
+                earlier,  # noqa: B023
                 budget.difference_steps,
                 caution,
-                earlier,
             ),
         )
-        if replay == "all":
-            earlier.append(policy)
-        else:
-            first = first or policy
+        earlier = earlier.then(policy)
         measured = stages.run(
             "measure",
             {"model": model, "policy": policy, "seed": seed},
@@ -174,30 +178,14 @@ def learn_by_difference(
         errors = read_json(measured / "accuracy.json")
         accuracy.append(seen | errors | read_json(model / "fit.json"))
 
-    policy, first = idealised, None
-    earlier = [idealised] if replay == "all" else []
+    earlier = Earlier.begin(idealised, replay)
     for iteration in range(1, budget.iterations + 1 if budget.control_steps else 1):
         policy = stages.run(
             "control",
-            {
-                **common,
-                "policy": policy,
-                "round": iteration,
-                "steps": budget.control_steps,
-                **({"earlier": list(earlier)} if earlier else {}),
-            },
-            lambda folder: steps.train_control(
-                folder,
-                policy,  # noqa: B023
-                first,  # noqa: B023
-                budget.control_steps,
-                earlier,
-            ),
+            {**common, **earlier.settings(), "round": iteration, "steps": budget.control_steps},
+            lambda folder: steps.train_control(folder, earlier, budget.control_steps),  # noqa: B023
         )
-        if replay == "all":
-            earlier.append(policy)
-        else:
-            first = first or policy
+        earlier = earlier.then(policy)
         folders[f"control-{iteration}"] = policy
         policies.append(steps.record(policy, "control") | {"iteration": iteration})
 

@@ -72,15 +72,13 @@ def remember(
     agent: DDPG,
     env: SimulatorEnv,
     folders: Sequence[Path],
-    corrected: CorrectedSimulator | None = None,
 ) -> None:
     """Fill an agent's replay with all that was simulated, as ``env`` would have it.
 
     Args:
         agent: Gets the transitions.
-        env: What the agent is to learn in.
+        env: What the agent is to learn in; if its simulator is a corrected one, so are they.
         folders: Of the trainings whose ``simulated.npz`` are read, in their order.
-        corrected: The simulator of ``env``, if it is a corrected one.
     """
     low, high = agent.policy.low, agent.policy.high
     simulator, task = env.simulator, env.task
@@ -91,8 +89,8 @@ def remember(
             columns = [data[name].astype(float) for name in ("states", "actions", "next_states")]
         for part in _pieces(len(columns[0])):
             states, actions, following = (column[part] for column in columns)
-            if corrected is not None:
-                following = corrected.correct(states, actions, following)
+            if isinstance(simulator, CorrectedSimulator):
+                following = simulator.correct(states, actions, following)
             agent.replay.extend(
                 observe(simulator, states),
                 2 * (actions - low) / (high - low) - 1,

@@ -1,9 +1,10 @@
 """The steps of difference learning; each writes what it computed into the folder it is given.
 
-Folders of policies hold ``agent.safetensors``, ``curve.json``, ``summary.json`` and
-``rollout.npz`` (one episode on the true system). Folders of models hold ``fit.json`` and, for
-the estimators of this package, ``difference.safetensors``; any other estimator is refitted
-from the samples when it is needed, because its only file format would be a pickle.
+Folders of policies hold ``agent.safetensors``, ``curve.json``, ``summary.json``,
+``rollout.npz`` (one episode on the true system) and, if all is to be replayed,
+``simulated.npz``. Folders of models hold ``fit.json`` and, for the estimators of this package,
+``difference.safetensors``; any other estimator is refitted from the samples when it is needed,
+because its only file format would be a pickle.
 """
 
 from __future__ import annotations
@@ -11,13 +12,12 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import time
-import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sklearn.base import BaseEstimator, clone
+from sklearn.base import BaseEstimator
 
 from policy.config import DDPGConfig
 from policy.ddpg import DDPG
@@ -33,78 +33,15 @@ from residual.persistence import load, save
 from residual.trajectories import Transitions
 from sims.environment import SimulatorEnv
 from sims.simulator import Array, Simulator
-from sims.tasks import Task
+from studies.learning.earlier import Earlier, ReplayRule
+from studies.learning.problem import Problem
+from studies.learning.seeds import derived_seed
 from studies.learning.simulated import FILE, Recorder, remember
 from studies.running.files import atomic_write_json, read_json
 from studies.running.progress import Progress
 
 # Policies learnt from nothing begin with random actions, the baselines too.
 RANDOM_STEPS = 1000
-
-
-@dataclasses.dataclass(frozen=True)
-class PolicyTests:
-    """How policies are tested while they learn and afterwards, and where accuracy is measured.
-
-    On a simulator tests are free; on the true system they are measurement and not counted, as
-    in the paper.
-
-    Args:
-        every: Steps of learning on a simulator between tests.
-        every_true: The same on the true system.
-        episodes: Rollouts without noise per test, each from its own start state.
-        noisy: Rollouts with a little noise per test on a model; they keep a policy from being
-            chosen for one lucky path through the model's errors.
-        finalists: So many of the best policies of a training are tested once more at its end.
-        final_episodes: Rollouts of each of them, from other starts; 0 for no final.
-        true_episodes: Rollouts of the policy kept on the true system: the result.
-        visited_seconds: Accuracy is measured over the first seconds of fresh rollouts.
-        visited_rollouts: How many of those.
-        visited_stride: Open-loop predictions start at every so many-th state of them.
-    """
-
-    every: int = 500
-    every_true: int = 250
-    episodes: int = 1
-    noisy: int = 3
-    finalists: int = 1
-    final_episodes: int = 0
-    true_episodes: int = 1
-    # Later a good policy balances, where there is next to nothing to predict.
-    visited_seconds: float = 2.0
-    visited_rollouts: int = 5
-    visited_stride: int = 1
-
-
-@dataclasses.dataclass(frozen=True)
-class Problem:
-    """A system to control and the simulator at hand.
-
-    Attributes:
-        description: What identifies all that follows: plain values only.
-        idealised: The simulator that one has.
-        true: The system that one wants to control; it is only ever sampled.
-        task: Reward, start states, horizon.
-        tests: How policies are tested.
-        measures: What is reported of a rollout on the true system beside its return, by name.
-        cold_sigma: Exploration noise of policies learnt from nothing; the others have the
-            paper's. Slightly higher (paper, section IV-C), 0.20 in the authors' scripts.
-        elsewhere: Draws states and actions of rollouts of the true system from anywhere, as
-            ``residual.accuracy.uniform_rollouts``, which is used without it.
-    """
-
-    description: Mapping[str, Any]
-    idealised: Simulator
-    true: Simulator
-    task: Task
-    tests: PolicyTests = PolicyTests()
-    measures: Callable[[Rollout], dict[str, float]] | None = None
-    cold_sigma: float = 0.20
-    elsewhere: Callable[[np.random.Generator], tuple[Array, Array]] | None = None
-
-    def environment(self, simulator: Simulator) -> SimulatorEnv:
-        """The task on ``simulator``."""
-        return SimulatorEnv(simulator, self.task)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,6 +53,7 @@ class LearningSteps:
     ddpg: DDPGConfig
     seed: int
     progress: Progress
+    replay: ReplayRule = "first"
 
     def train_idealised(self, folder: Path, steps: int) -> None:
         """The policy that one gets from the idealised simulator alone."""
@@ -150,21 +88,12 @@ class LearningSteps:
         atomic_write_json(folder / "fit.json", {"fit_seconds": seconds})
 
     def train_corrected(
-        self,
-        folder: Path,
-        model: Path,
-        policy: Path,
-        first: Path | None,
-        steps: int,
-        caution: float = 0.0,
-        earlier: Sequence[Path] = (),
+        self, folder: Path, model: Path, earlier: Earlier, steps: int, caution: float = 0.0
     ) -> None:
         """DDPG on the corrected simulator, from the last policy's networks.
 
-        From the second update on, the replay begins with the transitions of ``first``, the first
-        update (paper, section III-C); or, from the first on, with those of all trainings in
-        ``earlier``, relabelled with the difference model. With ``caution`` the reward is less
-        where the difference model is unsure; see ``residual.caution``.
+        With ``caution`` the reward is less where the difference model is unsure; see
+        ``residual.caution``.
         """
         corrected = self.corrected(model)
         task = self.problem.task
@@ -172,29 +101,14 @@ class LearningSteps:
             data = Transitions.load(model / "transitions.npz")
             task = CautiousTask.around(task, corrected.difference, data, caution)
         env = SimulatorEnv(corrected, task), SimulatorEnv(corrected, task)
-        agent = self._continued(policy, first)
-        remember(agent, env[0], earlier, corrected)
-        self._train(
-            folder,
-            agent,
-            env,
-            steps,
-            "train on the corrected model",
-            difference=corrected.difference,
-        )
+        agent = self._continued(earlier, env[0])
+        title = "train on the corrected model"
+        self._train(folder, agent, env, steps, title, difference=corrected.difference)
 
-    def train_control(
-        self,
-        folder: Path,
-        policy: Path,
-        first: Path | None,
-        steps: int,
-        earlier: Sequence[Path] = (),
-    ) -> None:
+    def train_control(self, folder: Path, earlier: Earlier, steps: int) -> None:
         """As ``train_corrected``, without a difference model: what more training alone brings."""
-        agent = self._continued(policy, first)
         env = self._environments(self.problem.idealised)
-        remember(agent, env[0], earlier)
+        agent = self._continued(earlier, env[0])
         self._train(folder, agent, env, steps, "train on, no difference model")
 
     def train_on_true(self, folder: Path, start: Path | None, steps: int) -> None:
@@ -299,7 +213,7 @@ class LearningSteps:
         env, tested = environments
         on_true = env.simulator is self.problem.true
         tests = self.problem.tests
-        recorder = None if on_true else Recorder(env)
+        recorder = Recorder(env) if self.replay == "all" and not on_true else None
         begin = time.perf_counter()
         with self.progress.task(title, steps) as tell:
 
@@ -324,7 +238,8 @@ class LearningSteps:
             )
         seconds = time.perf_counter() - begin
         agent.restore(selection.networks)
-        agent.save(folder / "agent.safetensors")
+        # What was simulated is kept once: as it was, or as the idealised simulator said it.
+        agent.save(folder / "agent.safetensors", replay=self.replay == "first")
         if recorder:
             recorder.save(folder / FILE, difference)
         atomic_write_json(
@@ -361,10 +276,15 @@ class LearningSteps:
         """One to learn in and one to be tested in."""
         return self.problem.environment(simulator), self.problem.environment(simulator)
 
-    def _continued(self, policy: Path, first: Path | None) -> DDPG:
-        """An agent with a policy's networks and, if there is one, the first update's replay."""
-        agent = DDPG.load(first / "agent.safetensors") if first else self._agent()
-        agent.restore(DDPG.load(policy / "agent.safetensors").networks())
+    def _continued(self, earlier: Earlier, env: SimulatorEnv) -> DDPG:
+        """An agent with a policy's networks, and with what there is to be learnt from again."""
+        agent = self._agent()
+        if earlier.rule == "all":
+            remember(agent, env, earlier.trainings)
+        elif earlier.trainings:
+            (first,) = earlier.trainings
+            agent = DDPG.load(first / "agent.safetensors")
+        agent.restore(DDPG.load(earlier.policy / "agent.safetensors").networks())
         return agent
 
     def _agent(self, sigma: float | None = None) -> DDPG:
@@ -397,26 +317,3 @@ def visited(run: Rollout) -> Array:
     if run.states is None:
         raise ValueError("the environment does not report info['state'], the simulator's state")
     return run.states
-
-
-def derived_seed(seed: int, *purpose: str) -> int:
-    """A seed of its own for each purpose, the same on every machine."""
-    return zlib.crc32("/".join([str(seed), *purpose]).encode())
-
-
-def describe(estimator: BaseEstimator) -> dict[str, Any]:
-    """The class and the settings of an estimator, in plain values."""
-    kind = type(estimator)
-    parameters = {name: repr(value) for name, value in estimator.get_params().items()}
-    return {"class_path": f"{kind.__module__}.{kind.__qualname__}", "parameters": parameters}
-
-
-def seeded(estimator: BaseEstimator, seed: int) -> BaseEstimator:
-    """A clone with every unset ``random_state`` set."""
-    copy = clone(estimator)
-    unset = [
-        name
-        for name, value in copy.get_params().items()
-        if name.split("__")[-1] == "random_state" and value is None
-    ]
-    return copy.set_params(**dict.fromkeys(unset, derived_seed(seed, "estimator") % 2**31))

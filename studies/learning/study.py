@@ -15,7 +15,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import threadpoolctl
 import torch
@@ -25,9 +25,10 @@ from sklearn.base import BaseEstimator
 
 from policy.config import DDPGConfig
 from residual import DropoutNet
+from studies.learning.earlier import ReplayRule
 from studies.learning.loop import Budget, learn_by_difference
+from studies.learning.problem import Problem
 from studies.learning.stages import Stages
-from studies.learning.steps import Problem
 from studies.running.command import HelpFormatter, Parser, class_label, expand_grid, fail, versions
 from studies.running.curves import Curves
 from studies.running.files import (
@@ -66,7 +67,7 @@ class GapTrial:
     budget: Budget = dataclasses.field(default_factory=Budget)
     ddpg: DDPGConfig = dataclasses.field(default_factory=DDPGConfig)
     caution: NonNegativeFloat = 0.0
-    replay: Literal["first", "all"] = "first"
+    replay: ReplayRule = "first"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,17 +4,19 @@ import numpy as np
 import pytest
 
 from policy.config import DDPGConfig
+from policy.ddpg import DDPG
 from residual import Linear
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
 from studies.learning.loop import Budget, learn_by_difference
+from studies.learning.problem import PolicyTests, Problem
+from studies.learning.simulated import FILE
 from studies.learning.stages import Stages
-from studies.learning.steps import PolicyTests, Problem
 from studies.running.progress import Silent
 
 
-@pytest.fixture(scope="module")
-def outcome(tmp_path_factory):
+@pytest.fixture(scope="module", params=["first", "all"])
+def learnt(tmp_path_factory, request):
     problem = Problem(
         description={"system": "short pendulum"},
         idealised=PendulumEquation(),
@@ -36,7 +38,32 @@ def outcome(tmp_path_factory):
     )
     ddpg = DDPGConfig(hidden=(8, 8), warm_up=50, batch=8)
     stages = Stages(tmp_path_factory.mktemp("stages"))
-    return learn_by_difference(problem, Linear(), budget, ddpg, 0, stages, Silent())
+    found = learn_by_difference(
+        problem, Linear(), budget, ddpg, 0, stages, Silent(), 0.0, request.param
+    )
+    return request.param, found
+
+
+@pytest.fixture
+def outcome(learnt):
+    return learnt[1]
+
+
+def test_what_was_simulated_is_kept_once_and_learnt_from_again(learnt):
+    rule, outcome = learnt
+    sizes = {
+        name: len(DDPG.load(folder / "agent.safetensors").replay)
+        for name, folder in outcome.folders.items()
+    }
+    kept = {name for name, folder in outcome.folders.items() if (folder / FILE).exists()}
+    if rule == "all":
+        assert set(sizes.values()) == {0}
+        assert kept == {n for n in sizes if n.startswith(("idealised", "difference", "control"))}
+    else:
+        assert not kept
+        # The second update learns from the first one's 60 transitions again, and so the control.
+        assert sizes["difference-1"] == sizes["control-1"] == 60
+        assert sizes["difference-2"] == sizes["control-2"] == 120
 
 
 def test_the_control_gets_the_same_training_and_no_true_samples(outcome):

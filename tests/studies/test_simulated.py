@@ -42,8 +42,7 @@ def rows(agent):
 def test_the_same_simulator_gives_back_the_replay(simulator, tmp_path):
     agent = learnt_in(simulator, tmp_path)
     again = DDPG.for_env(SimulatorEnv(simulator, SwingUp()), SMALL)
-    corrected = simulator if isinstance(simulator, CorrectedSimulator) else None
-    remember(again, SimulatorEnv(simulator, SwingUp()), [tmp_path], corrected)
+    remember(again, SimulatorEnv(simulator, SwingUp()), [tmp_path])
     np.testing.assert_allclose(rows(again), rows(agent), atol=2e-5)
 
 
@@ -54,7 +53,7 @@ def test_another_simulator_says_what_it_would_have_done(tmp_path):
     newest = correction(1)
     env = SimulatorEnv(newest, SwingUp())
     agent = DDPG.for_env(env, SMALL)
-    remember(agent, env, [tmp_path / "0", tmp_path / "1"], newest)
+    remember(agent, env, [tmp_path / "0", tmp_path / "1"])
     assert len(agent.replay) == 600
     stored = rows(agent)
     for row in stored[[0, 150, 299, 300, 450, 599]]:
