@@ -26,12 +26,13 @@ from policy.evaluate import Rollout
 from sims.leo import Leo, Walking, measure_walk
 from sims.leo.body import clearance
 from sims.simulator import Array, Simulator
+from studies.learning.command import run_command
 from studies.learning.earlier import ReplayRule
 from studies.learning.loop import Budget
 from studies.learning.problem import PolicyTests, Problem
+from studies.learning.settings import build_parser as parser_of
 from studies.learning.steps import visited
-from studies.learning.study import GapStudy, GapTrial, run_command
-from studies.learning.study import build_parser as parser_of
+from studies.learning.study import GapStudy, GapTrial
 from studies.leo.report import policy_table, write_report
 from studies.leo.tables import write_grid_report
 from studies.running.command import Parser

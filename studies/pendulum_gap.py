@@ -24,9 +24,10 @@ from typing import Any
 from sims.pendulum import Pendulum
 from sims.simulator import Simulator
 from sims.tasks import SwingUp
+from studies.learning.command import run_command
 from studies.learning.problem import Problem
-from studies.learning.study import GapStudy, GapTrial, run_command
-from studies.learning.study import build_parser as parser_of
+from studies.learning.settings import build_parser as parser_of
+from studies.learning.study import GapStudy, GapTrial
 from studies.pendulum.report import policy_table, write_report
 from studies.pendulum.tables import write_grid_report
 from studies.running.command import Parser

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from studies.learning import study
+from studies.learning import command
 from studies.running.command import HelpFormatter, Parser, fail
 from studies.running.files import read_json
 from studies.running.trials import PLAN
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         module = importlib.import_module(f"studies.{study_of(folder)}")
         # Other studies than those of a gap have a function of their own.
         if hasattr(module, "STUDY"):
-            study.rebuild(module.STUDY, folder)
+            command.rebuild(module.STUDY, folder)
         else:
             module.rebuild(folder)
     except (OSError, ValueError) as error:

@@ -12,8 +12,8 @@ from sims.pendulum import Pendulum
 from sims.simulator import Simulator
 from sims.tasks import SwingUp
 from studies import pendulum_gap
+from studies.learning.command import run_command
 from studies.learning.problem import Problem
-from studies.learning.study import run_command
 from studies.learning.tables import write_tables
 
 

@@ -8,7 +8,7 @@ import pytest
 import quick_gap
 
 from studies import report
-from studies.learning.study import rebuild
+from studies.learning.command import rebuild
 from studies.report import main, study_of
 
 TINY = (
@@ -39,7 +39,7 @@ def test_tables_come_back_from_the_trials_alone(finished, monkeypatch):
     before = {name: (finished / name).read_bytes() for name in tables}
     for name in tables:
         (finished / name).unlink()
-    monkeypatch.setattr("studies.learning.study.learn_by_difference", None)
+    monkeypatch.setattr("studies.learning.trial.learn_by_difference", None)
     rebuild(quick_gap.STUDY, finished)
     assert {name: (finished / name).read_bytes() for name in tables} == before
 

@@ -1,0 +1,81 @@
+"""The settings of a study: as options, as plain values, and as the trial that they describe."""
+
+from __future__ import annotations
+
+import copy
+import json
+from pathlib import Path
+from typing import Any
+
+from jsonargparse.typing import PositiveInt
+
+from studies.learning.study import Config, GapStudy, GapTrial
+from studies.running.command import HelpFormatter, Parser
+from studies.running.workers import Backend
+
+
+def build_parser(study: GapStudy) -> Parser:
+    """The command line of a study."""
+    parser = Parser(
+        prog=f"python -m studies.{study.name}",
+        description=study.description,
+        formatter_class=HelpFormatter,
+    )
+    parser.add_argument("--config", action="config", help="YAML file with any of the settings.")
+    parser.add_argument(
+        "--output",
+        type=Path | None,
+        default=None,
+        help=f"Folder for the results; default: results/{study.name}/ and a name.",
+    )
+    parser.add_argument("--jobs", type=PositiveInt, default=1, help="Processes for many trials.")
+    parser.add_argument(
+        "--backend",
+        type=Backend,
+        default="local",
+        help="Where many trials run: in local processes or on a cluster (docs/scaling.md).",
+    )
+    parser.add_argument(
+        "--scheduler",
+        type=str | None,
+        default=None,
+        help="Address of the cluster's scheduler, such as tcp://host:8786.",
+    )
+    parser.add_argument(
+        "--tensorboard",
+        type=Path | None,
+        default=None,
+        help="Folder for training curves; tensorboard --logdir shows them.",
+    )
+    parser.add_argument(
+        "--grid",
+        type=list[dict[str, list[Any]]] | None,
+        default=None,
+        help="For config files: blocks of settings and the values they take; one trial for each "
+        "combination within a block.",
+    )
+    parser.add_class_arguments(study.trial, sub_configs=True)
+    parser.set_defaults(estimator={"class_path": study.estimator})
+    return parser
+
+
+def instantiate(study: GapStudy, config: Config) -> GapTrial:
+    """The trial that plain settings describe; exits with one line if they are wrong."""
+    parser = build_parser(study)
+    # The parser changes nested lists of what it is given.
+    chosen = parser.instantiate(parser.parse_object(copy.deepcopy(dict(config))))
+    return study.trial(**{name: chosen[name] for name in study.settings})
+
+
+def resolve(study: GapStudy, config: Config) -> dict[str, Any]:
+    """``config`` with every default filled in, checked by the parser."""
+    parser = build_parser(study)
+    chosen = parser.parse_object(copy.deepcopy(dict(config)))
+    settings = json.loads(parser.dump(chosen, format="json", skip_unset=False))
+    return {name: settings[name] for name in study.settings}
+
+
+def trial_label(config: Config) -> str:
+    """A readable name for a trial's folder."""
+    estimator = config["estimator"]["class_path"].rsplit(".", 1)[-1]
+    return f"{estimator}-{config['budget']['true_samples']}-seed{config['seed']}"
