@@ -36,7 +36,10 @@ class Mean:
         return self.value + np.nan_to_num(self.half_width)
 
     def __str__(self) -> str:
-        digits = 0 if abs(self.value) >= 100 else 1
+        return self.text(0 if abs(self.value) >= 100 else 1)
+
+    def text(self, digits: int) -> str:
+        """The mean and its interval with so many decimals."""
         if self.count == 1:
             return f"{self.value:.{digits}f}"
         # With spaces that do not break a line.

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from studies import leo_gap
+from studies.learning.statistics import mean
 from studies.leo.report import grouped
 from studies.leo.tables import write_grid_report
 
@@ -69,10 +70,19 @@ def test_the_report_shows_it_walking_and_carries_everything(folder):
 
 def test_a_table_over_trials(results, tmp_path):
     other = json.loads(json.dumps(results)) | {"seed": 1}
+    control = next(p for p in other["policies"] if p["name"] == "control")
+    learnt = next(p for p in other["policies"] if p["name"] == "difference")
+    control["return_true"] = learnt["return_true"] - 100.0
+    mine = {p["name"]: p["return_true"] for p in results["policies"]}
     text = write_grid_report([results, other], {}, tmp_path)
+    pairs = mean([mine["difference"] - mine["control"], 100.0])
+    assert str(pairs) in text
     assert "Linear, update 1" in text and "no difference model, update 1" in text
     page = (tmp_path / "report.html").read_text()
-    assert "Table III" in page and "309 766" in page
+    for words in ("Table III", "309 766", "update Linear returns"):
+        assert words in page
+    errors = grouped(results["accuracy"][0]["visited"]["one_step"])
+    assert "Accuracy where the policies go" in page and f"{errors['base']:.2f}" in page
 
 
 def test_a_wrong_budget_is_one_line(capsys, tmp_path):
