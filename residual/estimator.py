@@ -36,7 +36,8 @@ class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
     * can be saved without pickle (``residual.persistence``).
 
     An estimator that wants raw states and actions rather than ``ChannelFeatures`` adds a method
-    ``for_simulator(simulator)`` that returns an unfitted copy configured for its channels.
+    ``for_simulator(simulator)`` that returns an unfitted copy configured for its channels. If
+    what it learns is a simulator itself, ``corrected()`` returns that.
 
     A subclass names the attributes it learns in ``_learned`` and implements ``_fit`` and
     ``_predict``.

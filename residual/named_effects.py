@@ -108,6 +108,11 @@ class NamedEffects(Estimator):
             variance = variance + np.einsum("nsi,ij,nsj->ns", slope, self.covariance_, slope)
         return mean, np.sqrt(variance)
 
+    def corrected(self) -> HostSimulator:
+        """The simulator with the effects in it: one step of it is a step and its difference."""
+        simulator = self._host()
+        return simulator.with_effects((*simulator.effects, *self.effects_))
+
     def _change(self, X: Array, effects: tuple[Effect, ...]) -> Array:
         """What effects change in the next state, (n, n_s)."""
         simulator = self._host()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from residual import DifferenceModel, NamedEffects, load, save
+from residual import CorrectedSimulator, DifferenceModel, NamedEffects, load, save
 from residual.gap.rows import SHORTEST
 from residual.trajectories import Transitions
 from sims.effects import CoulombFriction, Delay
@@ -41,6 +41,16 @@ def test_forty_exact_rows_name_the_mass_and_predict_everywhere(model, probe):
     assert "mass" in estimator.says_
     wanted = Pendulum.true().step(*probe) - Pendulum().step(*probe)
     np.testing.assert_allclose(model.predict(*probe), wanted, atol=1e-4)
+
+
+def test_corrected_it_steps_once_as_simulator_and_difference_do(model, probe):
+    direct = CorrectedSimulator(model.simulator, model)
+    added = CorrectedSimulator(Pendulum(), model)
+    np.testing.assert_allclose(direct.step(*probe), added.step(*probe), atol=1e-12)
+    stepped = model.fitted().corrected().step(*probe)
+    np.testing.assert_array_equal(
+        direct.step(*probe), np.clip(stepped, [-np.inf, -160], [np.inf, 160])
+    )
 
 
 def test_spread_is_small_where_the_name_is_certain(model, probe):
