@@ -56,6 +56,11 @@ def last_difference(results: Results) -> Mapping[str, Any] | None:
     return learnt[-1] if learnt else None
 
 
+def by_name(results: Results, name: str) -> list[Mapping[str, Any]]:
+    """The records of one kind of policy, in order."""
+    return [record for record in results["policies"] if record["name"] == name]
+
+
 def accuracy_line(record: Mapping[str, Any], errors: Mapping[str, float], digits: int) -> str:
     """The one-step errors of a difference model as text for the terminal.
 

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure as Drawing
 from studies.learning.records import POLICY_WORDS, failures_section
 from studies.learning.statistics import Mean, mean
 from studies.learning.tables import write_tables
-from studies.leo.report import GROUPS, NEAR, grouped
+from studies.leo.groups import GROUPS, grouped
+from studies.leo.report import NEAR
 from studies.reporting import Figure, KeyValues, Report, Section, Table, Verdict
 from studies.reporting.figures import PALETTE, new_figure, save_figure, styled
 from studies.reporting.sections import Cell

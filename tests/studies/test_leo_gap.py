@@ -7,7 +7,7 @@ import pytest
 
 from studies import leo_gap
 from studies.learning.statistics import mean
-from studies.leo.report import grouped
+from studies.leo.groups import grouped
 from studies.leo.tables import write_grid_report
 
 TINY = [
