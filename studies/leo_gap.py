@@ -8,6 +8,7 @@ goes, and what as much training without a difference model brings.
 
   python -m studies.leo_gap
   python -m studies.leo_gap --estimator residual.GaussianProcess --budget.iterations 1
+  python -m studies.leo_gap --corrected results/leo_named/corrected.yaml --budget.iterations 0
   python -m studies.leo_gap --config studies/configs/leo_table.yaml --jobs 2
 
 A killed run continues where it stopped when the same command is given again.
@@ -72,6 +73,8 @@ class LeoTrial(GapTrial):
             difference_steps=20_000,
             true_steps=120_000,
             control_steps=20_000,
+            # As much as three updates.
+            corrected_steps=60_000,
         )
     )
     # As in the authors' code; docs/leo.md says what each choice brought.

@@ -17,6 +17,7 @@ Every step is a stage: a pure function of its settings and of earlier stages, ke
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,8 @@ class Budget:
         true_steps: True steps that train the reference policy on the true system; 0 skips it.
         baseline_steps: True steps given to the cold and to the warm start; 0 skips them.
         control_steps: Simulated steps of the control for each update; 0 skips it.
+        corrected_steps: Simulated steps on the simulator that was corrected by name, if there is
+            one.
     """
 
     true_samples: int = 3750
@@ -55,6 +58,7 @@ class Budget:
     true_steps: int = 0
     baseline_steps: int = 0
     control_steps: int = 0
+    corrected_steps: int = 20_000
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -90,6 +94,7 @@ def learn_by_difference(
     progress: Progress,
     caution: float = 0.0,
     replay: ReplayRule = "first",
+    corrected: Mapping[str, Any] | None = None,
 ) -> Outcome:
     """The loop of the paper, then the baselines that the budget asks for.
 
@@ -105,6 +110,8 @@ def learn_by_difference(
             model; 0 learns as in the paper.
         replay: What a training after an update learns from beside its own transitions, see
             ``Earlier``; the control learns from its own in the same way.
+        corrected: Settings (``sims.loading.load_simulator``) of a simulator with what the
+            idealised one lacked: a policy is trained on it as well, without a true sample.
 
     Returns:
         Records, and the folders that hold the policies and the models.
@@ -188,6 +195,20 @@ def learn_by_difference(
         earlier = earlier.then(policy)
         folders[f"control-{iteration}"] = policy
         policies.append(steps.record(policy, "control") | {"iteration": iteration})
+
+    if corrected is not None:
+        earlier = Earlier.begin(idealised, replay)
+        folders["corrected"] = stages.run(
+            "corrected",
+            {
+                **common,
+                **earlier.settings(),
+                "corrected": corrected,
+                "steps": budget.corrected_steps,
+            },
+            lambda folder: steps.train_named(folder, corrected, earlier, budget.corrected_steps),
+        )
+        policies.append(steps.record(folders["corrected"], "corrected"))
 
     # The reference and the cold start are one experiment, read at two budgets.
     if longest := max(budget.true_steps, budget.baseline_steps):

@@ -74,6 +74,23 @@ class Problem:
     cold_sigma: float = 0.20
     elsewhere: Callable[[np.random.Generator], tuple[Array, Array]] | None = None
 
+    def check_corrected(self, corrected: Simulator) -> None:
+        """Raise ``ValueError`` unless a corrected simulator has the channels of the idealised one.
+
+        Delay, lag and play have a memory, which is more state than the idealised one has.
+        """
+        for what in ("dt", "state_channels", "action_channels"):
+            own, others = getattr(self.idealised, what), getattr(corrected, what)
+            if own != others:
+                told = [
+                    f"{value:g} s" if what == "dt" else ", ".join(c.name for c in value)
+                    for value in (others, own)
+                ]
+                raise ValueError(
+                    f"corrected: {corrected.name} has {what.replace('_', ' ')} {told[0]}, expected "
+                    f"{told[1]} as {self.idealised.name}; --simulator trains on any simulator"
+                )
+
     def environment(self, simulator: Simulator) -> SimulatorEnv:
         """The task on ``simulator``."""
         return SimulatorEnv(simulator, self.task)

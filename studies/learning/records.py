@@ -18,6 +18,7 @@ POLICY_WORDS = {
     "idealised": "idealised policy",
     "difference": "difference model, update {iteration}",
     "control": "no difference model, update {iteration}",
+    "corrected": "simulator corrected by name",
     "true": "trained on the true system",
     "cold": "cold start",
     "warm": "warm start",

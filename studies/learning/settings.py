@@ -64,7 +64,10 @@ def instantiate(study: GapStudy, config: Config) -> GapTrial:
     parser = build_parser(study)
     # The parser changes nested lists of what it is given.
     chosen = parser.instantiate(parser.parse_object(copy.deepcopy(dict(config))))
-    return study.trial(**{name: chosen[name] for name in study.settings})
+    trial = study.trial(**{name: chosen[name] for name in study.settings})
+    if trial.corrected is not None:
+        study.problem(trial, {}).check_corrected(trial.corrected)
+    return trial
 
 
 def resolve(study: GapStudy, config: Config) -> dict[str, Any]:

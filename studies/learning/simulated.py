@@ -8,7 +8,7 @@ are kept as it said them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -68,10 +68,22 @@ class Recorder(gymnasium.Wrapper[Any, Any, Any, Any]):
         )
 
 
+def recorded(folders: Sequence[Path]) -> int:
+    """Transitions in the ``simulated.npz`` of trainings."""
+    total = 0
+    for folder in folders:
+        if (folder / FILE).exists():
+            with np.load(folder / FILE, allow_pickle=False) as data:
+                total += len(data["actions"])
+    return total
+
+
 def remember(
     agent: DDPG,
     env: SimulatorEnv,
     folders: Sequence[Path],
+    again: bool = False,
+    tell: Callable[[int], None] = lambda _: None,
 ) -> None:
     """Fill an agent's replay with all that was simulated, as ``env`` would have it.
 
@@ -79,9 +91,12 @@ def remember(
         agent: Gets the transitions.
         env: What the agent is to learn in; if its simulator is a corrected one, so are they.
         folders: Of the trainings whose ``simulated.npz`` are read, in their order.
+        again: Simulate them again, for an ``env`` whose simulator is another than theirs.
+        tell: Told how many are done.
     """
     low, high = agent.policy.low, agent.policy.high
     simulator, task = env.simulator, env.task
+    done = 0
     for folder in folders:
         if not (folder / FILE).exists():  # it learnt nothing
             continue
@@ -89,7 +104,9 @@ def remember(
             columns = [data[name].astype(float) for name in ("states", "actions", "next_states")]
         for part in _pieces(len(columns[0])):
             states, actions, following = (column[part] for column in columns)
-            if isinstance(simulator, CorrectedSimulator):
+            if again:
+                following = simulator.step(states, actions)
+            elif isinstance(simulator, CorrectedSimulator):
                 following = simulator.correct(states, actions, following)
             agent.replay.extend(
                 observe(simulator, states),
@@ -98,6 +115,8 @@ def remember(
                 observe(simulator, following),
                 task.terminal(following),
             )
+            done += len(states)
+            tell(done)
 
 
 def _pieces(count: int) -> list[slice]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +32,12 @@ from residual.difference import DifferenceModel
 from residual.persistence import load, save
 from residual.trajectories import Transitions
 from sims.environment import SimulatorEnv
+from sims.loading import load_simulator
 from sims.simulator import Array, Simulator
 from studies.learning.earlier import Earlier, ReplayRule
 from studies.learning.problem import Problem
 from studies.learning.seeds import derived_seed
-from studies.learning.simulated import FILE, Recorder, remember
+from studies.learning.simulated import FILE, Recorder, recorded, remember
 from studies.running.files import atomic_write_json, read_json
 from studies.running.progress import Progress
 
@@ -111,6 +112,18 @@ class LearningSteps:
         agent = self._continued(earlier, env[0])
         self._train(folder, agent, env, steps, "train on, no difference model")
 
+    def train_named(
+        self, folder: Path, settings: Mapping[str, Any], earlier: Earlier, steps: int
+    ) -> None:
+        """DDPG on a simulator that was corrected by name, from the last policy's networks.
+
+        What was simulated before is simulated again, since no difference can be added to it.
+        """
+        simulator = load_simulator(settings)
+        env = self._environments(simulator)
+        agent = self._continued(earlier, env[0], again=True)
+        self._train(folder, agent, env, steps, f"train on {simulator.name}, corrected")
+
     def train_on_true(self, folder: Path, start: Path | None, steps: int) -> None:
         """A baseline: DDPG on the true system, from nothing or from a policy's networks."""
         if start is None:
@@ -171,7 +184,8 @@ class LearningSteps:
 
         Args:
             folder: Of the policy.
-            name: ``"idealised"``, ``"difference"``, ``"true"``, ``"cold"`` or ``"warm"``.
+            name: ``"idealised"``, ``"difference"``, ``"control"``, ``"corrected"``, ``"true"``,
+                ``"cold"`` or ``"warm"``.
             within: For policies learnt on the true system: read the experiment as if it had
                 ended after so many true samples.
         """
@@ -276,11 +290,13 @@ class LearningSteps:
         """One to learn in and one to be tested in."""
         return self.problem.environment(simulator), self.problem.environment(simulator)
 
-    def _continued(self, earlier: Earlier, env: SimulatorEnv) -> DDPG:
+    def _continued(self, earlier: Earlier, env: SimulatorEnv, again: bool = False) -> DDPG:
         """An agent with a policy's networks, and with what there is to be learnt from again."""
         agent = self._agent()
         if earlier.rule == "all":
-            remember(agent, env, earlier.trainings)
+            title, rows = "take up what was simulated", recorded(earlier.trainings)
+            with self.progress.task(title, rows) as tell:
+                remember(agent, env, earlier.trainings, again, lambda done: tell(done, ""))
         elif earlier.trainings:
             (first,) = earlier.trainings
             agent = DDPG.load(first / "agent.safetensors")

@@ -16,6 +16,7 @@ from sklearn.base import BaseEstimator
 
 from policy.config import DDPGConfig
 from residual import DropoutNet
+from sims.simulator import Simulator
 from studies.learning.earlier import ReplayRule
 from studies.learning.loop import Budget
 from studies.learning.problem import Problem
@@ -38,6 +39,8 @@ class GapTrial:
         replay: What a training after an update learns from beside its own transitions: "first",
             as in the paper, from the second update on those of the first; "all", those of all
             trainings on the simulator so far, relabelled with the newest difference model.
+        corrected: A simulator with what it lacked, such as the corrected.yaml of find_gap: a
+            policy is trained on it too, from the idealised one, without a true sample.
     """
 
     estimator: BaseEstimator = dataclasses.field(default_factory=DropoutNet)
@@ -46,6 +49,7 @@ class GapTrial:
     ddpg: DDPGConfig = dataclasses.field(default_factory=DDPGConfig)
     caution: NonNegativeFloat = 0.0
     replay: ReplayRule = "first"
+    corrected: Simulator | None = None
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,6 +18,7 @@ _IN_COLUMNS = {
         f"budget.{name}"
         for name in (
             "true_samples", "iterations", "true_steps", "baseline_steps", "control_steps",
+            "corrected_steps",
         )
     ),
 }  # fmt: skip
@@ -57,7 +58,7 @@ def apart(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     differing = [
         name
         for name in names
-        if name.split(".")[0] != "estimator"
+        if name.split(".")[0] not in ("estimator", "corrected")
         and name not in _IN_COLUMNS
         and len({json.dumps(settings.get(name)) for settings in flat}) > 1
     ]

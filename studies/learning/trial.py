@@ -46,6 +46,7 @@ def run_trial(
         progress,
         trial.caution,
         trial.replay,
+        config["corrected"],
     )
     for name, source in outcome.folders.items():
         copy_file(source / "agent.safetensors", folder / "policies" / f"{name}.safetensors")

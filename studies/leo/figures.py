@@ -16,7 +16,7 @@ from studies.reporting.media import encode_gif
 
 CONTROL_PERIOD = 0.03
 FILM_SECONDS = 6.0
-TESTED = ("idealised", "difference", "control", "true")
+TESTED = ("idealised", "difference", "control", "corrected", "true")
 
 
 def film(states: np.ndarray) -> bytes:

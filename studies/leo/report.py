@@ -85,7 +85,7 @@ def write_report(results: Results, folder: Path) -> Path:
     titles = {record_key(record): policy_name(record) for record in results["policies"]}
     rollouts = load_rollouts(results, folder)
     learnt = last_difference(results)
-    shown = ["idealised", *([record_key(learnt)] if learnt else []), "true"]
+    shown = ["idealised", *([record_key(learnt)] if learnt else []), "corrected", "true"]
     shown = [key for key in shown if key in rollouts]
     figures = folder / "figures"
     sections: list[Section] = [
@@ -141,6 +141,16 @@ def verdict(results: Results) -> Verdict:
     learnt, true, control = last_difference(results), by_name(results, "true"), by_name(
         results, "control"
     )  # fmt: skip
+    named = by_name(results, "corrected")
+    if learnt is None and named:
+        after = named[0]["return_true"]
+        return Verdict(
+            f"On the true Leo the return went from {idealised:.0f} to {after:.0f}, without a "
+            "true sample.",
+            "The policy was trained on the simulator with what find_gap named.",
+            tone="good" if after > idealised else "warning",
+            label="gap closed" if after > idealised else "not settled",
+        )
     if learnt is None:
         return Verdict(
             f"Trained on the simulator alone, the policy returns {idealised:.0f} on the true Leo.",

@@ -14,6 +14,11 @@ from studies.learning.simulated import FILE
 from studies.learning.stages import Stages
 from studies.running.progress import Silent
 
+CORRECTED = {
+    "class_path": "sims.pendulum_equation.PendulumEquation",
+    "init_args": {"mass": 0.089974, "dt": 0.05},
+}
+
 
 @pytest.fixture(scope="module", params=["first", "all"])
 def learnt(tmp_path_factory, request):
@@ -35,11 +40,12 @@ def learnt(tmp_path_factory, request):
         true_steps=120,
         baseline_steps=60,
         control_steps=60,
+        corrected_steps=60,
     )
     ddpg = DDPGConfig(hidden=(8, 8), warm_up=50, batch=8)
     stages = Stages(tmp_path_factory.mktemp("stages"))
     found = learn_by_difference(
-        problem, Linear(), budget, ddpg, 0, stages, Silent(), 0.0, request.param
+        problem, Linear(), budget, ddpg, 0, stages, Silent(), 0.0, request.param, CORRECTED
     )
     return request.param, found
 
@@ -58,7 +64,9 @@ def test_what_was_simulated_is_kept_once_and_learnt_from_again(learnt):
     kept = {name for name, folder in outcome.folders.items() if (folder / FILE).exists()}
     if rule == "all":
         assert set(sizes.values()) == {0}
-        assert kept == {n for n in sizes if n.startswith(("idealised", "difference", "control"))}
+        assert kept == {
+            n for n in sizes if n.startswith(("idealised", "difference", "control", "corrected"))
+        }
     else:
         assert not kept
         # The second update learns from the first one's 60 transitions again, and so the control.
@@ -76,9 +84,19 @@ def test_the_control_gets_the_same_training_and_no_true_samples(outcome):
         assert f"control-{iteration}" in outcome.folders
 
 
+def test_a_policy_is_learnt_on_a_simulator_corrected_by_name(learnt):
+    rule, outcome = learnt
+    (named,) = (p for p in outcome.policies if p["name"] == "corrected")
+    assert named["true_samples"] == 0 and named["simulated_steps"] == 60
+    if rule == "all":
+        simulated = np.load(outcome.folders["corrected"] / FILE)
+        steps = PendulumEquation(0.089974).step(simulated["states"], simulated["actions"])
+        np.testing.assert_allclose(simulated["next_states"], steps, atol=1e-4)
+
+
 def test_policies_are_tested_from_several_starts_with_the_measures_asked_for(outcome):
     for policy in outcome.policies:
-        if policy["name"] in ("idealised", "difference", "control", "true"):
+        if policy["name"] in ("idealised", "difference", "control", "corrected", "true"):
             returns = [test["return"] for test in policy["tests"]]
             assert len(set(returns)) == 3
             assert policy["return_true"] == pytest.approx(np.mean(returns))

@@ -11,7 +11,7 @@ from residual.trajectories import Transitions
 from sims.environment import SimulatorEnv
 from sims.pendulum import Pendulum
 from sims.tasks import SwingUp
-from studies.learning.simulated import FILE, Recorder, remember
+from studies.learning.simulated import FILE, Recorder, recorded, remember
 
 SMALL = DDPGConfig(hidden=(8, 8), batch=8, warm_up=10_000, replay=20_000)
 
@@ -54,9 +54,22 @@ def test_another_simulator_says_what_it_would_have_done(tmp_path):
     env = SimulatorEnv(newest, SwingUp())
     agent = DDPG.for_env(env, SMALL)
     remember(agent, env, [tmp_path / "0", tmp_path / "1"])
-    assert len(agent.replay) == 600
-    stored = rows(agent)
-    for row in stored[[0, 150, 299, 300, 450, 599]]:
+    assert len(agent.replay) == recorded([tmp_path / "0", tmp_path / "1"]) == 600
+    check_rows(rows(agent), env)
+
+
+def test_a_simulator_that_is_no_sum_simulates_it_again(tmp_path):
+    learnt_in(Pendulum(), tmp_path)
+    env = SimulatorEnv(Pendulum.true(), SwingUp())
+    agent, done = DDPG.for_env(env, SMALL), []
+    remember(agent, env, [tmp_path], again=True, tell=done.append)
+    assert done == [300]
+    check_rows(rows(agent), env)
+
+
+def check_rows(stored, env):
+    """Rows of a replay are what the environment does from the same states."""
+    for row in stored[::59]:
         state = [np.arctan2(row[1], row[0]), row[2] * Pendulum().state_channels[1].scale]
         env.reset(seed=0, options={"state": state})
         observation, reward, terminated, _, _ = env.step(row[3:4] * env.action_space.high)
