@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.adequacy import Remainder
 from residual.gap.contact.columns import chosen_changes
+from residual.gap.contact.duel import excluded
 from residual.gap.contact.quadratic import minimise
 from residual.gap.contact.refine import Refined, quadratic, refine
 from residual.gap.contact.search import Key, Search
@@ -78,7 +79,7 @@ def challenge(search: Search, key: Key, most: int = 2) -> None:
 
 def claims(
     search: Search, key: Key, full: Refined, spread: Array, fine: Array,
-    groups: Mapping[str, tuple[str, ...]],
+    groups: Mapping[str, tuple[str, ...]], beaten: Collection[Key],
 ) -> list[Claim]:  # fmt: skip
     """Numbers, intervals, rivals and numerics of every chosen effect, strongest first.
 
@@ -89,6 +90,7 @@ def claims(
         spread: Standard deviation of the numbers, (p,).
         fine: The numbers of the search at half the integration step, (p,).
         groups: Exact twins by label.
+        beaten: Rivals that all windows exclude.
     """
     base = search.tried[key]
     found, around = search.signatures(key)
@@ -108,7 +110,7 @@ def claims(
             for rival in search.tried
             if len(rival) == len(key) and number not in rival
             for other in set(rival) - set(key)
-            if len(set(rival) - set(key)) == 1 and not excluded(search, rival, key)
+            if len(set(rival) - set(key)) == 1 and not excluded(search, rival, key, beaten)
         ]
         without = [
             p for p in search.ranked(key, found, around, len(key) - 1) if number not in p.key
@@ -124,13 +126,12 @@ def claims(
     return sorted(told, key=lambda claim: -claim.gain)
 
 
-def excluded(search: Search, rival: Key, key: Key) -> bool:
-    """Whether a set leaves materially more than the chosen one."""
-    return search.drop(rival, key) > search.rules.material
+def evidence(search: Search, key: Key, beaten: Collection[Key]) -> tuple[Rival, ...]:
+    """Chosen set, nominal and runners-up on the windows of the search.
 
-
-def evidence(search: Search, key: Key) -> tuple[Rival, ...]:
-    """Chosen set, nominal and runners-up on the windows of the search."""
+    Args:
+        beaten: Rivals that all windows exclude.
+    """
     base = search.tried[key]
     rows = []
     for other, found in search.tried.items():
@@ -138,7 +139,7 @@ def evidence(search: Search, key: Key) -> tuple[Rival, ...]:
         rows.append(
             Rival(
                 tuple(search.candidates[i].label for i in other), found.total - base.total, ratio,
-                other == key, other != key and excluded(search, other, key),
+                other == key, other != key and excluded(search, other, key, beaten),
             )
         )  # fmt: skip
     return tuple(sorted(rows, key=lambda r: (not r.chosen, r.excess)))

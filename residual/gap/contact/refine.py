@@ -75,6 +75,18 @@ def renew(model: Model, theta: Array, shots: Shots, starts: Array, steps: int) -
     return settle(model, theta, shots, starts, 2)
 
 
+def level(one: Refined, other: Refined, shots: Shots) -> tuple[Refined, Refined]:
+    """Both after they have tried each other's start states, so that neither wins by its search.
+
+    A start state is found by search, and to go on searching lowers the loss of any set.
+    """
+    better = []
+    for mine, theirs in ((one, other.aimed), (other, one.aimed)):
+        again = settle(mine.model, mine.theta, shots, theirs.starts, 1, theirs.by_start)
+        better.append(mine.with_better(again))
+    return better[0], better[1]
+
+
 def refine(
     model: Model, theta: Array, shots: Shots, near: Aimed, turns: int = 3, settled: float = 3e-3
 ) -> Refined:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from residual.gap.candidates import Candidate
 from residual.gap.contact.columns import Column, columns
 from residual.gap.contact.quadratic import Quadratic, minimise
-from residual.gap.contact.refine import Refined, refine, settle
+from residual.gap.contact.refine import Refined, level, refine, settle
 from residual.gap.contact.shots import Aimed, Shots
 from residual.gap.contact.student import losses, trimmed_drop
 from residual.gap.model import Model
@@ -82,6 +82,10 @@ class Search:
         """The simulator with some candidates."""
         return Model(self.simulator, [self.candidates[i] for i in key])
 
+    def named(self, key: Key) -> str:
+        """A set in words."""
+        return " + ".join(self.candidates[i].label for i in key)
+
     def signatures(self, key: Key) -> tuple[list[Column], Quadratic]:
         """Columns of all candidates around a fitted set."""
         if key not in self.around:
@@ -97,8 +101,8 @@ class Search:
             return
         model = self.model(proposal.key)
         found = refine(model, proposal.theta, self.shots, near, self.rules.turns)
-        names = " + ".join(self.candidates[i].label for i in proposal.key)
-        self.tell(f"  {names}: {100 * found.total / self.tried[()].total:.1f} % of the misfit")
+        share = 100 * found.total / self.tried[()].total
+        self.tell(f"  {self.named(proposal.key)}: {share:.1f} % of the misfit")
         self.tried[proposal.key] = found
 
     def begin(self, key: Key, theta: Array, nominal: Array, near: Aimed | None) -> None:
@@ -122,15 +126,8 @@ class Search:
         return self.best(current)
 
     def level(self, one: Key, other: Key) -> None:
-        """Let two sets try each other's start states, so that neither wins by its iterations.
-
-        A start state is found by search, and to go on searching lowers the loss of any set.
-        """
-        starts = {key: self.tried[key].aimed for key in (one, other)}
-        for key, near in ((one, starts[other]), (other, starts[one])):
-            now = self.tried[key]
-            again = settle(now.model, now.theta, self.shots, near.starts, 1, near.by_start)
-            self.tried[key] = now.with_better(again)
+        """Let two sets try each other's start states."""
+        self.tried[one], self.tried[other] = level(self.tried[one], self.tried[other], self.shots)
 
     def best(self, current: Key) -> Key:
         """The set that beats the current one: materially if larger, at all if not."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from residual.gap.candidates import Candidate
 from residual.gap.contact import claims as told
+from residual.gap.contact.duel import duels
 from residual.gap.contact.exchange import exchange
 from residual.gap.contact.forecast import errors, forecast, median_span, noise_errors, plan
 from residual.gap.contact.noise import quieten, spread, with_noise
@@ -57,8 +58,9 @@ def explain(
     chosen = search.tried[key]
     sigma, error = spread(whole, full.aimed)
     told.challenge(search, key)
+    beaten = duels(search, key, full, whole, FULL_STEPS)
     fine = told.finer(chosen, search.shots) if key else np.zeros(0)
-    made = told.claims(search, key, full, told.bootstrap(full, whole, rng), fine, groups)
+    made = told.claims(search, key, full, told.bootstrap(full, whole, rng), fine, groups, beaten)
     lap("intervals")
     tell("confirming on held-out data")
     order = [claim.label for claim in made]
@@ -79,7 +81,7 @@ def explain(
         ),
         gap=gap,
         where=where(search, samples, channels),
-        evidence=told.evidence(search, key),
+        evidence=told.evidence(search, key, beaten),
         rollouts=rollouts,
         effects=tuple(corrected.effects[len(simulator.effects) :]),
         corrected=corrected,
