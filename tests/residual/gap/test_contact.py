@@ -1,5 +1,6 @@
 """Effects are named from walks: another simulator makes the log, sensors are noisy."""
 
+import dataclasses
 import sys
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from scipy.optimize import minimize
 
 from residual.gap import find_gap
 from residual.gap.candidates import candidates
+from residual.gap.contact.duel import duels, excluded
 from residual.gap.contact.exchange import ALIKE, cosines, exchange
 from residual.gap.contact.noise import quieten
 from residual.gap.contact.quadratic import Quadratic, minimise
@@ -90,6 +92,13 @@ def test_what_imitates_an_effect_makes_way_for_it():
     mass, friction = search.tried[0, 1].theta
     assert abs(mass - 0.308) < abs(search.tried[0, 2].theta[0] - 0.308)
     assert friction == pytest.approx(0.03, rel=0.1)
+
+    # As if the windows of the search had left it open: all windows decide.
+    right, wrong = search.tried[0, 1], search.tried[0, 2]
+    search.tried[0, 2] = dataclasses.replace(wrong, loss=right.loss)
+    assert not excluded(search, (0, 2), (0, 1))
+    beaten = duels(search, (0, 1), right, shots, 1)
+    assert beaten == {(0, 2)} and excluded(search, (0, 2), (0, 1), beaten)
 
 
 def test_the_robust_loss_of_a_set_is_its_least():
