@@ -110,13 +110,7 @@ def write_report(results: Results, folder: Path) -> Path:
             "the robot falls.",
             heading="The torso's way",
         ),
-        Figure(
-            updates_figure(results, figures / "updates.png"),
-            "Return on the true Leo after each update, with and without the difference model.",
-            "Mean of the tests on the true Leo. The control has trained as long, without the "
-            "difference model.",
-            heading="Return by update",
-        ),
+        *updates_section(results, figures),
         Figure(
             curves_figure(results, figures / "curves.png"),
             "Return on the training model against simulated steps.",
@@ -181,11 +175,26 @@ def verdict(results: Results) -> Verdict:
     )
 
 
+def updates_section(results: Results, figures: Path) -> list[Section]:
+    """The return per update, if there were any."""
+    if not (by_name(results, "difference") or by_name(results, "control")):
+        return []
+    return [
+        Figure(
+            updates_figure(results, figures / "updates.png"),
+            "Return on the true Leo after each update, with and without the difference model.",
+            "Mean of the tests on the true Leo. The control has trained as long, without the "
+            "difference model.",
+            heading="Return by update",
+        )
+    ]
+
+
 def tiles(results: Results) -> KeyValues:
     """The headline numbers."""
     items: dict[str, Any] = {}
     learnt = last_difference(results)
-    for record in (results["policies"][0], learnt):
+    for record in (results["policies"][0], learnt, *by_name(results, "corrected")):
         if record:
             tests = averaged(record)
             items[f"{policy_name(record)}, distance"] = f"{tests['distance']:.1f} m"
