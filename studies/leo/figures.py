@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 
 from sims.leo import Leo
 from studies.learning.records import Results, by_name, policy_name
-from studies.reporting.figures import draw_lines, new_figure, save_figure, styled
+from studies.reporting.figures import draw_lines, draw_over_time, new_figure, save_figure, styled
 from studies.reporting.media import encode_gif
 
 CONTROL_PERIOD = 0.03
@@ -31,18 +31,15 @@ def torso_figure(rollouts: Mapping[str, Mapping[str, np.ndarray]], path: Path) -
     """Distance, height and pitch over time."""
     figure, axes = new_figure(3, 1, height=6.0, share_x=True)
     data: dict[str, np.ndarray] = {}
+    rows = {}
     for row, label in enumerate(("distance (m)", "height (m)", "pitch (rad)")):
         series = {}
         for name, run in rollouts.items():
             values = run["states"][:, row] - (run["states"][0, row] if row == 0 else 0)
             series[name] = (np.arange(len(values)) * CONTROL_PERIOD, values)
             data[f"{name}, {label}"] = values
-        draw_lines(axes[row, 0], series)
-        axes[row, 0].set_ylabel(label)
-    axes[2, 0].set_xlabel("time (s)")
-    figure.legend(
-        *axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.4
-    )
+        rows[label] = series
+    draw_over_time(figure, axes[:, 0], rows)
     save_figure(figure, path, data)
     return figure
 

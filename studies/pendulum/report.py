@@ -31,7 +31,7 @@ from studies.reporting import (
     Table,
     Verdict,
 )
-from studies.reporting.figures import draw_lines, new_figure, save_figure, styled
+from studies.reporting.figures import draw_over_time, new_figure, save_figure, styled
 from studies.reporting.media import encode_gif
 
 CONTROL_PERIOD = 0.05
@@ -188,12 +188,11 @@ def trajectories(
     steps = round(FILM_SECONDS / CONTROL_PERIOD)
     time = np.arange(steps) * CONTROL_PERIOD
     data: dict[str, np.ndarray] = {"time_s": time}
-    for row, (key, column, label) in enumerate(
-        (
-            ("states", 0, "angle (rad)"),
-            ("states", 1, "rate (rad/s)"),
-            ("actions", 0, "voltage (V)"),
-        )
+    rows = {}
+    for key, column, label in (
+        ("states", 0, "angle (rad)"),
+        ("states", 1, "rate (rad/s)"),
+        ("actions", 0, "voltage (V)"),
     ):
         series = {}
         for name, run in rollouts.items():
@@ -203,12 +202,8 @@ def trajectories(
                 values = values - 2 * np.pi * np.round(values[-1] / (2 * np.pi))
             series[titles[name]] = (time, values)
             data[f"{name}_{label.split()[0]}"] = values
-        draw_lines(axes[row, 0], series)
-        axes[row, 0].set_ylabel(label)
-    axes[2, 0].set_xlabel("time (s)")
-    figure.legend(
-        *axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.4
-    )
+        rows[label] = series
+    draw_over_time(figure, axes[:, 0], rows)
     save_figure(figure, path, data)
     return figure
 

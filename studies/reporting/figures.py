@@ -157,6 +157,21 @@ def draw_lines(
             )  # fmt: skip
 
 
+def draw_over_time(
+    figure: Figure,
+    axes: np.ndarray,
+    rows: Mapping[str, Mapping[str, tuple[ArrayLike, ArrayLike]]],
+) -> None:
+    """Draw curves over time below each other, by their label, with one legend above them."""
+    for axis, (label, series) in zip(axes, rows.items(), strict=True):
+        draw_lines(axis, series)
+        axis.set_ylabel(label)
+    axes[-1].set_xlabel("time (s)")
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.4
+    )
+
+
 @styled()
 def intervals(
     rows: Mapping[str, tuple[float, float, float]],

@@ -13,7 +13,7 @@ from residual.gap.contact.columns import chosen_changes
 from residual.gap.contact.duel import excluded
 from residual.gap.contact.quadratic import minimise
 from residual.gap.contact.refine import Refined, quadratic, refine
-from residual.gap.contact.search import Key, Search
+from residual.gap.contact.search import Key, Search, exchanged
 from residual.gap.contact.shots import Shots
 from residual.gap.contact.student import losses, trimmed_drop, weights
 from residual.gap.result import Blind, Number, Rival
@@ -64,8 +64,8 @@ def finer(found: Refined, shots: Shots) -> Array:
 
 def challenge(search: Search, key: Key, most: int = 2) -> None:
     """Refit what comes near the chosen set with one effect exchanged, ``most`` for each effect."""
-    found, around = search.signatures(key)
-    sets = search.ranked(key, found, around, len(key))
+    _, around = search.signatures(key)
+    sets = search.ranked(key, len(key))
     limit = losses(around.c, around.freedom).sum() * (1 + 2 * search.rules.material)
     near = [p for p in sets if p.loss < limit and p.key not in search.tried]
     for gone in key:
@@ -93,7 +93,6 @@ def claims(
         beaten: Rivals that all windows exclude.
     """
     base = search.tried[key]
-    found, around = search.signatures(key)
     told = []
     for position, number in enumerate(key):
         candidate = search.candidates[number]
@@ -106,15 +105,13 @@ def claims(
             low, high = max(value - half, knob.low), min(value + half, knob.high)
             numbers[knob.field] = Number(value, low, high, knob.unit)
         ties = [
-            search.candidates[other].label
+            search.candidates[swap[1]].label
             for rival in search.tried
-            if len(rival) == len(key) and number not in rival
-            for other in set(rival) - set(key)
-            if len(set(rival) - set(key)) == 1 and not excluded(search, rival, key, beaten)
+            if (swap := exchanged(key, rival))
+            and swap[0] == number
+            and not excluded(search, rival, key, beaten)
         ]
-        without = [
-            p for p in search.ranked(key, found, around, len(key) - 1) if number not in p.key
-        ]
+        without = [p for p in search.ranked(key, len(key) - 1) if number not in p.key]
         gain = min((p.loss for p in without), default=search.tried[()].total) - base.total
         twins = tuple(n for n in groups.get(candidate.label, ()) if n != candidate.label)
         told.append(

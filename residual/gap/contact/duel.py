@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from residual.gap.contact.refine import Refined, level, renew
-from residual.gap.contact.search import Key, Search
+from residual.gap.contact.search import Key, Search, exchanged
 from residual.gap.contact.shots import Shots
 from residual.gap.contact.student import trimmed_drop
 
@@ -31,8 +31,7 @@ def duels(search: Search, key: Key, full: Refined, whole: Shots, steps: int) -> 
     rivals = [
         rival
         for rival in search.tried
-        if len(rival) == len(key) == len(set(rival) & set(key)) + 1
-        and not excluded(search, rival, key)
+        if exchanged(key, rival) and not excluded(search, rival, key)
     ]
     beaten = set()
     for rival in sorted(rivals, key=lambda rival: search.tried[rival].total)[:MOST]:

@@ -46,15 +46,13 @@ def lookalikes(search: Search, current: Key) -> list[Proposal]:
     proposals: dict[Key, Proposal] = {}
     for member in current:
         own = np.flatnonzero((place >= 0) & (owner == member))
-        others = tuple(int(j) for j in np.flatnonzero((place >= 0) & (owner != member)))
+        there, others = search.reduced(current, [i for i in current if i != member])
         likeness = np.where(place < 0, alike[own].max(axis=0), 0.0)
         likest = np.argsort(-likeness)[:RIVALS]
         sets = [(*others, int(j)) for j in likest if likeness[j] > ALIKE]
         if not sets:
             continue
-        gone = np.zeros(len(found))
-        gone[own] = -theta[place[own]]
-        loss, coefficients = minimise(quadratic.moved(gone), sets)
+        loss, coefficients = minimise(there, sets)
         for chosen, c, left in zip(sets, coefficients, loss, strict=True):
             proposal = search.proposal(chosen, c, found, theta, left)
             proposals.setdefault(proposal.key, proposal)

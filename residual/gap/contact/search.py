@@ -8,7 +8,7 @@ are ranked, which costs no simulation, and the best are refitted with all start 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,21 +155,20 @@ class Search:
 
         Each size pays as much as a material effect has to gain.
         """
-        found, quadratic = self.signatures(current)
+        _, quadratic = self.signatures(current)
         now = losses(quadratic.c, quadratic.freedom).sum()
         price = 0.5 * self.rules.material * now
         ranked: dict[Key, Proposal] = {}
         for size in range(1, min(len(current) + 2, self.rules.most) + 1):
-            for proposal in self.ranked(current, found, quadratic, size):
+            for proposal in self.ranked(current, size):
                 if proposal.key not in ranked and proposal.key not in self.tried:
                     ranked[proposal.key] = proposal
         kept = [p for p in ranked.values() if p.loss + price * (len(p.key) - len(current)) < now]
         return sorted(kept, key=lambda p: p.loss + price * len(p.key))
 
-    def ranked(
-        self, current: Key, found: list[Column], quadratic: Quadratic, size: int
-    ) -> list[Proposal]:
+    def ranked(self, current: Key, size: int) -> list[Proposal]:
         """The best sets of one size by the quadratic model around the current set."""
+        found, _ = self.signatures(current)
         theta = self.tried[current].theta
         owner = np.array([column.candidate for column in found])
         place = np.array([column.chosen for column in found])
@@ -178,12 +177,7 @@ class Search:
         for kept in _subsets(current):
             if len(kept) > size:
                 continue
-            gone = np.zeros(len(found))
-            for j in np.flatnonzero(place >= 0):
-                if owner[j] not in kept:
-                    gone[j] = -theta[place[j]]
-            there = quadratic.moved(gone)
-            base = tuple(int(j) for j in np.flatnonzero(place >= 0) if owner[j] in kept)
+            there, base = self.reduced(current, kept)
             fresh = [int(j) for j in np.flatnonzero(place < 0)]
             sets = _grown(there, base, fresh, owner, size - len(kept), self.rules.pairs)
             if not sets:
@@ -195,6 +189,19 @@ class Search:
         for proposal in sorted(proposals, key=lambda p: p.loss):
             best.setdefault(proposal.key, proposal)
         return list(best.values())[:20]
+
+    def reduced(self, current: Key, kept: Collection[int]) -> tuple[Quadratic, tuple[int, ...]]:
+        """Windows around the current set with only some members left in, and their columns."""
+        found, quadratic = self.signatures(current)
+        theta = self.tried[current].theta
+        gone = np.zeros(len(found))
+        base = []
+        for j, column in enumerate(found):
+            if column.chosen >= 0 and column.candidate in kept:
+                base.append(j)
+            elif column.chosen >= 0:
+                gone[j] = -theta[column.chosen]
+        return quadratic.moved(gone), tuple(base)
 
     def proposal(
         self, chosen: tuple[int, ...], coefficients: Array, found: list[Column], theta: Array,
@@ -211,6 +218,12 @@ class Search:
                 values[column.candidate] = column.start(coefficient)
         key = tuple(sorted(values))
         return Proposal(key, np.concatenate([values[i] for i in key]), float(loss))
+
+
+def exchanged(key: Key, rival: Key) -> tuple[int, int] | None:
+    """The member that a rival lacks and what it has in its place; None if more differs."""
+    gone, come = set(key) - set(rival), set(rival) - set(key)
+    return (gone.pop(), come.pop()) if len(gone) == len(come) == 1 else None
 
 
 def _subsets(key: Key) -> list[Key]:
