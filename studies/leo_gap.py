@@ -27,9 +27,9 @@ from policy.evaluate import Rollout
 from sims.leo import Leo, Walking, measure_walk
 from sims.leo.body import clearance
 from sims.simulator import Array, Simulator
+from studies.learning.budget import Budget
 from studies.learning.command import run_command
 from studies.learning.earlier import ReplayRule
-from studies.learning.loop import Budget
 from studies.learning.problem import PolicyTests, Problem
 from studies.learning.settings import build_parser as parser_of
 from studies.learning.steps import visited

@@ -140,6 +140,14 @@ class Arena:
         found = self.tried[key]
         return found.merit + np.log(self.size) * len(found.theta)
 
+    def near_floor(self, key: Key) -> bool:
+        """Whether a set leaves little more than noise."""
+        return self.tried[key].merit < 1.3 * self.size
+
+    def far_off(self, key: Key) -> bool:
+        """Whether what a set leaves is so large that its path is not the measured one."""
+        return self.tried[key].merit > 9 * self.size
+
     def refit(self, base: Fit, sets: dict[Key, list[Array]], most: bool = False) -> None:
         """Refit sets of candidates from start values, those near the best for longer.
 

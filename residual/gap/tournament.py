@@ -9,15 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.arena import Arena, Key
-from residual.gap.signatures import (
-    Gain,
-    Signatures,
-    constrained_gram,
-    gains,
-    pair_gains,
-    project_out,
-    variant_start,
-)
+from residual.gap.proposals import additions, exchanges, lookalikes, other_pairs
+from residual.gap.signatures import gains
 
 Array = NDArray[np.float64]
 
@@ -40,7 +33,7 @@ def choose(arena: Arena, known: dict[Key, Array]) -> Key:
         arena.calibrate(found)
         singles = settings.singles if turn == 0 else 4
         sets = additions(arena, current, found, singles)
-        if far_off(arena, current):
+        if arena.far_off(current):
             along = arena.signatures_of_path(current)
             for key, starts in additions(arena, current, along, singles).items():
                 sets.setdefault(key, []).extend(starts)
@@ -76,7 +69,7 @@ def complete(arena: Arena, key: Key) -> Key:
         arena: All runs, where the set and its rivals have been refitted.
         key: The chosen set.
     """
-    if not near_floor(arena, key):
+    if not arena.near_floor(key):
         return key
     found = arena.signatures(key)
     arena.calibrate(found)
@@ -89,67 +82,13 @@ def challenged(arena: Arena, current: Key) -> Key:
     """The chosen set, or a pair that shares no member with it and does better.
 
     Exchanges replace one member at a time, so a pair is also measured against all pairs of
-    others: those that come close in the linear picture are refitted. They stay rivals if they
-    do nearly as well.
+    others. They stay rivals if they do nearly as well.
     """
     arena.refit(arena.tried[current], lookalikes(arena, current))
-    found, now = arena.signatures(current), arena.tried[current]
-    if len(current) != 2 or not near_floor(arena, current):
+    if len(current) != 2 or not arena.near_floor(current):
         return current
-    # As if the chosen pair were not there.
-    residual = found.plain_residual + found.chosen @ now.theta
-    whole = float(residual @ residual)
-    chosen = whole - float((now.weights * now.costs).sum())
-    sets: dict[Key, list[Array]] = {}
-    for gain in pair_gains(found, 40, residual, found.plain, current):
-        if len(sets) == arena.settings.swaps or gain.value < 0.95 * chosen - 3 * arena.threshold:
-            break
-        numbers = [found.variants[i].candidate for i in gain.variants]
-        if len({arena.candidates[n].label for n in numbers}) < 2:
-            continue
-        key, theta = arena.merged((), list(zip(numbers, gain.values, strict=True)))
-        if key not in arena.tried:
-            sets.setdefault(key, []).append(theta)
-    arena.refit(now, sets)
-    best = min((k for k in arena.tried if len(k) == len(current)), key=arena.score)
-    return best
-
-
-def lookalikes(arena: Arena, current: Key, most: int = 3) -> dict[Key, list[Array]]:
-    """Sets in which one member is replaced by an effect that moves nearly alike.
-
-    Near in the sense of the verdict (see ``claims.excluded``), with room for the linear picture.
-
-    Args:
-        arena: Where the set won.
-        current: The set.
-        most: Replacements tried for each member.
-    """
-    found, now = arena.signatures(current), arena.tried[current]
-    cost = float((now.weights * now.costs).sum())
-    slack = 3 * arena.threshold if near_floor(arena, current) else 2 * cost
-    owners = np.array([current[i] for i in now.model.owner])
-    sets: dict[Key, list[Array]] = {}
-    for drop in current:
-        gone = owners == drop
-        stay = found.chosen[:, ~gone]
-        matrix = project_out(stay, found.plain)
-        residual = found.plain_residual + found.chosen[:, gone] @ now.theta[gone]
-        residual = project_out(stay, residual[:, None])[:, 0]
-        own = float(residual @ residual) - cost
-        fresh: dict[Key, Array] = {}
-        for gain in gains(found, residual, matrix):
-            number = found.variants[gain.variants[0]].candidate
-            if number in current:
-                continue
-            if gain.value < own - slack or len(fresh) == most:
-                break
-            key, theta = arena.merged(current, [(number, gain.values[0])], drop=(drop,))
-            if key not in arena.tried:
-                fresh.setdefault(key, theta)
-        for key, theta in fresh.items():
-            sets.setdefault(key, []).append(theta)
-    return sets
+    arena.refit(arena.tried[current], other_pairs(arena, current))
+    return min((k for k in arena.tried if len(k) == len(current)), key=arena.score)
 
 
 def worth(arena: Arena, smaller: Key, larger: Key) -> bool:
@@ -159,134 +98,8 @@ def worth(arena: Arena, smaller: Key, larger: Key) -> bool:
     takes a good part of the squared error is worth a name.
     """
     fall = arena.score(smaller) - arena.score(larger)
-    part = 0.0 if near_floor(arena, larger) else arena.settings.part * arena.tried[smaller].merit
+    part = 0.0 if arena.near_floor(larger) else arena.settings.part * arena.tried[smaller].merit
     return fall > max(arena.threshold, part)
-
-
-def near_floor(arena: Arena, key: Key) -> bool:
-    """Whether a set leaves little more than noise."""
-    return arena.tried[key].merit < 1.3 * arena.size
-
-
-def far_off(arena: Arena, key: Key) -> bool:
-    """Whether what a set leaves is so large that its path is not the measured one."""
-    return arena.tried[key].merit > 9 * arena.size
-
-
-def additions(
-    arena: Arena, current: Key, found: Signatures, singles: int
-) -> dict[Key, list[Array]]:
-    """Sets that add one or two candidates to the current one, with start values."""
-    settings = arena.settings
-    sets: dict[Key, list[Array]] = {}
-    taken = {arena.candidates[i].label for i in current}
-
-    def fresh(number: int) -> bool:
-        return arena.candidates[number].label not in taken
-
-    ranked = [g for g in gains(found) if fresh(found.variants[g.variants[0]].candidate)]
-    if near_floor(arena, current):
-        # So near the noise the linear picture holds: what promises nothing need not be tried.
-        ranked = [g for g in ranked if g.value > 0.5 * arena.threshold]
-    entered: dict[int, list[Gain]] = {}
-    for gain in ranked:
-        number = found.variants[gain.variants[0]].candidate
-        if number in entered:
-            if len(entered[number]) < 2 and arena.candidates[number].rough:
-                entered[number].append(gain)
-        elif len(entered) < singles and gain.value > 0:
-            entered[number] = [gain]
-    if not entered:
-        return sets
-    winner = found.variants[ranked[0].variants[0]]
-    lead = found.matrix[:, winner.columns[0]]
-    for gain in ranked:
-        variant = found.variants[gain.variants[0]]
-        if variant.candidate in entered or len(entered) >= singles + 2:
-            continue
-        column = found.matrix[:, variant.columns[0]]
-        size = np.sqrt((lead @ lead) * (column @ column))
-        if size > 0 and abs(lead @ column) > 0.9 * size:
-            entered[variant.candidate] = [gain]
-    for number, options in entered.items():
-        for gain in options:
-            key, theta = arena.merged(current, [(number, gain.values[0])])
-            sets.setdefault(key, []).append(theta)
-    if len(current) + 2 <= settings.most:
-        kept = 0
-        lead_value = ranked[0].value
-        for gain in pair_gains(found):
-            numbers = [found.variants[i].candidate for i in gain.variants]
-            if kept == settings.pairs or gain.value < lead_value + arena.threshold:
-                break
-            labels = {arena.candidates[n].label for n in numbers}
-            if len(labels) < 2 or not all(fresh(n) for n in numbers):
-                continue
-            key, theta = arena.merged(current, list(zip(numbers, gain.values, strict=True)))
-            if key not in sets:
-                sets[key] = [theta]
-                kept += 1
-    return sets
-
-
-def exchanges(arena: Arena, current: Key, found: Signatures) -> dict[Key, list[Array]]:
-    """Sets in which one chosen effect is replaced by another or by two others."""
-    fit_now = arena.tried[current]
-    best: list[tuple[float, Key, Array]] = []
-    for drop in current:
-        owners = np.array([current[i] for i in fit_now.model.owner])
-        gone = owners == drop
-        residual = found.plain_residual + found.chosen[:, gone] @ fit_now.theta[gone]
-        stay = found.chosen[:, ~gone]
-        matrix = project_out(stay, found.plain)
-        residual = project_out(stay, residual[:, None])[:, 0]
-        gram, right = matrix.T @ matrix, matrix.T @ residual
-        singles = []
-        for variant in found.variants:
-            if variant.candidate in current:
-                continue
-            columns = list(variant.columns)
-            value, c = constrained_gram(
-                gram[np.ix_(columns, columns)], right[columns], variant.trial.one_sided
-            )
-            singles.append((value, variant, c))
-        singles.sort(key=lambda item: -item[0])
-        for value, variant, c in singles[:4]:
-            key, theta = arena.merged(
-                current, [(variant.candidate, variant_start(variant, c))], drop=(drop,)
-            )
-            best.append((value - float(residual @ residual), key, theta))
-        if len(current) < arena.settings.most:
-            for _, first, _ in singles[:6]:
-                for _, second, _ in singles[:12]:
-                    if first.candidate >= second.candidate:
-                        continue
-                    columns = list(first.columns + second.columns)
-                    sides = np.append(first.trial.one_sided, second.trial.one_sided)
-                    value, c = constrained_gram(
-                        gram[np.ix_(columns, columns)], right[columns], sides
-                    )
-                    k = len(first.columns)
-                    key, theta = arena.merged(
-                        current,
-                        [
-                            (first.candidate, variant_start(first, c[:k])),
-                            (second.candidate, variant_start(second, c[k:])),
-                        ],
-                        drop=(drop,),
-                    )
-                    best.append((value - float(residual @ residual) - arena.threshold, key, theta))
-    best.sort(key=lambda item: -item[0])
-    sets: dict[Key, list[Array]] = {}
-    limit = -np.inf
-    if near_floor(arena, current):
-        limit = -float((fit_now.weights * fit_now.costs).sum()) - 3 * arena.threshold
-    for value, key, theta in best:
-        if len(sets) == arena.settings.swaps or value < limit:
-            break
-        if key and key not in arena.tried:
-            sets.setdefault(key, [theta])
-    return sets
 
 
 def wide_check(arena: Arena, best: Key) -> Key:
@@ -332,7 +145,7 @@ def rivals(arena: Arena, key: Key, reach: float = 100.0) -> list[Key]:
     if not key:
         return []
     best = arena.score(key)
-    if not near_floor(arena, key):
+    if not arena.near_floor(key):
         reach = max(reach, 1.5 * arena.tried[key].merit)
     near: list[Key] = []
     told = {tuple(arena.candidates[i].label for i in key)}

@@ -16,11 +16,11 @@ from residual.gap.contact.workflow import explain
 from residual.gap.holdout import split
 from residual.gap.measure import measure, prove
 from residual.gap.model import Model
+from residual.gap.proposals import lookalikes
 from residual.gap.quality import kinematics
 from residual.gap.result import GapResult
 from residual.gap.samples import Hold, Samples
 from residual.gap.search import search
-from residual.gap.tournament import lookalikes
 from residual.gap.verdicts import verdicts
 from residual.gap.where import locate
 from residual.gap.workers import workers

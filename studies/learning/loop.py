@@ -18,70 +18,22 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from sklearn.base import BaseEstimator
 
 from policy.config import DDPGConfig
+from studies.learning.budget import Budget
 from studies.learning.earlier import Earlier, ReplayRule
+from studies.learning.outcome import Outcome, policy_record, record_key
 from studies.learning.problem import Problem
 from studies.learning.seeds import describe, seeded
 from studies.learning.stages import Stages
 from studies.learning.steps import LearningSteps
 from studies.running.files import read_json
 from studies.running.progress import Progress
-
-Record = dict[str, Any]
-
-
-@dataclasses.dataclass(frozen=True)
-class Budget:
-    """How much is sampled and trained.
-
-    Args:
-        true_samples: True transitions collected before each update of the difference model.
-        iterations: Updates of the difference model.
-        idealised_steps: Simulated steps that train the idealised policy.
-        difference_steps: Simulated steps on the corrected simulator after each update.
-        true_steps: True steps that train the reference policy on the true system; 0 skips it.
-        baseline_steps: True steps given to the cold and to the warm start; 0 skips them.
-        control_steps: Simulated steps of the control for each update; 0 skips it.
-        corrected_steps: Simulated steps on the simulator that was corrected by name, if there is
-            one.
-    """
-
-    true_samples: int = 3750
-    iterations: int = 2
-    idealised_steps: int = 20_000
-    difference_steps: int = 20_000
-    true_steps: int = 0
-    baseline_steps: int = 0
-    control_steps: int = 0
-    corrected_steps: int = 20_000
-
-    def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            least = 2 if field.name == "true_samples" else 0
-            if (value := getattr(self, field.name)) < least:
-                raise ValueError(f"{field.name} is {value}, expected at least {least}")
-
-
-@dataclasses.dataclass(frozen=True)
-class Outcome:
-    """What the loop leaves behind.
-
-    Attributes:
-        policies: One record per policy, in the order learnt (docs/results.md).
-        accuracy: One record per update of the difference model.
-        folders: Folder of each policy, by a name such as ``"idealised"``, ``"difference-1"``.
-        models: Folder of each difference model, one per update.
-    """
-
-    policies: list[Record]
-    accuracy: list[Record]
-    folders: dict[str, Path]
-    models: list[Path]
 
 
 def learn_by_difference(
@@ -116,117 +68,147 @@ def learn_by_difference(
     Returns:
         Records, and the folders that hold the policies and the models.
     """
-    estimator = seeded(estimator, seed)
-    steps = LearningSteps(problem, estimator, ddpg, seed, progress, replay)
-    common = {
-        "problem": problem.description,
-        "ddpg": dataclasses.asdict(ddpg),
-        "seed": seed,
-        "replay": replay,
-    }
-    named = describe(estimator)
-
-    idealised = stages.run(
-        "idealised",
-        {**common, "steps": budget.idealised_steps},
-        lambda folder: steps.train_idealised(folder, budget.idealised_steps),
-    )
-    policies = [steps.record(idealised, "idealised")]
-    folders = {"idealised": idealised}
-
-    models: list[Path] = []
-    samples: list[Path] = []
-    accuracy: list[Record] = []
-    policy, earlier = idealised, Earlier.begin(idealised, replay)
-    for iteration in range(1, budget.iterations + 1):
-        collected = stages.run(
-            "collect",
-            {
-                **common,
-                "policy": earlier.policy,
-                "samples": budget.true_samples,
-                "round": iteration,
-            },
-            lambda folder: steps.collect(folder, earlier.policy, budget.true_samples, iteration),  # noqa: B023
-        )
-        samples.append(collected)
-        model = stages.run(
-            "fit",
-            {"problem": problem.description, "estimator": named, "samples": list(samples)},
-            lambda folder: steps.fit(folder, samples),
-        )
-        models.append(model)
-        policy = stages.run(
-            "train",
-            {
-                **common,
-                **earlier.settings(),
-                "model": model,
-                "steps": budget.difference_steps,
-                **({"caution": caution} if caution else {}),
-            },
-            lambda folder: steps.train_corrected(
-                folder,
-                model,  # noqa: B023
-                earlier,  # noqa: B023
-                budget.difference_steps,
-                caution,
-            ),
-        )
-        earlier = earlier.then(policy)
-        measured = stages.run(
-            "measure",
-            {"model": model, "policy": policy, "seed": seed},
-            lambda folder: steps.measure(folder, model, policy),  # noqa: B023
-        )
-        folders[f"difference-{iteration}"] = policy
-        seen = {"iteration": iteration, "true_samples": iteration * budget.true_samples}
-        policies.append(steps.record(policy, "difference") | seen)
-        errors = read_json(measured / "accuracy.json")
-        accuracy.append(seen | errors | read_json(model / "fit.json"))
-
-    earlier = Earlier.begin(idealised, replay)
-    for iteration in range(1, budget.iterations + 1 if budget.control_steps else 1):
-        policy = stages.run(
-            "control",
-            {**common, **earlier.settings(), "round": iteration, "steps": budget.control_steps},
-            lambda folder: steps.train_control(folder, earlier, budget.control_steps),  # noqa: B023
-        )
-        earlier = earlier.then(policy)
-        folders[f"control-{iteration}"] = policy
-        policies.append(steps.record(policy, "control") | {"iteration": iteration})
-
+    steps = LearningSteps(problem, seeded(estimator, seed), ddpg, seed, progress, replay)
+    loop = Loop(steps, budget, stages)
+    loop.idealised()
+    loop.updates(caution)
+    loop.control()
     if corrected is not None:
-        earlier = Earlier.begin(idealised, replay)
-        folders["corrected"] = stages.run(
-            "corrected",
-            {
-                **common,
-                **earlier.settings(),
-                "corrected": corrected,
-                "steps": budget.corrected_steps,
-            },
-            lambda folder: steps.train_named(folder, corrected, earlier, budget.corrected_steps),
-        )
-        policies.append(steps.record(folders["corrected"], "corrected"))
+        loop.corrected(corrected)
+    loop.on_the_true_system()
+    return loop.outcome
 
-    # The reference and the cold start are one experiment, read at two budgets.
-    if longest := max(budget.true_steps, budget.baseline_steps):
-        cold = stages.run(
-            "cold",
-            {**common, "steps": longest},
-            lambda folder: steps.train_on_true(folder, None, longest),
+
+class Loop:
+    """The loop in its stages.
+
+    Attributes:
+        outcome: What they have left so far.
+    """
+
+    def __init__(self, steps: LearningSteps, budget: Budget, stages: Stages) -> None:
+        self.steps, self.budget, self.stages = steps, budget, stages
+        self.outcome = Outcome([], [], {}, [])
+        # What every training depends on.
+        self._common = {
+            "problem": steps.problem.description,
+            "ddpg": dataclasses.asdict(steps.ddpg),
+            "seed": steps.seed,
+            "replay": steps.replay,
+        }
+
+    def idealised(self) -> None:
+        """The policy that all others begin with."""
+        count = self.budget.idealised_steps
+        folder = self.stages.run(
+            "idealised",
+            {**self._common, "steps": count},
+            lambda folder: self.steps.train_idealised(folder, count),
         )
-        if budget.true_steps:
-            policies.append(steps.record(cold, "true", budget.true_steps))
-            folders["true"] = cold
-        if budget.baseline_steps:
-            policies.append(steps.record(cold, "cold", budget.baseline_steps))
-    if budget.baseline_steps:
-        folders["warm"] = stages.run(
-            "warm",
-            {**common, "policy": idealised, "steps": budget.baseline_steps},
-            lambda folder: steps.train_on_true(folder, idealised, budget.baseline_steps),
+        self._keep(folder, "idealised")
+
+    def updates(self, caution: float) -> None:
+        """Collect, fit, train and measure, as often as the budget says."""
+        earlier, samples = self._begin(), list[Path]()
+        for iteration in range(1, self.budget.iterations + 1):
+            samples.append(self._collected(earlier.policy, iteration))
+            model = self._fitted(samples)
+            policy = self._trained(model, earlier, caution)
+            accuracy = self.stages.run(
+                "measure",
+                {"model": model, "policy": policy, "seed": self.steps.seed},
+                partial(self.steps.measure, model=model, policy=policy),
+            )
+            seen = {"iteration": iteration, "true_samples": iteration * self.budget.true_samples}
+            self._keep(policy, "difference", **seen)
+            self.outcome.models.append(model)
+            self.outcome.accuracy.append(
+                seen | read_json(accuracy / "accuracy.json") | read_json(model / "fit.json")
+            )
+            earlier = earlier.then(policy)
+
+    def control(self) -> None:
+        """As much training after each update, on the idealised simulator as it is."""
+        earlier, count = self._begin(), self.budget.control_steps
+        for iteration in range(1, self.budget.iterations + 1 if count else 1):
+            policy = self.stages.run(
+                "control",
+                {**self._common, **earlier.settings(), "round": iteration, "steps": count},
+                partial(self.steps.train_control, earlier=earlier, steps=count),
+            )
+            self._keep(policy, "control", iteration=iteration)
+            earlier = earlier.then(policy)
+
+    def corrected(self, settings: Mapping[str, Any]) -> None:
+        """A policy that learns on a simulator that was corrected by name."""
+        earlier, count = self._begin(), self.budget.corrected_steps
+        policy = self.stages.run(
+            "corrected",
+            {**self._common, **earlier.settings(), "corrected": settings, "steps": count},
+            lambda folder: self.steps.train_named(folder, settings, earlier, count),
         )
-        policies.append(steps.record(folders["warm"], "warm", budget.baseline_steps))
-    return Outcome(policies, accuracy, folders, models)
+        self._keep(policy, "corrected")
+
+    def on_the_true_system(self) -> None:
+        """The reference and the baselines."""
+        reference, baseline = self.budget.true_steps, self.budget.baseline_steps
+        # The reference and the cold start are one experiment, read at two budgets.
+        if longest := max(reference, baseline):
+            cold = self.stages.run(
+                "cold",
+                {**self._common, "steps": longest},
+                lambda folder: self.steps.train_on_true(folder, None, longest),
+            )
+            if reference:
+                self.outcome.policies.append(policy_record(cold, "true", reference))
+                self.outcome.folders["true"] = cold
+            if baseline:
+                self.outcome.policies.append(policy_record(cold, "cold", baseline))
+        if baseline:
+            start = self.outcome.folders["idealised"]
+            warm = self.stages.run(
+                "warm",
+                {**self._common, "policy": start, "steps": baseline},
+                lambda folder: self.steps.train_on_true(folder, start, baseline),
+            )
+            self.outcome.policies.append(policy_record(warm, "warm", baseline))
+            self.outcome.folders["warm"] = warm
+
+    def _collected(self, policy: Path, iteration: int) -> Path:
+        count = self.budget.true_samples
+        return self.stages.run(
+            "collect",
+            {**self._common, "policy": policy, "samples": count, "round": iteration},
+            lambda folder: self.steps.collect(folder, policy, count, iteration),
+        )
+
+    def _fitted(self, samples: list[Path]) -> Path:
+        return self.stages.run(
+            "fit",
+            {
+                "problem": self.steps.problem.description,
+                "estimator": describe(self.steps.estimator),
+                "samples": list(samples),
+            },
+            lambda folder: self.steps.fit(folder, samples),
+        )
+
+    def _trained(self, model: Path, earlier: Earlier, caution: float) -> Path:
+        count = self.budget.difference_steps
+        settings = {**self._common, **earlier.settings(), "model": model, "steps": count}
+        if caution:
+            settings["caution"] = caution
+        return self.stages.run(
+            "train",
+            settings,
+            lambda folder: self.steps.train_corrected(folder, model, earlier, count, caution),
+        )
+
+    def _begin(self) -> Earlier:
+        return Earlier.begin(self.outcome.folders["idealised"], self.steps.replay)
+
+    def _keep(self, folder: Path, name: str, **more: int) -> None:
+        """Record a policy that was learnt on a simulator."""
+        record = policy_record(folder, name) | more
+        self.outcome.policies.append(record)
+        self.outcome.folders[record_key(record)] = folder

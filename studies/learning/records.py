@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from studies.learning.outcome import record_key
 from studies.reporting import Code, KeyValues, Section, Table
 
 Results = Mapping[str, Any]
@@ -28,12 +29,6 @@ POLICY_WORDS = {
 def policy_name(record: Mapping[str, Any]) -> str:
     """A policy in words."""
     return POLICY_WORDS[record["name"]].format(**record)
-
-
-def record_key(record: Mapping[str, Any]) -> str:
-    """Name of a policy's files."""
-    name = record["name"]
-    return f"{name}-{record['iteration']}" if name in ("difference", "control") else name
 
 
 def load_rollout(path: Path) -> dict[str, np.ndarray]:

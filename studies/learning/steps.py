@@ -38,7 +38,7 @@ from studies.learning.earlier import Earlier, ReplayRule
 from studies.learning.problem import Problem
 from studies.learning.seeds import derived_seed
 from studies.learning.simulated import FILE, Recorder, recorded, remember
-from studies.running.files import atomic_write_json, read_json
+from studies.running.files import atomic_write_json
 from studies.running.progress import Progress
 
 # Policies learnt from nothing begin with random actions, the baselines too.
@@ -178,41 +178,6 @@ class LearningSteps:
             return CorrectedSimulator(simulator, load(saved, simulator))
         data = Transitions.load(model / "transitions.npz")
         return CorrectedSimulator(simulator, DifferenceModel(self.estimator, simulator).fit(data))
-
-    def record(self, folder: Path, name: str, within: int | None = None) -> dict[str, Any]:
-        """The record of a policy for ``results.json``.
-
-        Args:
-            folder: Of the policy.
-            name: ``"idealised"``, ``"difference"``, ``"control"``, ``"corrected"``, ``"true"``,
-                ``"cold"`` or ``"warm"``.
-            within: For policies learnt on the true system: read the experiment as if it had
-                ended after so many true samples.
-        """
-        summary = read_json(folder / "summary.json")
-        curve = read_json(folder / "curve.json")
-        if within is not None:
-            curve = [point for point in curve if point["step"] <= within]
-        common = {
-            "name": name,
-            "iteration": 0,
-            "true_samples": within or 0,
-            "curve": [[point["step"], point["deterministic"]] for point in curve],
-        }
-        if within is None:
-            return common | summary
-        best = max(curve, key=lambda point: point["score"])["deterministic"]
-        share = within / summary["simulated_steps"]
-        # At the full length the policy itself is there, and was tested as all others.
-        whole = {k: summary[k] for k in ("return_true", "tests") if k in summary and share == 1}
-        return {
-            **common,
-            "simulated_steps": 0,
-            "return_true": best,
-            **whole,
-            "return_model": best,
-            "seconds": summary["seconds"] * share,
-        }
 
     def _train(
         self,

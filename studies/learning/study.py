@@ -17,8 +17,8 @@ from sklearn.base import BaseEstimator
 from policy.config import DDPGConfig
 from residual import DropoutNet
 from sims.simulator import Simulator
+from studies.learning.budget import Budget
 from studies.learning.earlier import ReplayRule
-from studies.learning.loop import Budget
 from studies.learning.problem import Problem
 
 Config = Mapping[str, Any]

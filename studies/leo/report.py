@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from studies.learning.outcome import record_key
 from studies.learning.records import (
     Results,
     accuracy_line,
@@ -17,7 +18,6 @@ from studies.learning.records import (
     policies_section,
     policy_name,
     provenance,
-    record_key,
 )
 from studies.leo.figures import (
     CONTROL_PERIOD,

@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
 from sims.render import PendulumRenderer
+from studies.learning.outcome import record_key
 from studies.learning.records import (
     Results,
     accuracy_line,
@@ -19,7 +20,6 @@ from studies.learning.records import (
     policies_section,
     policy_name,
     provenance,
-    record_key,
 )
 from studies.reporting import (
     Animation,

@@ -8,7 +8,8 @@ from policy.ddpg import DDPG
 from residual import Linear
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
-from studies.learning.loop import Budget, learn_by_difference
+from studies.learning.budget import Budget
+from studies.learning.loop import learn_by_difference
 from studies.learning.problem import PolicyTests, Problem
 from studies.learning.simulated import FILE
 from studies.learning.stages import Stages
