@@ -132,7 +132,8 @@ def run(
         raise ValueError(f"--output {output} is a file, expected a folder")
     data = read(simulator, chosen.logs, study.columns)
     rows = sum(len(run.times) for run in data.trajectories)
-    tell(f"{len(data.trajectories)} trajectories, {rows} samples")
+    count = len(data.trajectories)
+    tell(f"{count} {'trajectory' if count == 1 else 'trajectories'}, {rows} samples")
     result = find_gap(
         simulator,
         data.trajectories,

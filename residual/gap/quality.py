@@ -14,6 +14,40 @@ from sims.host import HostSimulator
 Array = NDArray[np.float64]
 
 
+# No log says much of a system of which it has one sample in so many control periods.
+_SLOWEST = 100.0
+
+
+def check_usable(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> None:
+    """Refuse logs from which nothing can be found.
+
+    Args:
+        simulator: Gives the control period and the channels.
+        trajectories: Measured runs.
+
+    Raises:
+        ValueError: Samples are so rare that their times must be in another unit than s, or a
+            system that strikes the ground was logged without one of its positions.
+    """
+    for run in trajectories:
+        if len(run.durations) and run.durations.min() > _SLOWEST * simulator.dt:
+            period = float(np.median(run.durations))
+            raise ValueError(
+                f"{run.name}: a sample every {period:.4g} s, {period / simulator.dt:.0f} control "
+                f"periods of {simulator.name}: if the times are in ms, set columns.time to "
+                "{column: time, unit: ms}"
+            )
+    if not simulator.has_contacts:
+        return
+    seen = np.any([np.isfinite(run.states).any(axis=0) for run in trajectories], axis=0)
+    for channel, logged in zip(simulator.physical_channels, seen, strict=True):
+        if channel.kind != "rate" and not logged:
+            raise ValueError(
+                f"{trajectories[0].name}: the channel {channel.name!r} was not logged; of a system "
+                f"that strikes the ground, as {simulator.name} does, every position is needed"
+            )
+
+
 def kinematics(
     simulator: HostSimulator, trajectories: Sequence[Trajectory]
 ) -> tuple[list[Trajectory], list[str]]:

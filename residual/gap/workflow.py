@@ -17,7 +17,7 @@ from residual.gap.holdout import split
 from residual.gap.measure import measure, prove
 from residual.gap.model import Model
 from residual.gap.proposals import lookalikes
-from residual.gap.quality import kinematics
+from residual.gap.quality import check_usable, kinematics
 from residual.gap.result import GapResult
 from residual.gap.samples import Hold, Samples
 from residual.gap.search import search
@@ -72,7 +72,8 @@ def find_gap(
         The verdicts and everything behind them.
 
     Raises:
-        ValueError: There are no trajectories, or nothing was measured.
+        ValueError: There are no trajectories, nothing was measured, samples are too rare, or a
+            position of a system that strikes the ground was not measured.
     """
     offered = tuple(library(simulator) if effects is None else effects)
     if measured_input:
@@ -97,6 +98,7 @@ def _find(
     ceiling: bool, settings: Settings, tell: Callable[[str], None],
 ) -> GapResult:  # fmt: skip
     clock = Clock()
+    check_usable(simulator, trajectories)
     trajectories, quality = kinematics(simulator, trajectories)
     if len(trajectories) == 1:
         quality.append(

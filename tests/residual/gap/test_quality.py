@@ -1,10 +1,13 @@
 """Findings about the data before any physics."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from residual.gap.quality import kinematics
+from residual.gap.quality import check_usable, kinematics
 from residual.trajectories import Trajectory
+from sims.leo import Leo
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
 
@@ -35,3 +38,21 @@ def test_noise_in_the_rate_is_not_taken_for_a_smaller_scale():
     # A wide dead zone leaves little motion, so most of the measured rate is noise.
     logs = make_logs(Truth(dead_zone=0.58), 4, "weak", "A", 15)
     assert kinematics(PendulumEquation(), logs) == (logs, [])
+
+
+def test_times_in_ms_are_refused():
+    (run,) = swings(1.0)
+    check_usable(PendulumEquation(), [run])
+    slow = dataclasses.replace(run, times=1000 * run.times)
+    with pytest.raises(ValueError, match=r"run: a sample every 10 s, .*unit: ms"):
+        check_usable(PendulumEquation(), [slow])
+
+
+def test_a_walk_without_one_encoder_is_refused():
+    states = np.full((20, 18), np.nan)
+    states[:, :9] = 0.0
+    walk = Trajectory("walk", 0.03 * np.arange(20), states, np.zeros((19, 6)))
+    check_usable(Leo(), [walk])
+    states[:, 5] = np.nan
+    with pytest.raises(ValueError, match=r"walk: .*'left_knee' was not logged"):
+        check_usable(Leo(), [walk])
