@@ -82,7 +82,8 @@ def rollout(result: GapResult, shown: Rollout, path: Path) -> Drawing:
         axis.plot(time, after, color=BLUE, label=own if first else None)
         axis.plot(time, seen, "o", color=INK, markersize=3 if len(time) < 80 else 1.6,
                   label="measured" if first else None)  # fmt: skip
-        axis.set_ylabel(name + (f" ({unit})" if unit else ""))
+        between = "\n" if len(name) > 10 else " "  # a panel is as high as some twenty letters
+        axis.set_ylabel(name + (f"{between}({unit})" if unit else ""))
         # A nominal forecast that runs away must not flatten all else.
         good = seen[np.isfinite(seen)]
         if len(good):
