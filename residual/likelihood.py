@@ -15,7 +15,7 @@ BOUNDS = {"lengthscale": (1e-2, 1e3), "outputscale": (1e-4, 1e4), "noise": (1e-1
 
 
 def maximise_likelihood(
-    X: Array, y: Array, kernel: str, max_iter: int
+    X: Array, y: Array, kernel: str, max_iter: int, least_noise: float = BOUNDS["noise"][0]
 ) -> tuple[Array, float, float, int]:
     """Length scales, signal and noise variance of largest marginal likelihood, and iterations.
 
@@ -24,6 +24,7 @@ def maximise_likelihood(
         y: one standardised target, shape (n,).
         kernel: ``"rbf"`` or ``"matern"``.
         max_iter: Most iterations of L-BFGS.
+        least_noise: Lower bound of the noise variance.
     """
     import torch
 
@@ -60,13 +61,14 @@ def maximise_likelihood(
     process = Process().double()
     process.kernel.base_kernel.lengthscale = X.shape[1] ** 0.5
     process.kernel.outputscale = 1.0
-    process.likelihood.noise = 1e-2
+    process.likelihood.noise = max(1e-2, least_noise)
     process.train()
     marginal = gpytorch.mlls.ExactMarginalLogLikelihood(process.likelihood, process)
     parameters = dict(process.named_parameters())
     sizes = [parameter.numel() for parameter in parameters.values()]
+    limits = {**BOUNDS, "noise": (least_noise, BOUNDS["noise"][1])}
     bounds = [
-        tuple(np.log(BOUNDS[name.rsplit("raw_", 1)[1]]))
+        tuple(np.log(limits[name.rsplit("raw_", 1)[1]]))
         for name, size in zip(parameters, sizes, strict=True)
         for _ in range(size)
     ]

@@ -116,3 +116,29 @@ def test_a_failed_factor_is_repaired_and_targets_may_be_constant():
     y = np.stack([np.sin(X[:, 0]), np.zeros(200)], axis=1)
     mean, std = GaussianProcess(random_state=0).fit(X, y).predict(X, return_std=True)
     assert np.allclose(mean, y, atol=1e-3) and np.isfinite(std).all()
+
+
+def jumping(seed, share, rows=1600, inputs=12):
+    """Inputs, a smooth function of two of them, and that with jumps of some rows, standardised."""
+    rng = np.random.default_rng(seed)
+    X = rng.normal(size=(rows, inputs))
+    smooth = X[:, 0] + 0.5 * np.sin(2 * X[:, 1])
+    y = smooth + (rng.random(rows) < share) * rng.normal(0, 8, rows)
+    return X, smooth, (y - y.mean()) / y.std()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_jumps_do_not_hide_what_is_smooth(seed):
+    X, smooth, y = jumping(seed, 0.05)
+    model = GaussianProcess(hyper_points=300, random_state=0).fit(X[:1000], y[:1000])
+    assert np.corrcoef(model.predict(X[1000:]), smooth[1000:])[0, 1] > 0.9
+
+
+def test_what_cannot_be_predicted_is_noise():
+    X, _, _ = jumping(0, 0.0)
+    y = np.random.default_rng(5).standard_t(1.3, len(X))
+    y = (y - y.mean()) / y.std()
+    model = GaussianProcess(hyper_points=300, random_state=0).fit(X[:1000], y[:1000])
+    mean, std = model.predict(X[1000:], return_std=True)
+    assert mean.std() < 0.1
+    np.testing.assert_allclose(std, y[:1000].std(), rtol=0.05)
