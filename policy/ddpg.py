@@ -294,12 +294,7 @@ class DDPG:
             FileNotFoundError: There is no such file.
             ValueError: The file holds something else.
         """
-        arrays, metadata = read_arrays(path)
-        if metadata.get("format") != FORMAT:
-            raise ValueError(
-                f"{path} has format {metadata.get('format')!r}, expected {FORMAT!r}: "
-                "a policy alone is read by MlpPolicy.load"
-            )
+        arrays, metadata = read_arrays(path, FORMAT)
         low, high = arrays.pop("low"), arrays.pop("high")
         rows = arrays.pop("replay", None)
         agent = cls(

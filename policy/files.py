@@ -22,12 +22,17 @@ def write_whole(path: str | Path, content: bytes) -> None:
         draft.unlink(missing_ok=True)
 
 
-def read_arrays(path: str | Path) -> tuple[dict[str, Any], dict[str, Any]]:
+def read_arrays(path: str | Path, form: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Read a safetensors file: arrays by name, and the metadata, each value JSON.
+
+    Args:
+        path: The file.
+        form: What its metadata has to say under ``format``.
 
     Raises:
         FileNotFoundError: There is no such file.
-        ValueError: It is not a safetensors file, or its metadata is not JSON.
+        ValueError: It is not a safetensors file, its metadata is not JSON, or it holds something
+            else.
     """
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path} is not a file")
@@ -37,4 +42,9 @@ def read_arrays(path: str | Path) -> tuple[dict[str, Any], dict[str, Any]]:
             metadata = {key: json.loads(text) for key, text in (file.metadata() or {}).items()}
     except (SafetensorError, json.JSONDecodeError) as error:
         raise ValueError(f"{path} is not a safetensors file of this toolkit: {error}") from error
+    if metadata.get("format") != form:
+        raise ValueError(
+            f"{path} has format {metadata.get('format')!r}, expected {form!r}: agents are read by "
+            "DDPG.load, policies by MlpPolicy.load"
+        )
     return arrays, metadata

@@ -100,11 +100,6 @@ class MlpPolicy:
             FileNotFoundError: There is no such file.
             ValueError: The file holds something else.
         """
-        arrays, metadata = read_arrays(path)
-        if metadata.get("format") != FORMAT:
-            raise ValueError(
-                f"{path} has format {metadata.get('format')!r}, expected {FORMAT!r}: "
-                "load it with the class that saved it"
-            )
+        arrays, _ = read_arrays(path, FORMAT)
         low, high = arrays.pop("low"), arrays.pop("high")
         return cls(arrays, low, high)
