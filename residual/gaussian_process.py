@@ -17,9 +17,10 @@ _KERNELS = ("rbf", "matern")
 _CHUNK = 2048
 _CANDIDATES = 5000
 _KEPT_BYTES = 2**29
-# Shares of the variance of rows not learnt from that are left unexplained: too much to believe the
-# length scales, and so much that nothing was learnt; and the least noise variance of a second try.
-_POOR, _NOTHING, _NOISY = 0.5, 0.95, 0.3
+# What hyperparameters leave unexplained of other rows, as a share: less is well, more is nothing.
+# Errors count up to the size that this part of the rows has anyway: jumps are no reason to choose.
+_WELL, _NOTHING, _ORDINARY = 0.1, 0.95, 0.95
+_NOISY = 0.3
 
 
 class GaussianProcess(Estimator):
@@ -27,11 +28,11 @@ class GaussianProcess(Estimator):
 
     Fit in two steps. The length scales, signal variance and noise variance of each output
     maximise the marginal likelihood (gpytorch, L-BFGS) of at most ``hyper_points`` random rows.
-    Where as many other rows contradict them, the likelihood is maximised again with 30 % of the
-    variance or more as noise, and an output that remains unpredictable is all noise: of a target
-    that jumps, as at impacts, the likelihood has a second maximum without noise, at length scales
-    so short that the process remembers rows and predicts nothing. The process is then conditioned,
-    in double precision, on
+    Where they do not predict as many other rows well, the likelihood is maximised again with 30 %
+    of the variance or more as noise, and what predicts those rows better is taken; an output that
+    neither predicts is all noise. Of a target that jumps, as at impacts, the likelihood has a
+    second maximum with next to no noise, at length scales so short that the process remembers
+    rows and predicts little. The process is then conditioned, in double precision, on
 
     * all n rows exactly if n <= ``max_points`` (cost n^3 / 3 per output), else
     * ``inducing`` of the rows that summarise all of them (Titsias, Variational learning of
@@ -129,20 +130,26 @@ class GaussianProcess(Estimator):
         if len(other_y) < FEWEST_ROWS:
             return found
 
+        away = (other_y - other_y.mean()) ** 2
+        most = np.quantile(away, _ORDINARY)
+
         def unexplained(lengthscale: Array, outputscale: float, noise: float, _: int) -> float:
             matrix = self._covariance(X, X, lengthscale, outputscale)
             matrix[np.diag_indices(len(X))] += noise
             weights = np.linalg.solve(matrix, y)
-            predicted = self._covariance(other_X, X, lengthscale, outputscale) @ weights
-            return float(np.mean((other_y - predicted) ** 2)) / max(float(np.var(other_y)), 1e-300)
+            errors = other_y - self._covariance(other_X, X, lengthscale, outputscale) @ weights
+            return float(np.minimum(errors**2, most).sum() / max(away.clip(max=most).sum(), 1e-300))
 
-        if unexplained(*found) < _POOR:
+        share = unexplained(*found)
+        if share < _WELL:
             return found
         noisy = maximise_likelihood(X, y, self.kernel, self.max_iter, _NOISY)
+        noisy_share = unexplained(*noisy)
         iterations = found[3] + noisy[3]
-        if unexplained(*noisy) < _NOTHING:
-            return (*noisy[:3], iterations)
-        return np.ones(X.shape[1]), BOUNDS["outputscale"][0], 1.0, iterations
+        if min(share, noisy_share) > _NOTHING:
+            return np.ones(X.shape[1]), BOUNDS["outputscale"][0], 1.0, iterations
+        better = noisy if noisy_share < share else found
+        return (*better[:3], iterations)
 
     def _condition(self, y: Array) -> None:
         self._kept: dict[int, Array] = {}
