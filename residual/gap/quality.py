@@ -26,9 +26,11 @@ def check_usable(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -
         trajectories: Measured runs.
 
     Raises:
-        ValueError: Samples are so rare that their times must be in another unit than s, or a
-            system that strikes the ground was logged without one of its positions.
+        ValueError: There are none, samples are so rare that their times must be in another unit
+            than s, or a system that strikes the ground was logged without one of its positions.
     """
+    if not trajectories:
+        raise ValueError("there are no trajectories: give at least one measured run")
     for run in trajectories:
         if len(run.durations) and run.durations.min() > _SLOWEST * simulator.dt:
             period = float(np.median(run.durations))

@@ -12,6 +12,7 @@ import yaml
 from residual.gap import GapResult
 from studies.gap.forecasts import bars, rollouts, tiles, where
 from studies.gap.verdicts import apart, banner, blind, evidence
+from studies.gap.words import twins
 from studies.reporting import Code, Prose, Report, Section, Table
 
 # Findings beyond these are in gap.json.
@@ -26,15 +27,15 @@ def write_report(result: GapResult, record: Mapping[str, Any], folder: Path) -> 
         record: What ``gap.json`` holds.
         folder: Where to.
     """
-    figures = folder / "figures"
+    figures, alike = folder / "figures", twins(result)
     sections: list[Section] = [
-        *(banner(v, result) for v in result.verdicts if v.kind != "needs_data"),
+        *(banner(v, result, alike) for v in result.verdicts if v.kind != "needs_data"),
         tiles(result),
         *rollouts(result, figures),
         bars(result, figures),
         *where(result, figures),
         evidence(result),
-        *apart(result),
+        *apart(result, alike),
         *blind(result),
         *quality(result, record),
         *provenance(record),

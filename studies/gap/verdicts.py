@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal
 
 from residual.gap import GapResult
@@ -14,11 +15,13 @@ from studies.gap.words import (
     label_of,
     sentence,
     set_name,
-    twins,
+    unlike_and_alike,
 )
 from studies.reporting import Section, Table, Verdict
 from studies.reporting.sections import Cell
 
+# Effects that no motion can tell apart, by label; see ``words.twins``.
+Twins = Mapping[str, tuple[str, ...]]
 Tone = Literal["good", "warning", "bad", "neutral"]
 TONES: dict[str, Tone] = {
     "confirmed": "good",
@@ -31,14 +34,13 @@ TONES: dict[str, Tone] = {
 RIVALS = 10
 
 
-def banner(answer: Answer, result: GapResult) -> Verdict:
+def banner(answer: Answer, result: GapResult, alike: Twins) -> Verdict:
     """One verdict."""
     text = []
     if answer.effect:
         label = label_of(answer)
         text.append(sentence(label, result))
-        same = [a for a in answer.alternatives if a in twins(result).get(label, ())]
-        ties = [a for a in answer.alternatives if a not in same]
+        ties, same = unlike_and_alike(answer, alike)
         if ties:
             family = f", all of them {answer.family}" if answer.family else ""
             text.append(f"These data cannot tell it from **{names_of(ties)}**{family}.")
@@ -96,16 +98,14 @@ def evidence(result: GapResult) -> Table:
     )
 
 
-def apart(result: GapResult) -> list[Section]:
+def apart(result: GapResult, alike: Twins) -> list[Section]:
     """What could not be told apart, and what would tell."""
-    alike = twins(result)
     rows = []
     for answer in result.verdicts:
         if not answer.effect:
             continue
         label = label_of(answer)
-        same = [a for a in answer.alternatives if a in alike.get(label, ())]
-        ties = [a for a in answer.alternatives if a not in same]
+        ties, same = unlike_and_alike(answer, alike)
         for group, exact in ((ties, False), (same, True)):
             if group:
                 rows.append([

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from residual.gap import GapResult
 from residual.gap.confirm import Span
@@ -138,12 +138,30 @@ def sentence(label: str, result: GapResult) -> str:
 
 
 def twins(result: GapResult) -> dict[str, tuple[str, ...]]:
-    """Effects that no motion can tell apart, by label."""
-    found = {}
+    """Effects that no motion can tell apart, by label, if a verdict leaves alternatives."""
+    found: dict[str, tuple[str, ...]] = {}
+    if not any(verdict.effect and verdict.alternatives for verdict in result.verdicts):
+        return found  # the search below takes seconds for a walking robot
     for alias in exact_aliases(result.corrected):
         if "combination" not in alias.says:
             found.update({name: alias.effects for name in alias.effects})
     return found
+
+
+def unlike_and_alike(
+    verdict: Verdict, alike: Mapping[str, Sequence[str]]
+) -> tuple[list[str], list[str]]:
+    """Alternatives that these data cannot tell from an effect, and those that no motion can.
+
+    Args:
+        verdict: Names the effect and its alternatives.
+        alike: See ``twins``.
+    """
+    same = alike.get(label_of(verdict), ())
+    return (
+        [name for name in verdict.alternatives if name not in same],
+        [name for name in verdict.alternatives if name in same],
+    )
 
 
 def experiment(label: str, rivals: Sequence[str], result: GapResult, same: bool) -> str:
@@ -160,6 +178,7 @@ def experiment(label: str, rivals: Sequence[str], result: GapResult, same: bool)
 
 def summary(result: GapResult) -> str:
     """One screen of text."""
+    alike = twins(result)
     lines = []
     for verdict in result.verdicts:
         if verdict.kind == "needs_data":
@@ -170,11 +189,9 @@ def summary(result: GapResult) -> str:
         if "provisional" in verdict.says:
             lines.append(f"{'':<16} provisional: there is one record only")
         if verdict.effect and verdict.alternatives:
-            same = set(twins(result).get(label_of(verdict), ()))
-            ties = [name for name in verdict.alternatives if name not in same]
-            alike = [name for name in verdict.alternatives if name in same]
-            if alike:
-                words = ", ".join(map(effect_name, alike))
+            ties, same = unlike_and_alike(verdict, alike)
+            if same:
+                words = ", ".join(map(effect_name, same))
                 lines.append(f"{'':<16} no motion can tell it from: {words}")
             if ties:
                 words = ", ".join(map(effect_name, ties))

@@ -64,13 +64,16 @@ def tensors(path):
 
 
 def differing(folder, alone):
-    """What came out otherwise than alone: trial, file and array."""
-    found = []
-    for name, (results, files) in numbers(folder).items():
-        if results != alone[name][0]:
+    """What came out otherwise than alone: the results of a trial, or an array of a file."""
+    found, sides = [], (numbers(folder), alone)
+    for name in set().union(*sides):
+        (results, files), (expected, others) = (side.get(name, ({}, {})) for side in sides)
+        if results != expected:
             found.append((name, "results.json"))
-        for path, arrays in alone[name][1].items():
-            found += [(name, path, key) for key in arrays if files[path].get(key) != arrays[key]]
+        for path in {*files, *others}:
+            arrays, wanted = files.get(path, {}), others.get(path, {})
+            keys = {*arrays, *wanted}
+            found += [(name, path, key) for key in keys if arrays.get(key) != wanted.get(key)]
     return found
 
 

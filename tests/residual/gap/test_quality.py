@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from residual.gap import find_gap
 from residual.gap.quality import check_usable, kinematics
 from residual.trajectories import Trajectory
 from sims.leo import Leo
@@ -56,3 +57,8 @@ def test_a_walk_without_one_encoder_is_refused():
     states[:, 5] = np.nan
     with pytest.raises(ValueError, match=r"walk: .*'left_knee' was not logged"):
         check_usable(Leo(), [walk])
+
+
+def test_no_log_is_refused():
+    with pytest.raises(ValueError, match="there are no trajectories"):
+        find_gap(PendulumEquation(), [])
