@@ -62,6 +62,7 @@ class HostSimulator(Simulator):
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
         has_contacts: True if motion jumps at impacts, so that it can be compared with logs over
             short windows only (``residual.gap.contact``).
+        lagged: How an input with a lag is averaged over sub-steps, see ``sims.drive.lagged``.
     """
 
     effects: tuple[Effect, ...] = ()
@@ -69,6 +70,7 @@ class HostSimulator(Simulator):
     substeps: int
     has_drive_force: bool = False
     has_contacts: bool = False
+    lagged = staticmethod(path.lagged)
 
     @abc.abstractmethod
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
@@ -102,6 +104,10 @@ class HostSimulator(Simulator):
         keeps away from them.
         """
         return np.stack([random_values(c, n, rng) for c in self.physical_channels], axis=1)
+
+    def offered_effects(self) -> tuple[Effect, ...] | None:
+        """What may be missing by default (``sims.effects.library``); None for all it can host."""
+        return None
 
     # -- what it is made of ---------------------------------------------------------------
 
@@ -248,7 +254,7 @@ class HostSimulator(Simulator):
                 shape = (lag.rows or len(means), *means.shape[1:])
                 means, rise = np.broadcast_to(means, shape), np.broadcast_to(rise, shape)
                 start = np.broadcast_to(samples[:, 0], len(means))
-                means, rise, _ = path.lagged(means, rise, durations, lag.time_constant, start)
+                means, rise, _ = self.lagged(means, rise, durations, lag.time_constant, start)
             columns.append((np.stack([means, rise], axis=-1) if rises else means)[:, k:])
         rows = {e.rows for e in self.effects if isinstance(e, ActuatorEffect)} - {None}
         if not columns:
@@ -352,7 +358,7 @@ class HostSimulator(Simulator):
             )
             means, rises = means[:, -1:], rises[:, -1:]
             for lag in path.lags(effects):
-                means, rises, after[:, at] = path.lagged(
+                means, rises, after[:, at] = self.lagged(
                     means, rises, np.array([self.dt]), lag.time_constant, memory[:, at]
                 )
                 at += 1
