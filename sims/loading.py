@@ -15,7 +15,7 @@ import yaml
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.host import HostSimulator
-from sims.simulator import Simulator
+from sims.simulator import Hold, Simulator
 
 #: In a list of effects: all that the simulator can host.
 LIBRARY = "library"
@@ -40,30 +40,58 @@ def simulator_settings(source: str | Path | Mapping[str, Any]) -> dict[str, Any]
     return yaml.safe_load(text)["simulator"]
 
 
-def with_effects(simulator: HostSimulator, effects: list[Effect]) -> HostSimulator:
-    """A copy with these effects beside its own; for YAML, if a class takes no ``effects``."""
-    return simulator.with_effects([*simulator.effects, *effects])
+def with_effects(
+    simulator: HostSimulator,
+    effects: list[Effect] | None = None,
+    hold: dict[str, Hold] | None = None,
+    substeps: int | None = None,
+) -> HostSimulator:
+    """A copy with these effects beside its own; for YAML, whatever arguments its class takes.
+
+    Args:
+        simulator: What is changed.
+        effects: What acts beside its own effects.
+        hold: How inputs run between samples, by channel; see ``HostSimulator.with_hold``.
+        substeps: Sub-steps per control period, if not the simulator's own.
+    """
+    changed = simulator.with_effects([*simulator.effects, *(effects or ())]).with_hold(hold or {})
+    changed.substeps = substeps or changed.substeps
+    return changed
 
 
-def corrected_settings(settings: Mapping[str, Any], effects: Sequence[Effect]) -> dict[str, Any]:
+def corrected_settings(
+    settings: Mapping[str, Any],
+    effects: Sequence[Effect],
+    hold: Mapping[str, Hold] | None = None,
+    substeps: int | None = None,
+) -> dict[str, Any]:
     """Settings of a simulator with effects beside its own, for ``load_simulator``.
 
     Args:
         settings: Of the simulator without them, see ``simulator_settings``.
         effects: With scalar values; they come back bit for bit.
+        hold, substeps: As for ``with_effects``.
     """
     added = [effect_settings(effect) for effect in effects]
     arguments = dict(settings.get("init_args") or {})
+    changed: dict[str, Any] = {}
+    if hold:
+        changed["hold"] = dict(hold)
+    if substeps:
+        changed["substeps"] = substeps
+    own = f"{__name__}.{with_effects.__name__}"
     # A function that makes the simulator, such as with_effects, may have effects of its own.
-    if isinstance(arguments.get("effects"), list):
+    if isinstance(arguments.get("effects"), list) and (
+        settings["class_path"] == own or not changed
+    ):
         arguments["effects"] = [*arguments["effects"], *added]
-        return {"class_path": settings["class_path"], "init_args": arguments}
-    if not added:
+        if hold:
+            changed["hold"] = {**(arguments.get("hold") or {}), **hold}
+        return {"class_path": settings["class_path"], "init_args": {**arguments, **changed}}
+    if not added and not changed:
         return dict(settings)
-    return {
-        "class_path": f"{__name__}.{with_effects.__name__}",
-        "init_args": {"simulator": dict(settings), "effects": added},
-    }
+    changed = {"effects": added, **changed}
+    return {"class_path": own, "init_args": {"simulator": dict(settings), **changed}}
 
 
 def effect_settings(effect: Effect) -> dict[str, Any]:
