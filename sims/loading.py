@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import importlib
+import importlib.util
 import inspect
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -198,7 +199,40 @@ def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
     try:
         return _parser().parse_object({"simulator": value})
     except (jsonargparse.ArgumentError, TypeError) as error:
-        raise ValueError(f"simulator {source}: {_one_line(error)}") from None
+        lacking = _not_found(value)
+        raise ValueError(f"simulator {source}: {lacking or _one_line(error)}") from None
+
+
+def _not_found(source: str | Mapping[str, Any]) -> str:
+    """Which module of a class path, or of a YAML file of them, Python cannot find; or nothing."""
+    settings: Any = source
+    if isinstance(source, str) and Path(source).suffix in (".yaml", ".yml"):
+        if not Path(source).is_file():
+            return "there is no such file"
+        settings = yaml.safe_load(Path(source).read_text(encoding="utf-8"))
+    for path in _class_paths(settings):
+        module = path.partition(".")[0]
+        if module and importlib.util.find_spec(module) is None:
+            return (
+                f"there is no module {module!r} for {path}; start Python in the folder that "
+                "holds it, or name that folder in PYTHONPATH"
+            )
+    return ""
+
+
+def _class_paths(settings: Any) -> list[str]:
+    """Every import path of a class in settings, from the outside in."""
+    if isinstance(settings, str):
+        return [settings]
+    if isinstance(settings, list):
+        return [
+            path for entry in settings if not isinstance(entry, str) for path in _class_paths(entry)
+        ]
+    if not isinstance(settings, Mapping):
+        return []
+    found = [str(settings["class_path"])] if "class_path" in settings else []
+    nested = [v for v in settings.values() if isinstance(v, Mapping | list)]
+    return found + [path for entry in nested for path in _class_paths(entry)]
 
 
 def _one_line(error: Exception) -> str:
