@@ -10,11 +10,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from sims.effects.joint import LinearSpring, ViscousFriction
 from sims.mujoco import elements
 from sims.mujoco.contacts import touching_geoms
 from sims.simulator import Array, Parameter
 
 Index = tuple[int, ...]
+
+DISSIPATION = ViscousFriction.family
 
 
 @dataclasses.dataclass(frozen=True)
@@ -137,24 +140,32 @@ def _of_joints(model: Any) -> Iterator[Attribute]:
         f, q = ("N m", "rad") if hinge else ("N", "m")
 
         def at_least_zero(
-            what: str, value: float, unit: str, scale: float, slot: Slot, name: str = name
+            what: str,
+            value: float,
+            unit: str,
+            scale: float,
+            slot: Slot,
+            family: str = "",
+            name: str = name,
         ) -> Attribute:
             full = f"{what} of joint {name}"
-            return Attribute(full, Parameter(float(value), unit, full, 0.0, scale=scale), (slot,))
+            parameter = Parameter(float(value), unit, full, 0.0, scale=scale, family=family)
+            return Attribute(full, parameter, (slot,))
 
         yield at_least_zero(
-            "damping", model.dof_damping[d], f"{f} s/{q}", force / rate, Slot("dof_damping", (d,))
-        )
+            "damping", model.dof_damping[d], f"{f} s/{q}", force / rate,
+            Slot("dof_damping", (d,)), DISSIPATION,
+        )  # fmt: skip
         yield at_least_zero(
             "frictionloss",
             model.dof_frictionloss[d],
             f,
             0.1 * force,
-            Slot("dof_frictionloss", (d,)),
+            Slot("dof_frictionloss", (d,)), DISSIPATION,
         )  # fmt: skip
         yield at_least_zero(
             "quadratic damping", model.dof_dampingpoly[d, 0], f"{f} s^2/{q}^2", force / rate**2,
-            Slot("dof_dampingpoly", (d, 0)),
+            Slot("dof_dampingpoly", (d, 0)), DISSIPATION,
         )  # fmt: skip
         yield at_least_zero(
             "armature", model.dof_armature[d], "kg m^2" if hinge else "kg", float(inertias[d]),
@@ -163,12 +174,14 @@ def _of_joints(model: Any) -> Iterator[Attribute]:
         if model.jnt_stiffness[j] > 0:
             stiffness = float(model.jnt_stiffness[j])
             yield at_least_zero(
-                "stiffness", stiffness, f"{f}/{q}", stiffness, Slot("jnt_stiffness", (j,))
-            )
+                "stiffness", stiffness, f"{f}/{q}", stiffness, Slot("jnt_stiffness", (j,)),
+                LinearSpring.family,
+            )  # fmt: skip
         if model.dof_damping[d] > 0:
             damped.append(d)
     if len(damped) > 1:
-        yield _group("damping of all joints", [Slot("dof_damping", (d,), True) for d in damped])
+        slots = [Slot("dof_damping", (d,), True) for d in damped]
+        yield _group("damping of all joints", slots, DISSIPATION)
 
 
 def _of_bodies(model: Any) -> Iterator[Attribute]:
@@ -246,6 +259,7 @@ def _of_the_world(model: Any) -> Iterator[Attribute]:
         yield Attribute(full, parameter, (Slot("opt.gravity", (k,)),))
 
 
-def _group(name: str, slots: list[Slot]) -> Attribute:
+def _group(name: str, slots: list[Slot], family: str = "") -> Attribute:
     """A factor on several numbers, 1 by default."""
-    return Attribute(name, Parameter(1.0, "1", name, 0.01, scale=1.0), tuple(slots))
+    parameter = Parameter(1.0, "1", name, 0.01, scale=1.0, family=family)
+    return Attribute(name, parameter, tuple(slots))
