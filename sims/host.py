@@ -112,6 +112,10 @@ class HostSimulator(Simulator):
         """What may be missing by default (``sims.effects.library``); None for all it can host."""
         return None
 
+    def own_files(self) -> dict[str, bytes]:
+        """It as files of the format that it came from, by name, for tools that read that format."""
+        return {}
+
     # -- what it is made of ---------------------------------------------------------------
 
     @property

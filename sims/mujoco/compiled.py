@@ -54,26 +54,13 @@ class Source:
 
 
 def specification(source: Source) -> Any:
-    """The ``mujoco.MjSpec`` of a source, with what ``source`` changes.
+    """The ``mujoco.MjSpec`` of a source, with its changes.
 
     Raises:
         ValueError: The file is missing, broken, or lacks a mesh; the message is one line.
     """
-    if not source.path.is_file():
-        raise ValueError(f"there is no model file {source.path}")
-    try:
-        spec = mujoco.MjSpec.from_file(str(source.path))
-    except ValueError as error:
-        raise ValueError(f"{source.path}: {_one_line(error)}") from None
-    if source.motors is not None:
-        _add_motors(spec, source.motors, source.path)
-    elif source.urdf and not spec.actuators:
-        raise ValueError(
-            f"{source.path}: a URDF has no actuators: say which joints have a torque motor, "
-            "in a YAML file with class_path: sims.mujoco.MujocoSimulator and init_args: "
-            f"{{model: {source.path.name}, motors: [all]}}; motors: [] for none. "
-            f"Its joints: {', '.join(joint.name for joint in spec.joints) or 'none'}"
-        )
+    text = model_text(source)
+    spec = _read(source.path) if text is None else mujoco.MjSpec.from_string(text.decode())
     if source.timestep is not None:
         spec.option.timestep = source.timestep
     if source.integrator is not None:
@@ -82,6 +69,45 @@ def specification(source: Source) -> Any:
             raise ValueError(f"there is no integrator {source.integrator!r}; give one of {known}")
         spec.option.integrator = INTEGRATORS[source.integrator]
     return spec
+
+
+def model_text(source: Source) -> bytes | None:
+    """MJCF that MuJoCo writes for a URDF or a model with added motors; None if the file is used.
+
+    Raises:
+        ValueError: The file cannot be used, has no joint of a given name, or is a URDF without
+            motors.
+    """
+    if not source.urdf and source.motors is None:
+        return None
+    spec = _read(source.path)
+    if source.motors is not None:
+        _add_motors(spec, source.motors, source.path)
+    elif not spec.actuators:
+        raise ValueError(
+            f"{source.path}: a URDF has no actuators: say which joints have a torque motor, "
+            "in a YAML file with class_path: sims.mujoco.MujocoSimulator and init_args: "
+            f"{{model: {source.path.name}, motors: [all]}}; motors: [] for none. "
+            f"Its joints: {', '.join(joint.name for joint in spec.joints) or 'none'}"
+        )
+    # MuJoCo writes six digits, so what it wrote is the nominal, not what it read.
+    folder = source.path.parent.resolve()
+    spec.compiler.meshdir = str(folder / spec.compiler.meshdir)
+    spec.compiler.texturedir = str(folder / spec.compiler.texturedir)
+    try:
+        spec.compile()
+    except ValueError as error:
+        raise ValueError(f"{source.path}: {_one_line(error)}") from None
+    return str(spec.to_xml()).encode()
+
+
+def _read(path: Path) -> Any:
+    if not path.is_file():
+        raise ValueError(f"there is no model file {path}")
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise ValueError(f"{path}: {_one_line(error)}") from None
 
 
 def compiled(source: Source) -> Any:

@@ -15,7 +15,7 @@ def lagged_at_ends(
     time_constant: float | Array,
     start: Array,
 ) -> tuple[Array, Array, Array]:
-    """First-order filter of an input that runs straight in each sub-step, sampled at its end.
+    """First-order filter of an input that is held in each sub-step, sampled at its end.
 
     It is what an actuator with ``dyntype="filterexact" actearly="true"`` receives, so that a
     corrected model file moves as the corrected simulator. Arguments and values are those of
@@ -26,9 +26,7 @@ def lagged_at_ends(
     with np.errstate(divide="ignore"):
         ratio = (durations / substeps) / constants[:, None]
     stays = np.exp(-ratio)
-    behind = rises / ratio[..., None]
-    first, last = means - 0.5 * rises - behind, means + 0.5 * rises - behind
-    gained = last - first * stays[..., None]
+    gained = means * -np.expm1(-ratio)[..., None]
     # Only from interval to interval is it a recursion in Python; inside, all rows at once.
     added = np.zeros_like(ratio)
     for i in range(substeps):

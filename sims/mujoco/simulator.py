@@ -9,6 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from sims.drive import lagged
 from sims.effects.actuator import (
     ActuatorBias,
     ActuatorLag,
@@ -22,10 +23,10 @@ from sims.effects.sensor import SensorOffset
 from sims.host import HostSimulator
 from sims.mujoco import elements
 from sims.mujoco.attributes import Attribute, attributes, row_fields
-from sims.mujoco.compiled import Source, compiled
+from sims.mujoco.compiled import INTEGRATORS, Source, compiled
 from sims.mujoco.contacts import touching_geoms
 from sims.mujoco.effects import AttributeChange
-from sims.mujoco.forces import place
+from sims.mujoco.forces import Placed, place
 from sims.mujoco.lag import lagged_at_ends
 from sims.mujoco.rows import BLOCK, Rows
 from sims.simulator import Array, random_values
@@ -61,8 +62,6 @@ class MujocoSimulator(HostSimulator):
     #: One call of ``integrate`` with many rows is efficient, each with its own numbers.
     advances_rows_at_once = True
 
-    lagged = staticmethod(lagged_at_ends)
-
     def __init__(
         self,
         model: str,
@@ -83,6 +82,8 @@ class MujocoSimulator(HostSimulator):
         self.state_channels = elements.state_channels(self.model)
         self.action_channels = elements.action_channels(self.model)
         self.has_contacts = bool(touching_geoms(self.model))
+        # Within a step only Runge-Kutta asks again what the actuators do.
+        self.lagged = lagged if self.runge_kutta else lagged_at_ends
         self._rows = Rows(self.model)
         self._dofs = {
             joint.name: (j, int(self.model.jnt_dofadr[j]))
@@ -140,8 +141,7 @@ class MujocoSimulator(HostSimulator):
         if n == 0:
             return states.copy()
         fields = row_fields(self.model, self.attributes, self.parameter_values(), n)
-        placed = [(e, *self._dofs[e.joint]) for e in self.joint_effects()]
-        applied, law = place(self.model, placed, fields, n)
+        applied, law = place(self.model, self._placed(), fields, n)
         own = float(self.model.opt.timestep)
         h = durations / steps
         h = np.where(np.abs(h - own) < SAME * own, own, h)
@@ -176,6 +176,36 @@ class MujocoSimulator(HostSimulator):
         for name, moved in zip(names, after[1:], strict=True):
             if np.nanmax(np.abs(moved - after[0]) / size, initial=0.0) < 1e-12:
                 del self.attributes[name], self.parameters[name]
+
+    @property
+    def timestep(self) -> float:
+        """Time step in s."""
+        own, step = float(self.model.opt.timestep), self.dt / self.substeps
+        return own if abs(step - own) < SAME * own else step
+
+    @property
+    def runge_kutta(self) -> bool:
+        """Whether the model is integrated by RK4, which is of fourth order; all others of first."""
+        return int(self.model.opt.integrator) == int(INTEGRATORS["RK4"])
+
+    def joint_index(self, name: str) -> int:
+        """Index of a joint in the model."""
+        return self._dofs[name][0]
+
+    def own_files(self) -> dict[str, bytes]:
+        """``corrected.xml`` and what it includes; see ``sims.mujoco.corrected``."""
+        from sims.mujoco.corrected import corrected_files
+
+        return corrected_files(self).files
+
+    def row_fields(self, rows: int) -> dict[str, Array]:
+        """Fields of the model that attributes and effects on joints change, (rows, ...)."""
+        fields = row_fields(self.model, self.attributes, self.parameter_values(), rows)
+        place(self.model, self._placed(), fields, rows)
+        return fields
+
+    def _placed(self) -> list[Placed]:
+        return [(effect, *self._dofs[effect.joint]) for effect in self.joint_effects()]
 
     def smooth_states(self, n: int, rng: np.random.Generator) -> Array:
         """Random physical states without contact, (n, n_physical), about the reference pose."""
