@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from xml.parsers import expat
 
 import numpy as np
 
@@ -104,6 +105,10 @@ def model_text(source: Source) -> bytes | None:
 def _read(path: Path) -> Any:
     if not path.is_file():
         raise ValueError(f"there is no model file {path}")
+    try:
+        expat.ParserCreate().Parse(path.read_bytes(), True)
+    except expat.ExpatError as error:
+        raise ValueError(f"{path}: not well-formed XML: {error}") from None
     try:
         return mujoco.MjSpec.from_file(str(path))
     except ValueError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -27,8 +27,10 @@ from sims.mujoco.attributes import nominal_field
 from sims.mujoco.compiled import HARD_FRICTION, model_text
 from sims.mujoco.forces import native
 from sims.mujoco.markup import Document, Markup, Tag
-from sims.mujoco.simulator import MujocoSimulator
 from sims.simulator import Array
+
+if TYPE_CHECKING:
+    from sims.mujoco.simulator import MujocoSimulator
 
 
 @dataclasses.dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from sims.mujoco import elements
 from sims.mujoco.attributes import Attribute, attributes, row_fields
 from sims.mujoco.compiled import INTEGRATORS, Source, compiled
 from sims.mujoco.contacts import touching_geoms
+from sims.mujoco.corrected import corrected_files
 from sims.mujoco.effects import AttributeChange
 from sims.mujoco.forces import Placed, place
 from sims.mujoco.lag import lagged_at_ends
@@ -183,6 +184,32 @@ class MujocoSimulator(HostSimulator):
         own, step = float(self.model.opt.timestep), self.dt / self.substeps
         return own if abs(step - own) < SAME * own else step
 
+    def finer(self) -> Iterator[tuple[str, HostSimulator]]:
+        """The same model with RK4, then with shorter steps too, cheapest first.
+
+        Yields:
+            The option that makes it, as on the command line, and the simulator.
+        """
+        settings = self.source
+        for parts in (1, 2, 4):
+            step = float(self.model.opt.timestep) / parts
+            if parts == 1 and self.runge_kutta:
+                continue
+            option = "--simulator.integrator RK4"
+            if parts > 1:
+                option += f" --simulator.timestep {step:g}"
+            yield (
+                option,
+                type(self)(
+                    str(settings.path),
+                    self.dt,
+                    step,
+                    "RK4",
+                    None if settings.motors is None else list(settings.motors),
+                    self.effects,
+                ),
+            )
+
     @property
     def runge_kutta(self) -> bool:
         """Whether the model is integrated by RK4, which is of fourth order; all others of first."""
@@ -194,8 +221,6 @@ class MujocoSimulator(HostSimulator):
 
     def own_files(self) -> dict[str, bytes]:
         """``corrected.xml`` and what it includes; see ``sims.mujoco.corrected``."""
-        from sims.mujoco.corrected import corrected_files
-
         return corrected_files(self).files
 
     def row_fields(self, rows: int) -> dict[str, Array]:
