@@ -193,7 +193,7 @@ class Truth:
         speed = np.full((len(seen), model.nv), np.nan)
         if sensors.rates:
             speed = np.array(rates) + rng.normal(0, 50 * sensors.noise, speed.shape)
-        times = sensors.period * np.arange(len(seen))
+        times = sensors.period * np.arange(len(seen), dtype=np.float64)
         states: Array = np.concatenate([seen, speed], axis=1, dtype=np.float64)
         return Trajectory(name, times, states, np.array(commands, dtype=np.float64))
 
