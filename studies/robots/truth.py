@@ -1,4 +1,4 @@
-"""Measure a robot that hides something: MuJoCo at a tenth of the step, by another integrator.
+"""Measure a robot that hides something: MuJoCo at a finer step, by another integrator.
 
 None of it is the code that explains the logs: the truth is one ``mujoco.MjData`` stepped in a
 loop, with forces and commands of its own.
@@ -47,19 +47,20 @@ class Truth:
         path: The nominal model.
         hidden: Size by name: attributes as ``"frictionloss of joint elbow"``, effects as
             ``"delay@elbow_motor"``; sizes are changes, those of gains and groups shares.
-        finer: Steps of the truth in one of the nominal.
+        finer: Steps of the truth in one of the nominal; by default 10, or 50 where the truth has
+            the integrator of lower order, whose error would be a gap of its own.
 
     Raises:
         ValueError: A name is not known.
     """
 
-    def __init__(self, path: str | Path, hidden: Mapping[str, float], finer: int = 10) -> None:
+    def __init__(self, path: str | Path, hidden: Mapping[str, float], finer: int = 0) -> None:
         self.model = mujoco.MjModel.from_xml_path(str(path))
         model = self.model
         first = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
         kinds = mujoco.mjtIntegrator
         model.opt.integrator = kinds.mjINT_IMPLICITFAST if first else kinds.mjINT_RK4
-        model.opt.timestep /= finer
+        model.opt.timestep /= finer or (50 if first else 10)
         model.dof_solimp[:, :3] = HARDER
         self.loads = np.zeros(model.nv)
         self.delay = np.zeros(model.nu)
