@@ -1,134 +1,261 @@
-"""From samples to a chosen set of effects: noise, windows and tournament in turns.
+"""Sets of effects worth a fit: a linear screen, then a beam that grows by single effects.
 
-Noise and windows are estimated around the best model so far, because both suffer from a large
-gap; the tournament then runs again, until nothing changes.
+Every set is fitted from the numbers of the set it grew from. A larger set that ends worse than one
+that it contains has not converged; it is fitted again from there, and never counts as evidence if
+that does not help.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap import noise
-from residual.gap.adequacy import remainder
-from residual.gap.arena import Arena, Key, Settings
 from residual.gap.candidates import Candidate
+from residual.gap.currency import Currency, groups
+from residual.gap.fitting import Fit, Fitter
 from residual.gap.model import Model
-from residual.gap.samples import Samples
-from residual.gap.shooting import Fit
-from residual.gap.tournament import choose, complete, rivals
-from residual.gap.windows import by_growth
+from residual.gap.screening import Signatures, constrained, gains, pair_gains, signatures, trials
+from residual.gap.validation import Validated, validate
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
+Key = tuple[int, ...]
+Proposals = dict[Key, Array]
 
 
 @dataclasses.dataclass(frozen=True)
-class Found:
-    """What the search ends with, on all training runs.
-
-    Attributes:
-        arena: All training runs; holds the fits of the chosen set, its rivals and the nominal.
-        trial: The runs of the tournament; holds all rivals that were tried.
-        key: The chosen candidates.
-        floor: Noise and smooth path around the chosen model.
-        nominal_floor: The same around the nominal model.
-    """
-
-    arena: Arena
-    trial: Arena
-    key: Key
-    floor: noise.Floor
-    nominal_floor: noise.Floor
-
-    @property
-    def fit(self) -> Fit:
-        """Fit of the chosen set."""
-        return self.arena.tried[self.key]
-
-    @property
-    def chosen(self) -> list[Candidate]:
-        """The chosen candidates."""
-        return [self.arena.candidates[i] for i in self.key]
-
-
-def survey(
-    model: Model, samples: Samples, theta: Array, sigma: Array | None, finest: float
-) -> tuple[noise.Floor, Array]:
-    """Noise and smooth path around a model, and the typical variation of the states."""
-    nodes = noise.first_path(model, samples, theta)
-    if sigma is None:
-        sigma = noise.local_noise(samples)
-    scale = noise.variation(samples, nodes)
-    floor = noise.estimate(model, samples, nodes, theta, sigma, scale)
-    least = finest * scale[samples.measured]
-    return dataclasses.replace(floor, sigma=np.maximum(floor.sigma, least)), scale
-
-
-def search(
-    simulator: HostSimulator,
-    candidates: Sequence[Candidate],
-    samples: Samples,
-    rng: np.random.Generator,
-    settings: Settings,
-    longest: int = 25,
-    tell: Callable[[str], None] = lambda _: None,
-) -> Found:
-    """Choose the missing effects from training runs.
+class Effort:
+    """How hard to search.
 
     Args:
-        simulator: The nominal simulator.
-        candidates: What may be missing.
-        samples: The training runs.
-        rng: Chooses the runs that the tournament sees.
-        settings: How hard to search.
-        longest: Longest window in samples.
-        tell: Progress.
+        singles: Effects of the screen that are fitted alone.
+        pairs: Pairs of the screen that are fitted.
+        beam: Sets that are grown further, beside the one that forecasts best.
+        grown: Effects that each of these is grown by, one at a time.
+        most: Largest number of effects in a set.
+        stale: Share of the error that one more effect must take off for the search to go on.
     """
-    some = sorted(rng.permutation(len(samples.runs))[: settings.runs].tolist())
-    part, rows = samples.pick(some)
-    nominal_floor, scale = survey(Model(simulator), samples, np.zeros(0), None, settings.finest)
-    physical = len(simulator.physical_channels)
-    scale = scale[:physical]
-    floor, theta = nominal_floor, np.zeros(0)
-    key: Key = ()
 
-    def arena(table: Samples, index: NDArray[np.int64]) -> Arena:
-        nodes = floor.nodes[index][:, :physical]
-        by_state = floor.slope.by_state[index][:, :physical, :physical]
-        windows = by_growth(table, by_state, scale, longest)
-        return Arena(
-            simulator, candidates, table, windows, nodes, by_state, floor.sigma, scale, settings,
-            tell,
-        )  # fmt: skip
+    singles: int = 8
+    pairs: int = 2
+    beam: int = 2
+    grown: int = 4
+    most: int = 8
+    stale: float = 0.05
 
-    for turn in range(3):
-        trial = arena(part, rows)
-        before = key
-        key = choose(trial, {key: theta})
-        theta = trial.tried[key].theta
-        if key:
-            model = Model(simulator, [candidates[i] for i in key])
-            floor, _ = survey(model, samples, theta, floor.sigma, settings.finest)
-        full = arena(samples, np.arange(len(samples)))
-        sets = {key: [theta]} if key else {}
-        sets.update({rival: [trial.tried[rival].theta] for rival in rivals(trial, key)})
-        full.refit(full.tried[()], sets, most=True)
-        full.threshold, full.noise_gain = trial.threshold, trial.noise_gain
-        # All runs may prefer a rival that came close on those of the tournament.
-        key = min(sets, key=full.score, default=key)
-        left = remainder(full.tried[key], samples, full.windows, floor.sigma, floor, scale)
-        if left.adequate or (turn and key == before) or turn == 2:
-            break
+
+class Search:
+    """Rival sets of effects fitted to the windows of one fitter.
+
+    Attributes:
+        tried: Every fitted set: sorted candidate numbers -> fit.
+        unfit: Sets that did not converge.
+        validated: Cross-validated forecasts of the sets.
+        currency: Relative errors.
+    """
+
+    def __init__(
+        self,
+        simulator: HostSimulator,
+        candidates: Sequence[Candidate],
+        fitter: Fitter,
+        effort: Effort | None = None,
+        tell: Callable[[str], None] = lambda _: None,
+        until: float = np.inf,
+    ) -> None:
+        self.simulator, self.candidates, self.fitter = simulator, list(candidates), fitter
+        self.effort, self.tell, self.until = effort or Effort(), tell, until
+        self.tried: dict[Key, Fit] = {(): fitter.fit(Model(simulator), np.zeros(0))}
+        self.unfit: set[Key] = set()
+        self._signatures: dict[Key, Signatures] = {}
+        channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
+        nominal = validate(fitter, self.tried[()])
+        self.validated: dict[Key, Validated] = {(): nominal}
+        self.currency = Currency(nominal.squares, groups(channels))
+
+    # -- what is known of a set -----------------------------------------------------------
+
+    def model(self, key: Key) -> Model:
+        """The simulator with some candidates."""
+        return Model(self.simulator, [self.candidates[i] for i in key])
+
+    def labels(self, key: Key) -> tuple[str, ...]:
+        """Names and places of a set."""
+        return tuple(self.candidates[i].label for i in key)
+
+    def error(self, key: Key) -> float:
+        """Cross-validated relative error."""
+        return self.currency.error(self.validated[key].squares)
+
+    def numbers(self, key: Key) -> int:
+        """Free numbers of a set."""
+        return sum(len(self.candidates[i].knobs) for i in key)
+
+    def usable(self) -> list[Key]:
+        """Sets that converged."""
+        return [key for key in self.validated if key not in self.unfit]
+
+    def best(self) -> Key:
+        """The set that forecasts best."""
+        return min(self.usable(), key=self.error)
+
+    @property
+    def late(self) -> bool:
+        """Whether the time for searching is over."""
+        return time.perf_counter() > self.until
+
+    def signatures(self, key: Key) -> Signatures:
+        """What every candidate would add to a fitted set."""
+        if key not in self._signatures:
+            fit = self.tried[key]
+            columns = self.fitter.columns(fit, self.candidates)
+            self._signatures[key] = signatures(fit, trials(self.candidates), columns)
+        return self._signatures[key]
+
+    def merged(self, key: Key, additions: Iterable[tuple[int, Array]], drop: Key = ()) -> tuple[Key, Array]:
+        """Sorted key and start vector of a set with some candidates added and some dropped."""
+        values: dict[int, Array] = {}
+        at = 0
+        for number in key:
+            width = len(self.candidates[number].knobs)
+            values[number] = self.tried[key].theta[at : at + width]
+            at += width
+        for number in drop:
+            values.pop(number)
+        values.update(dict(additions))
+        fresh = tuple(sorted(values))
+        return fresh, np.concatenate([values[i] for i in fresh]) if fresh else np.zeros(0)
+
+    # -- fitting --------------------------------------------------------------------------
+
+    def add(self, proposals: Proposals) -> list[Key]:
+        """Fit and validate sets that were not tried yet."""
+        fresh = []
+        for key, theta in proposals.items():
+            if key in self.tried:
+                continue
+            if self.late and fresh:
+                break
+            self.fit(key, theta)
+            fresh.append(key)
+            error = 100 * self.error(key)
+            self.tell(f"  {' + '.join(self.labels(key))}: {error:.3g} % of the error")
+        return fresh
+
+    def fit(self, key: Key, theta: Array) -> None:
+        """Fit a set from start values, and from its nested sets if it ends worse than one."""
+        found = self.fitter.fit(self.model(key), theta)
+        nested = [k for k in self.tried if len(k) < len(key) and set(k) < set(key)]
+        if nested:
+            best = min(nested, key=lambda k: self.tried[k].merit)
+            floor = self.tried[best].merit
+            if found.merit > floor:
+                again = self.fitter.fit(self.model(key), self._from_nested(key, best, theta))
+                found = again if again.merit < found.merit else found
+            if found.merit > 1.001 * floor:
+                self.unfit.add(key)
+        self.tried[key] = found
+        self.validated[key] = validate(self.fitter, found)
+
+    def _from_nested(self, key: Key, nested: Key, theta: Array) -> Array:
+        """Numbers of a nested set, what it lacks hardly there."""
+        model = self.model(key)
+        start = np.array(theta)
+        for place, number in enumerate(key):
+            own = np.flatnonzero(model.owner == place)
+            if number in nested:
+                inner = self.model(nested)
+                start[own] = self.tried[nested].theta[inner.owner == nested.index(number)]
+                continue
+            for j in own:
+                if model.knobs[j].strength:
+                    start[j] = np.clip(0.01 * model.knobs[j].step, model.low[j], model.high[j])
+        return start
+
+    # -- proposals ------------------------------------------------------------------------
+
+    def run(self, seeds: Proposals | None = None) -> Key:
+        """Grow sets until one more effect no longer pays; returns the one that forecasts best."""
+        effort = self.effort
+        self.add(seeds or {})
+        frontier: list[Key] = [()]
+        reached = 1.0
+        for level in range(1, effort.most + 1):
+            proposals: Proposals = {}
+            for key in frontier:
+                proposals |= self.proposals(key)
+            fresh = [key for key in self.add(proposals) if key not in self.unfit]
+            if not fresh or self.late:
+                break
+            by_merit = sorted(fresh, key=lambda k: self.tried[k].merit)[: effort.beam]
+            by_error = sorted(fresh, key=self.error)[:1]
+            frontier = list(dict.fromkeys([*by_error, *by_merit]))
+            now = self.error(by_error[0])
+            if level > 1 and not self._pays(by_error[0], reached):
+                break
+            reached = min(reached, now)
+        return self.best()
+
+    def _pays(self, key: Key, reached: float) -> bool:
+        """Whether a set is clearly better than what was reached, in all or in one joint."""
+        if self.error(key) < (1 - self.effort.stale) * reached:
+            return True
+        before = min((k for k in self.usable() if len(k) < len(key)), key=self.error)
+        own = self.currency.by_group(self.validated[key].squares)
+        its = self.currency.by_group(self.validated[before].squares)
+        return bool((own < (1 - 2 * self.effort.stale) * its).any())
+
+    def proposals(self, key: Key) -> Proposals:
+        """Sets one effect larger than a fitted one, the best by the linear screen first."""
+        if len(key) >= self.effort.most:
+            return {}
+        around = self.signatures(key)
+        found: Proposals = {}
+        wanted = self.effort.grown if key else self.effort.singles
+        for gain in gains(around):
+            number = around.variants[gain.variants[0]].candidate
+            if number in key or gain.value <= 0:
+                continue
+            fresh, theta = self.merged(key, [(number, gain.values[0])])
+            if fresh not in found and len(found) < wanted:
+                found[fresh] = theta
+        together = self._one_for_each_group(key, around)
+        if len(together) > 1 and len(key) + len(together) <= self.effort.most:
+            fresh, theta = self.merged(key, together.items())
+            found.setdefault(fresh, theta)
         if not key:
-            break
-        theta = full.tried[key].theta
-    completed = complete(full, key)
-    if completed != key:
-        key = completed
-        model = Model(simulator, [candidates[i] for i in key])
-        floor, _ = survey(model, samples, full.tried[key].theta, floor.sigma, settings.finest)
-    return Found(full, trial, key, floor, nominal_floor)
+            for pair in pair_gains(around, self.effort.pairs):
+                numbers = [around.variants[v].candidate for v in pair.variants]
+                fresh, theta = self.merged(key, zip(numbers, pair.values, strict=True))
+                found.setdefault(fresh, theta)
+        return found
+
+    def _one_for_each_group(self, key: Key, around: Signatures) -> dict[int, Array]:
+        """The best effect for every joint by its own channels, where several joints are off."""
+        places = self.currency.groups
+        if len(places) < 2:
+            return {}
+        measured = len(self.fitter.samples.measured)
+        channel = np.arange(len(around.residual)) % measured
+        found: dict[int, Array] = {}
+        for group in places:
+            rows = np.isin(channel, group)
+            residual = around.residual[rows]
+            total = float(residual @ residual)
+            if total <= 0:
+                continue
+            best = (0.2 * total, -1, np.zeros(0))
+            for variant in around.variants:
+                if variant.candidate in key:
+                    continue
+                columns = around.matrix[np.ix_(rows, variant.columns)]
+                value, c = constrained(columns, residual, variant.trial.one_sided)
+                if value > best[0]:
+                    best = (value, variant.candidate, variant.start(c))
+            if best[1] >= 0:
+                found[best[1]] = best[2]
+        return found

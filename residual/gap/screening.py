@@ -1,8 +1,7 @@
-"""Signatures: how each candidate effect would move the predicted windows, and what it would gain.
+"""Screening: how each candidate effect would move the predicted windows, and what it would gain.
 
-A candidate is tried for one sample interval from every node; the change it makes is then carried
-linearly along the window, and whatever free start states and effects already chosen can imitate is
-projected out. One batch of the simulator serves all windows, and no trial can run away.
+A candidate is tried at small values; from the change that it makes to every window, whatever free
+start states and effects already chosen can imitate is projected out.
 """
 
 from __future__ import annotations
@@ -14,11 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.candidates import Candidate, Trial
-from residual.gap.model import Model
-from residual.gap.samples import Samples
-from residual.gap.shooting import Fit
-from residual.gap.slopes import observe
-from residual.gap.windows import Windows, carry
+from residual.gap.fitting import Fit
 
 Array = NDArray[np.float64]
 
@@ -38,6 +33,14 @@ class Variant:
     trial: Trial
     columns: tuple[int, ...]
     linear: NDArray[np.bool_]
+
+    def start(self, coefficients: Array) -> Array:
+        """Start value of the knobs from linear coefficients of the variant's columns."""
+        start = self.trial.values[0].copy()
+        # A secant far from one times itself says little about the true size.
+        trusted = np.clip(coefficients, -3, 3) if len(coefficients) == 1 else coefficients
+        start[self.linear] = trusted @ self.trial.values[:, self.linear]
+        return start
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,54 +84,18 @@ def project_out(basis: Array, columns: Array) -> Array:
     return columns - q @ (q.T @ columns)
 
 
-def signatures(
-    fit: Fit,
-    samples: Samples,
-    windows: Windows,
-    sigma: Array,
-    candidates: Sequence[Candidate],
-) -> Signatures:
-    """Signatures of all candidates around a fitted model."""
-    model = fit.model
-    n, width = fit.nodes.shape
-    moved: list[Array] = []
-    shown: list[Array] = []
-    variants: list[Variant] = []
-    total = 0
-    base = fit.slope.after
-    for number, candidate in enumerate(candidates):
-        joint = Model(model.simulator, (*model.chosen, candidate))
-        rows = np.vstack([trial.values for trial in candidate.trials])
-        theta = np.hstack([np.repeat(fit.theta[None], len(rows), axis=0), rows])
-        states = np.broadcast_to(fit.nodes, (len(rows), n, width))
-        if joint.width > width:
-            play = [joint.widen(samples, fit.nodes[:, : joint.physical], t) for t in theta]
-            states = np.concatenate([states, np.stack(play)[:, :, width:]], axis=2)
-        if candidate.effect.enters == "sensor":
-            seen = joint.sense(states, theta) - fit.slope.shown
-            shown.append(seen.transpose(1, 2, 0))
-            moved.append(np.zeros((n, width, len(rows))))
-        else:
-            after = joint.advance(samples, states, theta)[..., :width] - base
-            moved.append(after.transpose(1, 2, 0))
-            shown.append(np.zeros((n, width, len(rows))))
-        for trial in candidate.trials:
-            places = tuple(range(total, total + len(trial.values)))
-            variants.append(Variant(number, trial, places, candidate.linear))
-            total += len(places)
-    start = np.zeros((width, 0))
-    response = carry(windows, fit.slope.by_state, start, np.concatenate(moved, axis=2))
-    columns = observe(samples, windows, fit.slope, response, sigma)
-    measured = samples.measured
-    valid = np.isfinite(samples.seen[:, measured])[windows.index] & windows.inside[..., None]
-    direct = np.concatenate(shown, axis=2)[:, measured][windows.index] / sigma[:, None]
-    columns = columns + direct * valid[..., None]
-    columns = columns.reshape(len(windows), -1, total)
+def signatures(fit: Fit, variants: Sequence[Variant], columns: Array) -> Signatures:
+    """Signatures from what each variant adds to the whitened output of every window.
+
+    Args:
+        fit: The fitted model around which they were computed.
+        variants: Whose columns they are.
+        columns: shape (W, R, c).
+    """
     columns = columns - fit.basis @ (fit.basis.transpose(0, 2, 1) @ columns)
-    weights = fit.weights
-    plain = flatten(columns, weights)
-    chosen = flatten(fit.by_knob, weights)
-    residual = flatten(fit.projected, weights)
+    plain = flatten(columns, fit.weights)
+    chosen = flatten(fit.by_knob, fit.weights)
+    residual = flatten(fit.projected, fit.weights)
     return Signatures(
         tuple(variants),
         project_out(chosen, plain),
@@ -137,6 +104,17 @@ def signatures(
         plain,
         residual,
     )
+
+
+def trials(candidates: Sequence[Candidate]) -> list[Variant]:
+    """Variants of candidates at all their trial values, columns numbered in that order."""
+    found, total = [], 0
+    for number, candidate in enumerate(candidates):
+        for trial in candidate.trials:
+            places = tuple(range(total, total + len(trial.values)))
+            found.append(Variant(number, trial, places, candidate.linear))
+            total += len(places)
+    return found
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,17 +143,8 @@ def gains(
         value, coefficients = constrained(
             matrix[:, variant.columns], residual, variant.trial.one_sided
         )
-        out.append(Gain((number,), value, (variant_start(variant, coefficients),)))
+        out.append(Gain((number,), value, (variant.start(coefficients),)))
     return sorted(out, key=lambda g: -g.value)
-
-
-def variant_start(variant: Variant, coefficients: Array) -> Array:
-    """Start value of the knobs from linear coefficients of the variant's columns."""
-    start = variant.trial.values[0].copy()
-    # A secant far from one times itself says little about the true size.
-    trusted = np.clip(coefficients, -3, 3) if len(coefficients) == 1 else coefficients
-    start[variant.linear] = trusted @ variant.trial.values[:, variant.linear]
-    return start
 
 
 def constrained(
@@ -239,6 +208,6 @@ def pair_gains(
             sides = np.append(first.trial.one_sided, second.trial.one_sided)
             value, c = constrained_gram(gram[np.ix_(columns, columns)], right[columns], sides)
             k = len(first.columns)
-            starts = (variant_start(first, c[:k]), variant_start(second, c[k:]))
+            starts = (first.start(c[:k]), second.start(c[k:]))
             out.append(Gain((i, j), value, starts))
     return sorted(out, key=lambda g: -g.value)[:top]
