@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from studies import find_gap
-from studies.real_systems import sum_accelerations
+from studies.real.prepare import sum_accelerations
 
 ROOT = Path(__file__).parents[2]
 DATA = Path(os.environ.get("SIMGAP_DATA", ROOT.parent / "shared" / "data"))
