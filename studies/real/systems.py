@@ -132,7 +132,6 @@ class Drives(EquationOfMotion):
 
     name = "drives"
     substeps = 2
-    action_channels = ()
 
     def __init__(self, inertias: Sequence[float], names: Sequence[str], dt: float) -> None:
         """Make the drives.
@@ -156,10 +155,8 @@ class Drives(EquationOfMotion):
 
     def acceleration(self, q: Array, v: Array, u: Array, force: Array, p: Any) -> Array:
         """Torque over inertia."""
-        inertia = np.stack(
-            [np.broadcast_to(getattr(p, n), len(u)) for n in self.parameters], axis=1
-        )
-        return (u + force) / inertia
+        inertias = [np.broadcast_to(getattr(p, n), len(u)) for n in self.parameters]
+        return (u + force) / np.stack(inertias, axis=1)
 
 
 class Car(FirstOrderSystem):
