@@ -128,7 +128,7 @@ def test_an_unknown_rig_is_one_line(tmp_path, capsys):
 
 
 needs_data = pytest.mark.skipif(
-    not DATA.is_dir(), reason="no data: set SIMGAP_DATA to the folder described in docs/real-rigs.md"
+    not DATA.is_dir(), reason="no data: set SIMGAP_DATA to the folder of docs/real-rigs.md"
 )
 
 
