@@ -9,14 +9,11 @@ it, every jump inside a sub-step would leave a lasting error of the position.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal
 
 import numpy as np
 
 from sims.effects.actuator import ActuatorEffect, ActuatorLag, Delay, StaticActuatorEffect
-from sims.simulator import Array
-
-Hold = Literal["zero", "linear"]
+from sims.simulator import Array, Hold
 
 
 def column(value: float | Array) -> float | Array:

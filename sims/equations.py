@@ -38,6 +38,7 @@ class EquationOfMotion(HostSimulator):
     dt = 0.02
     substeps = 10
     parameters: Mapping[str, Parameter] = {}
+    advances_rows_at_once = True
 
     def __init__(
         self,
@@ -171,6 +172,7 @@ class FirstOrderSystem(HostSimulator):
     dt = 1.0
     substeps = 5
     parameters: Mapping[str, Parameter] = {}
+    advances_rows_at_once = True
 
     def __init__(
         self,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import abc
 import copy
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -19,11 +19,11 @@ from numpy.typing import ArrayLike
 from sims import drive as path
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
-from sims.effects.base import Effect
+from sims.effects.base import Effect, place
 from sims.effects.joint import JointEffect
 from sims.effects.parameter import ParameterChange
 from sims.effects.sensor import SensorEffect
-from sims.simulator import Array, Channel, Simulator, random_values
+from sims.simulator import Array, Channel, Hold, Simulator, random_values
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,6 +62,8 @@ class HostSimulator(Simulator):
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
         has_contacts: True if motion jumps at impacts, so that it can be compared with logs over
             short windows only (``residual.gap.contact``).
+        advances_rows_at_once: True if ``integrate`` advances all rows together, each with its own
+            values of effects and parameters, so that a batch costs little more than a row.
     """
 
     effects: tuple[Effect, ...] = ()
@@ -69,6 +71,7 @@ class HostSimulator(Simulator):
     substeps: int
     has_drive_force: bool = False
     has_contacts: bool = False
+    advances_rows_at_once: bool = False
 
     @abc.abstractmethod
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
@@ -141,6 +144,22 @@ class HostSimulator(Simulator):
         }
         return changed
 
+    def with_hold(self, hold: Mapping[str, Hold]) -> Self:
+        """A copy in which some inputs run otherwise between samples, ``{"torque": "linear"}``.
+
+        Raises:
+            ValueError: There is no such input, or no such hold.
+        """
+        inputs = {channel.name: channel for channel in self.action_channels}
+        for name, kind in hold.items():
+            channel = place("actuator", name, inputs)
+            if kind not in ("zero", "linear"):
+                raise ValueError(f"hold of {name!r} is {kind!r}, expected 'zero' or 'linear'")
+            inputs[name] = dataclasses.replace(channel, hold=kind)
+        changed = copy.copy(self)
+        changed.action_channels = tuple(inputs.values())
+        return changed
+
     def take(self, index: Any) -> Self:
         """A copy for some rows: values given per row are indexed, the others kept."""
         changed = copy.copy(self)
@@ -162,8 +181,9 @@ class HostSimulator(Simulator):
         return values
 
     def joint_effects(self) -> list[JointEffect]:
-        """The forces among the effects that are not at zero strength."""
-        return [e for e in self.effects if isinstance(e, JointEffect) and not e.absent]
+        """The forces among the effects that are not at zero strength, in their simplest parts."""
+        effects = [e for e in self.effects if isinstance(e, JointEffect) and not e.absent]
+        return [part for effect in effects for part in effect.parts()]
 
     def plays(self) -> list[Backlash]:
         """The backlashes that are not at zero strength."""
@@ -181,13 +201,36 @@ class HostSimulator(Simulator):
 
     def step(self, states: ArrayLike, actions: ArrayLike) -> Array:
         """Advance every row by one control period; see ``Simulator.step``."""
-        states, actions = self.check_rows(states, actions)
-        if not self.effects:
+        return self._step(*self.check_rows(states, actions))
+
+    def rollout(self, start: ArrayLike, actions: ArrayLike) -> Array:
+        """Step through a sequence of actions; see ``Simulator.rollout``.
+
+        An input whose channel says ``hold="linear"`` runs straight from every action to the next
+        and holds the last; ``step``, which knows no next action, holds it.
+        """
+        if all(channel.hold == "zero" for channel in self.action_channels):
+            return super().rollout(start, actions)
+        start, actions = np.asarray(start, float), np.asarray(actions, float)
+        single = start.ndim == 1
+        if single:
+            start, actions = start[None], actions[None]
+        states = np.empty((len(start), actions.shape[1] + 1, start.shape[1]))
+        states[:, 0] = start
+        last = actions.shape[1] - 1
+        for k in range(last + 1):
+            now = self.check_rows(states[:, k], actions[:, k])
+            upcoming = self._clip(actions[:, min(k + 1, last)])
+            states[:, k + 1] = self._step(*now, upcoming)
+        return states[0] if single else states
+
+    def _step(self, states: Array, actions: Array, upcoming: Array | None = None) -> Array:
+        if not self.effects and upcoming is None:
             inputs = np.repeat(actions[:, None, :], self.substeps, axis=1)
             return self.integrate(states, inputs, np.full(len(states), self.dt))
         own = len(self.integrated_channels)
         following = np.empty_like(states)
-        inputs, following[:, own:] = self._inputs(states[:, own:], actions)
+        inputs, following[:, own:] = self._inputs(states[:, own:], actions, upcoming)
         durations = np.full(len(states), self.dt)
         true = self.integrate(self.unsense(states[:, :own]), inputs, durations)
         following[:, :own] = self.sense(true)
@@ -198,7 +241,7 @@ class HostSimulator(Simulator):
         actions: ArrayLike,
         durations: ArrayLike,
         substeps: int | None = None,
-        hold: path.Hold = "zero",
+        hold: Hold | Sequence[Hold] | None = None,
         before: ArrayLike | None = None,
         rises: bool = False,
     ) -> Array:
@@ -209,7 +252,8 @@ class HostSimulator(Simulator):
             durations: shape (T,), lengths of the intervals in seconds.
             substeps: Sub-steps per interval; by default the simulator's own.
             hold: Whether a command is held over its interval (``"zero"``) or runs straight to
-                the next (``"linear"``).
+                the next (``"linear"``): one for all inputs or one for each; by default what
+                every channel says.
             before: shape (k, n_a), earlier commands, as far apart as the first interval is
                 long; without them the input is taken to have had its first value.
             rises: Whether to tell how the input runs within sub-steps too. ``integrate`` is
@@ -232,6 +276,7 @@ class HostSimulator(Simulator):
                 "the durations, which must be positive, and a column for each input"
             )
         substeps = substeps or self.substeps
+        holds = self._holds(hold)
         earlier = np.empty((0, actions.shape[1])) if before is None else np.asarray(before, float)
         k = len(earlier)
         durations = np.concatenate([np.full(k, durations[:1]), durations])
@@ -243,7 +288,7 @@ class HostSimulator(Simulator):
             late = path.total_delay(effects)
             if np.ndim(late):
                 samples = np.broadcast_to(samples, (len(np.asarray(late)), samples.shape[1]))
-            means, rise = path.substep_inputs(samples, durations, substeps, late, hold)
+            means, rise = path.substep_inputs(samples, durations, substeps, late, holds[j])
             for lag in path.lags(effects):
                 shape = (lag.rows or len(means), *means.shape[1:])
                 means, rise = np.broadcast_to(means, shape), np.broadcast_to(rise, shape)
@@ -308,6 +353,16 @@ class HostSimulator(Simulator):
         low = [channel.low for channel in self.action_channels]
         return np.clip(actions, low, [channel.high for channel in self.action_channels])
 
+    def _holds(self, hold: Hold | Sequence[Hold] | None) -> list[Hold]:
+        """How each input runs between samples."""
+        if hold is None:
+            return [channel.hold for channel in self.action_channels]
+        if isinstance(hold, str):
+            return [hold] * len(self.action_channels)
+        if len(hold) != len(self.action_channels):
+            raise ValueError(f"hold has {len(hold)} entries for {len(self.action_channels)} inputs")
+        return list(hold)
+
     def _history(self, actuator: str) -> int:
         """Past commands that the delays of an input reach back to."""
         late = path.total_delay(self.actuator_effects(actuator))
@@ -327,30 +382,37 @@ class HostSimulator(Simulator):
                 name = f"{channel.name} lagged" + (f" {i + 1}" if i else "")
                 yield Channel(name, channel.unit, "memory", scale=channel.scale)
 
-    def _inputs(self, memory: Array, actions: Array) -> tuple[Array, Array]:
-        """Effective inputs of one control period and the memory after it."""
+    def _inputs(self, memory: Array, actions: Array, upcoming: Array | None) -> tuple[Array, Array]:
+        """Effective inputs of one control period and the memory after it.
+
+        The upcoming actions matter for inputs that run straight to them.
+        """
         inputs = np.repeat(actions[:, None, :], self.substeps, axis=1)
-        if not any(isinstance(effect, ActuatorEffect) for effect in self.effects):
+        acting = any(isinstance(effect, ActuatorEffect) for effect in self.effects)
+        if not acting and upcoming is None:
             return inputs, memory
         inputs = np.stack([inputs, np.zeros_like(inputs)], axis=-1)
         after = np.empty_like(memory)
         at = 0
         for j, channel in enumerate(self.action_channels):
             effects = self.actuator_effects(channel.name)
-            if not effects:
+            straight = upcoming is not None and channel.hold == "linear"
+            if not effects and not straight:
                 continue
             kept = self._history(channel.name)
             commands = np.concatenate([memory[:, at : at + kept], actions[:, j : j + 1]], axis=1)
             after[:, at : at + kept] = commands[:, 1:]
             at += kept
+            if upcoming is not None and straight:
+                commands = np.concatenate([commands, upcoming[:, j : j + 1]], axis=1)
             means, rises = path.substep_inputs(
                 path.shaped(commands, effects),
-                np.full(kept + 1, self.dt),
+                np.full(commands.shape[1], self.dt),
                 self.substeps,
                 path.total_delay(effects),
-                "zero",
+                "linear" if straight else "zero",
             )
-            means, rises = means[:, -1:], rises[:, -1:]
+            means, rises = means[:, kept : kept + 1], rises[:, kept : kept + 1]
             for lag in path.lags(effects):
                 means, rises, after[:, at] = path.lagged(
                     means, rises, np.array([self.dt]), lag.time_constant, memory[:, at]

@@ -35,7 +35,9 @@ def pendulum_parameters(mass: float = IDEALISED_MASS) -> dict[str, Parameter]:
         "inertia": Parameter(1.91e-4, "kg m^2", "moment of inertia about the pivot", low=1e-6),
         "length": Parameter(0.042, "m", "distance of the centre of gravity", low=0.0),
         "gravity": Parameter(9.81, "m/s^2", "acceleration of gravity", low=0.0),
-        "damping": Parameter(3e-6, "N m s/rad", "viscous damping of the bearing", low=0.0),
+        "damping": Parameter(
+            3e-6, "N m s/rad", "viscous damping of the bearing", low=0.0, family="dissipation"
+        ),
         "torque_constant": Parameter(0.0536, "N m/A", "torque constant of the motor", low=1e-6),
         "resistance": Parameter(9.5, "ohm", "resistance of the motor winding", low=1e-3),
     }

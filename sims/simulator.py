@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+Hold = Literal["zero", "linear"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,6 +32,10 @@ class Channel:
         low, high: Bounds; only inputs are clipped to them.
         invariant: True if the motion is the same wherever the channel is (how far a walker
             has come): policies and difference models need not see it.
+        hold: How an input runs between two samples of a record: held (``"zero"``), as commands
+            are, or straight to the next (``"linear"``), as most measured inputs are.
+        integrates: Name of the measured channel that this one is the integral of, as a heading
+            may be summed up from a yaw rate: its noise is then a random walk.
     """
 
     name: str
@@ -42,6 +47,8 @@ class Channel:
     low: float = -math.inf
     high: float = math.inf
     invariant: bool = False
+    hold: Hold = "zero"
+    integrates: str | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +56,8 @@ class Parameter:
     """A physical parameter that a simulator declares: value, unit, meaning and bounds.
 
     ``value`` may be an array with one entry per row of a batch. ``scale`` is a typical size, for
-    a parameter whose value is zero; otherwise the value tells.
+    a parameter whose value is zero; otherwise the value tells. ``family`` is that of the effects
+    which a change of it resembles, ``"dissipation"`` for a damping (``sims.effects.Effect``).
     """
 
     value: float | Array
@@ -58,6 +66,7 @@ class Parameter:
     low: float = -math.inf
     high: float = math.inf
     scale: float = 1.0
+    family: str = ""
 
 
 class Simulator(abc.ABC):

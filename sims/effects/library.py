@@ -19,7 +19,12 @@ from sims.effects.actuator import (
 )
 from sims.effects.backlash import Backlash
 from sims.effects.base import Effect
-from sims.effects.friction import CoulombFriction, DryFriction, StribeckFriction
+from sims.effects.friction import (
+    CoulombFriction,
+    DirectionalFriction,
+    DryFriction,
+    StribeckFriction,
+)
 from sims.effects.joint import (
     Cogging,
     ConstantLoad,
@@ -40,6 +45,7 @@ JOINT_EFFECTS: tuple[type[Effect], ...] = (
     ViscousFriction,
     CoulombFriction,
     StribeckFriction,
+    DirectionalFriction,
     QuadraticDrag,
     LinearSpring,
     CubicSpring,
@@ -241,7 +247,7 @@ def _response(
     for value in (change, -change):
         changed = simulator.with_effects([effect.with_values(**{name: value})])
         # The actuator path is applied to the input here, where it has no memory.
-        commands = changed.drive(inputs, np.ones(len(inputs)), 2, "zero")
+        commands = changed.drive(inputs, np.ones(len(inputs)), 2, hold="zero")
         durations = np.full(len(states), 0.1 * simulator.dt)
         ends.append(changed.integrate(states, commands, durations))
     scale = np.array([channel.scale for channel in simulator.physical_channels])

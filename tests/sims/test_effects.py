@@ -20,6 +20,7 @@ from sims.effects import (
     CubicSpring,
     DeadZone,
     Delay,
+    DirectionalFriction,
     JointEffect,
     LinearSpring,
     ParameterChange,
@@ -65,7 +66,7 @@ def dead(u, width):
     return math.copysign(max(abs(u) - width, 0.0), u)
 
 
-def stribeck(w):
+def stribeck(w, _):
     return 1e-3 + 1.5e-3 * math.exp(-((w / 0.8) ** 2))
 
 
@@ -105,13 +106,18 @@ EQUATIONS = {
     ),
     "coulomb": (
         CoulombFriction("pivot", 2e-3),
-        lambda s, u: dry_step(s, u, lambda w: 2e-3),
+        lambda s, u: dry_step(s, u, lambda w, _: 2e-3),
         (5e-6, 5e-5),
     ),
     "stribeck": (
         StribeckFriction("pivot", 1e-3, 2.5e-3, 0.8),
         lambda s, u: dry_step(s, u, stribeck),
         (1e-5, 2e-4),
+    ),
+    "directional": (
+        DirectionalFriction("pivot", 3e-3, 5e-4),
+        lambda s, u: dry_step(s, u, lambda _, side: 3e-3 if side > 0 else 5e-4),
+        (5e-6, 5e-5),
     ),
     "gain": (ActuatorGain("voltage", 0.2), lambda s, u: smooth_step(s, 1.2 * u), (1e-6, 1e-5)),
     "bias": (ActuatorBias("voltage", 0.3), lambda s, u: smooth_step(s, u + 0.3), (1e-6, 1e-5)),
@@ -272,6 +278,16 @@ def test_what_friction_holds_does_not_creep(host, friction):
 
 
 @host
+def test_friction_that_differs_by_direction_holds_one_way_and_slips_the_other(host):
+    # 0.1 rad off hanging, gravity pulls back with 2.3e-3 N m.
+    start = np.array([[np.pi - 0.1, 0.0], [np.pi + 0.1, 0.0]])
+    for levels, held in (((3e-3, 1e-3), 0), ((1e-3, 3e-3), 1), ((3e-3, 3e-3), 2)):
+        simulator = HOSTS[host].with_effects([DirectionalFriction("pivot", *levels)])
+        stays = (simulator.step(start, np.zeros((2, 1))) == start).all(axis=1)
+        assert np.array_equal(stays, {0: [True, False], 1: [False, True], 2: [True, True]}[held])
+
+
+@host
 def test_a_swing_with_dry_friction_comes_to_rest_in_finite_time(host):
     simulator = HOSTS[host].with_effects([CoulombFriction("pivot", 2e-3)])
     path = simulator.rollout([np.pi - 1.5, 0.0], np.zeros((60, 1)))
@@ -389,3 +405,30 @@ def test_an_effect_of_the_users_own_is_hosted(host):
         for s, u in zip(states, actions[:, 0], strict=True)
     ]
     assert found == pytest.approx(np.array(truth), abs=2e-5)
+
+
+def test_every_effect_says_which_family_it_belongs_to():
+    pendulum = Pendulum()
+    families = {str(effect): effect.family_in(pendulum) for effect in library(pendulum)}
+    assert {name for name, family in families.items() if family == "dissipation"} == {
+        "viscous_friction@pivot",
+        "coulomb_friction@pivot",
+        "stribeck_friction@pivot",
+        "directional_friction@pivot",
+        "quadratic_drag@pivot",
+        "damping",
+    }
+    assert families["mass"] == families["actuator_gain@voltage"] == ""
+    dry = {effect.name for effect in library(pendulum) if effect.subfamily == "dry friction"}
+    assert dry == {"coulomb_friction", "stribeck_friction", "directional_friction"}
+    before_the_sensor = {e.name for e in library(pendulum) if e.upstream_of_sensor}
+    assert before_the_sensor == {"dead_zone", "saturation", "actuator_lag"}
+
+
+def test_a_spring_may_rest_anywhere_and_is_absent_without_stiffness():
+    for kind in (LinearSpring, CubicSpring):
+        rest = kind("pivot").quantities(Pendulum())["rest"]
+        assert rest.role == "shape" and rest.starts == (-0.5, 0.0, 0.5)
+        assert kind("pivot", 0.0, 0.4).absent
+        assert not np.any(kind("pivot", np.zeros(3), np.ones(3)).present())
+        assert next(e for e in library(Pendulum()) if isinstance(e, kind)) == kind("pivot")

@@ -79,6 +79,13 @@ def test_arguments_are_kept():
     assert load_simulator(settings).parameters["mass"].value == 0.07
 
 
+def test_a_class_that_is_out_of_reach_says_where_to_start(tmp_path):
+    path = tmp_path / "corrected.yaml"
+    path.write_text(yaml.safe_dump({"class_path": "arm_of_mine.Arm", "init_args": {}}))
+    with pytest.raises(ValueError, match=r"no module 'arm_of_mine'.*PYTHONPATH"):
+        load_simulator(path)
+
+
 @pytest.mark.parametrize(
     ("source", "names"),
     [
