@@ -1,17 +1,15 @@
-"""Nominal models of the measured systems in docs/find-gap.md: what one would write down first."""
+"""Nominal models of the measured rigs in docs/real-rigs.md: what one would write down first."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.host import Joint
 from sims.simulator import Array, Channel, Parameter
-from studies.running.files import atomic_write_text
 
 GRAVITY = 9.81
 
@@ -111,7 +109,7 @@ class FallingPhone(EquationOfMotion):
     """A phone in free flight, per unit of mass: v' = -9.8 m/s^2.
 
     Its accelerometer feels every force but gravity. What was measured is thus no state; summed
-    up from rest it gives the velocity but for the start speed (docs/find-gap.md).
+    up from rest it gives the velocity but for the start speed (docs/real-rigs.md).
     """
 
     name = "falling phone"
@@ -129,22 +127,85 @@ class FallingPhone(EquationOfMotion):
         return force - 9.8
 
 
-def sum_accelerations(source: str | Path, target: str | Path) -> None:
-    """Sum an accelerometer's log up to velocities, for ``FallingPhone``.
+class Drives(EquationOfMotion):
+    """Drives of which each turns an inertia, on its own: J q'' = torque."""
 
-    The start speed of a trial is not in the log; it is taken as zero, which is nearly true for a
-    phone that was dropped and wrong for one that was thrown.
+    name = "drives"
+    substeps = 2
 
-    Args:
-        source: CSV with columns kind, trial, t in s and az in m/s^2, zero in free fall.
-        target: CSV to write, with the column velocity in m/s in place of az.
+    def __init__(self, inertias: Sequence[float], names: Sequence[str], dt: float) -> None:
+        """Make the drives.
+
+        Args:
+            inertias: Moment of inertia of each in kg m^2.
+            names: What each is called; its channels are ``angle``, ``rate`` and ``torque`` of it.
+            dt: Control period in s.
+        """
+        angles = [Channel(f"angle {n}", "rad", "position", angle=True) for n in names]
+        rates = [Channel(f"rate {n}", "rad/s", "rate", rate_of=f"angle {n}") for n in names]
+        self.state_channels = (*angles, *rates)
+        self.action_channels = tuple(
+            Channel(f"torque {n}", "N m", "input", scale=5.0) for n in names
+        )
+        self.parameters = {
+            f"inertia {n}": Parameter(value, "kg m^2", f"inertia of drive {n}", low=1e-5)
+            for n, value in zip(names, inertias, strict=True)
+        }
+        super().__init__(dt=dt)
+
+    def acceleration(self, q: Array, v: Array, u: Array, force: Array, p: Any) -> Array:
+        """Torque over inertia."""
+        inertias = [np.broadcast_to(getattr(p, n), len(u)) for n in self.parameters]
+        return (u + force) / np.stack(inertias, axis=1)
+
+
+class Car(FirstOrderSystem):
+    """A model car at low speed: a bicycle that rolls where its wheels point, actuators ideal.
+
+    x' = v cos h, y' = v sin h, h' = v tan(steering) / wheelbase; the speed is the one asked for
+    within a control period.
     """
-    table = pd.read_csv(source)
-    trials = []
-    for _, trial in table.groupby(["kind", "trial"], sort=False):
-        steps = np.diff(trial["t"])
-        middle = 0.5 * (trial["az"].to_numpy()[1:] + trial["az"].to_numpy()[:-1])
-        felt = np.concatenate([[0.0], np.cumsum(steps * middle)])
-        trials.append(trial.assign(velocity=felt - 9.8 * (trial["t"] - trial["t"].iloc[0])))
-    columns = ["kind", "trial", "t", "velocity"]
-    atomic_write_text(target, pd.concat(trials)[columns].to_csv(index=False))
+
+    name = "car"
+    dt = 0.025
+    substeps = 5
+    state_channels = (
+        Channel("x", "m", "other", invariant=True),
+        Channel("y", "m", "other", invariant=True),
+        Channel("heading", "rad", "other", angle=True),
+        Channel("speed", "m/s", "other"),
+    )
+    action_channels = (
+        Channel("steering", "rad", "input", scale=0.2),
+        Channel("speed_command", "m/s", "input"),
+    )
+    parameters = {"wheelbase": Parameter(0.3302, "m", "wheelbase", low=0.01)}  # noqa: RUF012
+
+    def derivative(self, x: Array, u: Array, p: Any) -> Array:
+        """Rolling without slip."""
+        heading, speed = x[:, 2], x[:, 3]
+        reached = (u[:, 1] - speed) / (self.dt / 5)
+        turn = speed * np.tan(u[:, 0]) / p.wheelbase
+        return np.stack([speed * np.cos(heading), speed * np.sin(heading), turn, reached], axis=1)
+
+
+class CoastingRocket(EquationOfMotion):
+    """A rocket after burn-out, going straight up: h'' = -9.807 m/s^2.
+
+    What pushes on it acts on its frontal area, so forces are counted per m^2 of it; the area per
+    kg differs between rockets and comes with the log.
+    """
+
+    name = "coasting rocket"
+    dt = 0.1
+    substeps = 1
+    state_channels = (
+        Channel("altitude", "m", "position", scale=1000.0, invariant=True),
+        Channel("speed", "m/s", "rate", rate_of="altitude", scale=100.0),
+    )
+    action_channels = (Channel("area_per_mass", "m2/kg", "input", scale=1e-3),)
+    joints = (Joint("airframe", "altitude", "speed", "N/m^2", scale=1e4),)
+
+    def acceleration(self, q: Array, v: Array, u: Array, force: Array, p: Any) -> Array:
+        """Free fall with a pressure on the frontal area."""
+        return force * u - 9.807
