@@ -12,8 +12,8 @@ import dataclasses
 
 from residual.gap.search import Key, Search
 
-#: Part of the remaining error that an effect must take off.
-MATERIAL = 0.2
+#: Part of the remaining error that an effect must take off: over all joints, or at one of several.
+MATERIAL, AT_ONE = 0.2, 1 / 3
 #: And of the nominal error.
 TRIFLE = 0.02
 #: Differences of relative errors below this are none.
@@ -35,17 +35,16 @@ class Choice:
     minor: dict[int, Key]
 
 
-def choose(search: Search, refused: dict[Key, str]) -> Choice:
+def choose(search: Search) -> Choice:
     """The set with the fewest numbers among those that forecast best, each effect material.
 
     Args:
         search: Fitted and cross-validated sets.
-        refused: Sets that cannot be right, such as by an absurd size of a number, and why.
     """
-    open_ = [key for key in search.usable() if key not in refused]
+    open_ = search.usable()
     best = min(open_, key=search.error)
-    near = [key for key in open_ if as_good(search, key, best)]
-    key = min(near, key=lambda k: (search.numbers(k), search.error(k)))
+    fewest = min(search.numbers(key) for key in open_ if as_good(search, key, best))
+    key = min((key for key in open_ if search.numbers(key) <= fewest), key=search.error)
     minor: dict[int, Key] = {}
     while key:
         smaller = _smaller(search, key, open_)
@@ -59,7 +58,7 @@ def choose(search: Search, refused: dict[Key, str]) -> Choice:
     if key and not _helps(search, (), key):
         key = ()
     minor = {number: found for number, found in minor.items() if number not in key}
-    return Choice(key, _reasons(search, key, refused), minor)
+    return Choice(key, _reasons(search, key), minor)
 
 
 def _smaller(search: Search, key: Key, among: list[Key]) -> list[Key]:
@@ -78,12 +77,14 @@ def as_good(search: Search, key: Key, best: Key) -> bool:
 
 
 def material(search: Search, smaller: Key, larger: Key) -> bool:
-    """Whether a set takes a fifth off what a smaller one leaves, in all or at one joint."""
-    if search.error(larger) >= search.error(smaller):
-        return False
+    """Whether a set takes a fifth off what a smaller one leaves, or a third at one of its joints."""
     before = search.currency.by_group(search.validated[smaller].squares)
     after = search.currency.by_group(search.validated[larger].squares)
-    return bool(((before - after > MATERIAL * before) & (before - after > TRIFLE)).any())
+    gained = before - after
+    if gained.mean() <= 0:
+        return False
+    over_all = gained.mean() > max(MATERIAL * before.mean(), TRIFLE)
+    return bool(over_all or ((gained > AT_ONE * before) & (gained > TRIFLE)).any())
 
 
 def _helps(search: Search, smaller: Key, larger: Key) -> bool:
@@ -93,7 +94,7 @@ def _helps(search: Search, smaller: Key, larger: Key) -> bool:
     return gained > error
 
 
-def _reasons(search: Search, chosen: Key, refused: dict[Key, str]) -> dict[Key, str]:
+def _reasons(search: Search, chosen: Key) -> dict[Key, str]:
     """One reason for every set that was tried and not chosen."""
     found = {}
     own = search.error(chosen)
@@ -102,8 +103,8 @@ def _reasons(search: Search, chosen: Key, refused: dict[Key, str]) -> dict[Key, 
             continue
         if key in search.unfit:
             found[key] = "did not converge"
-        elif key in refused:
-            found[key] = refused[key]
+        elif key in search.refused:
+            found[key] = search.refused[key]
         elif search.error(key) > own + SAME:
             found[key] = f"{search.error(key) / max(own, 1e-12):.2g} times the error" + _worst(
                 search, key, chosen

@@ -40,8 +40,8 @@ class Currency:
 
     def by_block(self, squares: Array) -> Array:
         """Share of every block and group in the relative error, (B, g); sums over B are errors."""
-        roots, base = np.sqrt(squares), np.nansum(np.sqrt(self.nominal), axis=0)
-        shares = np.nan_to_num(roots / np.maximum(base, 1e-300))
+        weights = np.sqrt(self.nominal) / np.maximum(np.nansum(self.nominal, axis=0), 1e-300)
+        shares = np.nan_to_num(np.sqrt(squares) * weights)
         return np.stack([shares[:, list(group)].mean(axis=1) for group in self.groups], axis=1)
 
     def by_group(self, squares: Array) -> Array:

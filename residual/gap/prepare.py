@@ -15,7 +15,7 @@ from residual.gap.model import Model
 from residual.gap.numerics import stride_for, substeps_for
 from residual.gap.samples import Samples
 from residual.gap.smooth import LEAD, SmoothFitter
-from residual.gap.windows import Windows, by_growth
+from residual.gap.windows import cut
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
@@ -44,9 +44,8 @@ def smooth_fitter(
     nodes = paths.measured(model, samples, np.zeros(0))
     scale = paths.variation(samples, nodes)
     floor = noise.estimate(model, samples, nodes, np.zeros(0), noise.local_noise(samples), scale)
-    longest = max(6, round((1 + LEAD / (1 - LEAD)) * horizon / samples.step) + 1)
-    shortest = min(longest, max(6, longest // 3))
-    windows = by_growth(samples, floor.slope.by_state, scale, longest, shortest)
+    length = max(6, round(horizon / 0.75 / samples.step) + 1)
+    windows = cut(samples, floor.slope.by_state, scale, length)
     moving = np.array(noise.driven_states(model))
     grouped = blocks(samples, windows, drive(samples, nodes, moving), most)
     start = SmoothFitter(samples, grouped, nodes, floor.slope.by_state, floor.sigma, scale)

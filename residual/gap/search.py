@@ -18,7 +18,8 @@ from residual.gap.candidates import Candidate
 from residual.gap.currency import Currency, groups
 from residual.gap.fitting import Fit, Fitter
 from residual.gap.model import Model
-from residual.gap.screening import Signatures, constrained, gains, pair_gains, signatures, trials
+from residual.gap.plausible import absurd
+from residual.gap.screening import Gain, Signatures, gains, pair_gains, signatures, trials
 from residual.gap.validation import Validated, validate
 from sims.host import HostSimulator
 
@@ -54,6 +55,7 @@ class Search:
     Attributes:
         tried: Every fitted set: sorted candidate numbers -> fit.
         unfit: Sets that did not converge.
+        refused: Sets that cannot be right whatever they take off, and why.
         validated: Cross-validated forecasts of the sets.
         currency: Relative errors.
     """
@@ -71,6 +73,7 @@ class Search:
         self.effort, self.tell, self.until = effort or Effort(), tell, until
         self.tried: dict[Key, Fit] = {(): fitter.fit(Model(simulator), np.zeros(0))}
         self.unfit: set[Key] = set()
+        self.refused: dict[Key, str] = {}
         self._signatures: dict[Key, Signatures] = {}
         channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
         nominal = validate(fitter, self.tried[()])
@@ -95,9 +98,14 @@ class Search:
         """Free numbers of a set."""
         return sum(len(self.candidates[i].knobs) for i in key)
 
+    def fits_in(self, key: Key) -> bool:
+        """Whether a set has few enough numbers for the windows there are."""
+        windows = len(self.fitter.blocks.windows)
+        return len(key) <= self.effort.most and self.numbers(key) <= max(3, windows // 2)
+
     def usable(self) -> list[Key]:
-        """Sets that converged."""
-        return [key for key in self.validated if key not in self.unfit]
+        """Sets that converged and may be right."""
+        return [k for k in self.validated if k not in self.unfit and k not in self.refused]
 
     def best(self) -> Key:
         """The set that forecasts best."""
@@ -136,10 +144,8 @@ class Search:
         """Fit and validate sets that were not tried yet."""
         fresh = []
         for key, theta in proposals.items():
-            if key in self.tried:
+            if key in self.tried or self.late:
                 continue
-            if self.late and fresh:
-                break
             self.fit(key, theta)
             fresh.append(key)
             error = 100 * self.error(key)
@@ -160,6 +166,9 @@ class Search:
                 self.unfit.add(key)
         self.tried[key] = found
         self.validated[key] = validate(self.fitter, found)
+        reason = absurd(found.model, found.theta, self.fitter.samples)
+        if reason:
+            self.refused[key] = reason
 
     def _from_nested(self, key: Key, nested: Key, theta: Array) -> Array:
         """Numbers of a nested set, what it lacks hardly there."""
@@ -176,7 +185,7 @@ class Search:
                     start[j] = np.clip(0.01 * model.knobs[j].step, model.low[j], model.high[j])
         return start
 
-    # -- proposals ------------------------------------------------------------------------
+    # -- growing --------------------------------------------------------------------------
 
     def run(self, seeds: Proposals | None = None) -> Key:
         """Grow sets until one more effect no longer pays; returns the one that forecasts best."""
@@ -185,10 +194,10 @@ class Search:
         frontier: list[Key] = [()]
         reached = 1.0
         for level in range(1, effort.most + 1):
-            proposals: Proposals = {}
+            fresh: list[Key] = []
             for key in frontier:
-                proposals |= self.proposals(key)
-            fresh = [key for key in self.add(proposals) if key not in self.unfit]
+                grown = self.grow(key)
+                fresh += grown + self.together(key, grown)
             if not fresh or self.late:
                 break
             by_merit = sorted(fresh, key=lambda k: self.tried[k].merit)[: effort.beam]
@@ -209,53 +218,69 @@ class Search:
         its = self.currency.by_group(self.validated[before].squares)
         return bool((own < (1 - 2 * self.effort.stale) * its).any())
 
-    def proposals(self, key: Key) -> Proposals:
-        """Sets one effect larger than a fitted one, the best by the linear screen first."""
-        if len(key) >= self.effort.most:
-            return {}
+    def grow(self, key: Key) -> list[Key]:
+        """Fit sets one effect larger than a fitted one, the best of the linear screen for each
+        joint; those that turn out absurd are replaced by the next."""
         around = self.signatures(key)
-        found: Proposals = {}
-        wanted = self.effort.grown if key else self.effort.singles
-        for gain in gains(around):
-            number = around.variants[gain.variants[0]].candidate
-            if number in key or gain.value <= 0:
-                continue
-            fresh, theta = self.merged(key, [(number, gain.values[0])])
-            if fresh not in found and len(found) < wanted:
-                found[fresh] = theta
-        together = self._one_for_each_group(key, around)
-        if len(together) > 1 and len(key) + len(together) <= self.effort.most:
-            fresh, theta = self.merged(key, together.items())
-            found.setdefault(fresh, theta)
+        places = self.currency.groups
+        total = self.effort.grown if key else self.effort.singles
+        wanted = max(2, -(-total // len(places)))
+        found: list[Key] = []
+        for group in places:
+            good = 0
+            for gain in self._by_gain(around, group)[: 3 * wanted]:
+                number = around.variants[gain.variants[0]].candidate
+                fresh, theta = self.merged(key, [(number, gain.values[0])])
+                if number in key or gain.value <= 0 or not self.fits_in(fresh):
+                    continue
+                if fresh not in found:
+                    self.add({fresh: theta})
+                    if fresh in self.tried and self.usable_set(fresh):
+                        found.append(fresh)
+                good += fresh in found
+                if good >= wanted or self.late:
+                    break
         if not key:
             for pair in pair_gains(around, self.effort.pairs):
                 numbers = [around.variants[v].candidate for v in pair.variants]
                 fresh, theta = self.merged(key, zip(numbers, pair.values, strict=True))
-                found.setdefault(fresh, theta)
-        return found
+                self.add({fresh: theta})
+                if fresh in self.tried and self.usable_set(fresh):
+                    found.append(fresh)
+        return list(dict.fromkeys(found))
 
-    def _one_for_each_group(self, key: Key, around: Signatures) -> dict[int, Array]:
-        """The best effect for every joint by its own channels, where several joints are off."""
-        places = self.currency.groups
-        if len(places) < 2:
-            return {}
-        measured = len(self.fitter.samples.measured)
-        channel = np.arange(len(around.residual)) % measured
-        found: dict[int, Array] = {}
-        for group in places:
-            rows = np.isin(channel, group)
-            residual = around.residual[rows]
-            total = float(residual @ residual)
-            if total <= 0:
-                continue
-            best = (0.2 * total, -1, np.zeros(0))
-            for variant in around.variants:
-                if variant.candidate in key:
+    def usable_set(self, key: Key) -> bool:
+        """Whether a fitted set converged and may be right."""
+        return key not in self.unfit and key not in self.refused
+
+    def together(self, key: Key, grown: list[Key]) -> list[Key]:
+        """The set with the best addition for every joint at once, if several joints gain."""
+        if len(self.currency.groups) < 2:
+            return []
+        base = self.currency.by_group(self.validated[key].squares)
+        additions: dict[int, Array] = {}
+        for group in range(len(base)):
+            best, reached = None, (1 - 2 * self.effort.stale) * base[group]
+            for fresh in grown:
+                if len(fresh) != len(key) + 1:
                     continue
-                columns = around.matrix[np.ix_(rows, variant.columns)]
-                value, c = constrained(columns, residual, variant.trial.one_sided)
-                if value > best[0]:
-                    best = (value, variant.candidate, variant.start(c))
-            if best[1] >= 0:
-                found[best[1]] = best[2]
-        return found
+                error = self.currency.by_group(self.validated[fresh].squares)[group]
+                if error < reached:
+                    best, reached = fresh, error
+            if best is not None:
+                (number,) = set(best) - set(key)
+                fit = self.tried[best]
+                additions[number] = fit.theta[fit.model.owner == best.index(number)]
+        fresh, theta = self.merged(key, additions.items())
+        if len(additions) < 2 or not self.fits_in(fresh):
+            return []
+        self.add({fresh: theta})
+        return [fresh] if fresh in self.tried and self.usable_set(fresh) else []
+
+    def _by_gain(self, around: Signatures, group: tuple[int, ...]) -> list[Gain]:
+        """Gains counted on the channels of one joint."""
+        if len(self.currency.groups) < 2:
+            return gains(around)
+        measured = len(self.fitter.samples.measured)
+        rows = np.isin(np.arange(len(around.residual)) % measured, group)
+        return gains(around, around.residual[rows], around.matrix[rows])

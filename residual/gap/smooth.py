@@ -20,7 +20,7 @@ from residual.gap.windows import carry
 Array = NDArray[np.float64]
 
 #: Part of a window that a forecast's start state is fitted to, and its least number of samples.
-LEAD, LEAST = 0.25, 5
+LEAD, LEAST = float(__import__('os').environ.get('LEAD', 0.25)), 5
 #: Gauss-Newton turns of a start state.
 TURNS = 3
 #: Forecast errors count up to so many times the spread of a channel: a forecast that runs away
@@ -169,13 +169,14 @@ class SmoothFitter:
             states = states.copy()
             states[:, free] += np.clip(step, -limit, limit)
         full = self._shown(model, first, best, windows.index.shape[1] - 1, thetas, which)
-        ahead = self._valid & ~lead[..., None]
         spread = np.nanstd(samples.seen[:, measured], axis=0)
-        square = np.minimum((seen - full) ** 2, (LOST * spread) ** 2)
+        square = np.clip(seen - full, -LOST * spread, LOST * spread) ** 2
+        # What happens within the lead-in counts too: a lag shows just after a record's start.
         lengths = windows.inside.sum(axis=1)
-        begun = lead.sum(axis=1)
-        near = np.arange(windows.index.shape[1]) < (begun + 0.5 * (lengths - begun))[:, None]
-        return Foretold(_mean(square, ahead), _mean(square, ahead & near[..., None]), full)
+        near = np.arange(windows.index.shape[1]) < 0.5 * lengths[:, None]
+        return Foretold(
+            _mean(square, self._valid), _mean(square, self._valid & near[..., None]), full
+        )
 
     def _shown(
         self, model: Model, rows: NDArray[np.int64], states: Array, steps: int, thetas: Array,

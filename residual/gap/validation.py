@@ -13,6 +13,9 @@ from residual.gap.fitting import Fit, Fitter, Foretold
 
 Array = NDArray[np.float64]
 
+#: Squared change of all residuals by a usual step of a number, below which it is not fitted.
+IDLE = 1e-4
+
 
 @dataclasses.dataclass(frozen=True)
 class Validated:
@@ -52,10 +55,14 @@ def without_folds(fit: Fit, blocks: Blocks) -> Array:
     found = np.repeat(theta[None], blocks.folds, axis=0)
     if not len(theta) or blocks.folds < 2:
         return found
+    # A number that moves nothing where it stands stays there.
+    alive = np.diag(matrices.sum(axis=0)) * model.step**2 > IDLE
+    low = np.where(alive, model.low - theta, 0.0)
+    high = np.where(alive, model.high - theta, 0.0)
     for fold in range(blocks.folds):
         rest = blocks.fold_of_window != fold
         matrix, right = matrices[rest].sum(axis=0), rights[rest].sum(axis=0)
-        found[fold] += bounded_step(matrix, right, model.low - theta, model.high - theta)
+        found[fold] += bounded_step(matrix, right, low, high)
     return found
 
 
