@@ -16,6 +16,8 @@ from residual.gap.search import Key, Search
 MATERIAL, AT_ONE = 0.2, 1 / 3
 #: And of the nominal error.
 TRIFLE = 0.02
+#: Forecasts so many times as bad are not as good, whatever the chance is.
+NEAR = 1.5
 #: Differences of relative errors below this are none.
 SAME = 0.01
 
@@ -44,7 +46,7 @@ def choose(search: Search) -> Choice:
     open_ = search.usable()
     best = min(open_, key=search.error)
     fewest = min(search.numbers(key) for key in open_ if as_good(search, key, best))
-    key = min((key for key in open_ if search.numbers(key) <= fewest), key=search.error)
+    key = _better_fit(search, [key for key in open_ if search.numbers(key) <= fewest])
     minor: dict[int, Key] = {}
     while key:
         smaller = _smaller(search, key, open_)
@@ -58,7 +60,14 @@ def choose(search: Search) -> Choice:
     if key and not _helps(search, (), key):
         key = ()
     minor = {number: found for number, found in minor.items() if number not in key}
-    return Choice(key, _reasons(search, key), minor)
+    return Choice(key, reasons(search, key), minor)
+
+
+def _better_fit(search: Search, keys: list[Key]) -> Key:
+    """The set that forecasts best, or one that is as good within chance and fits better."""
+    best = min(keys, key=search.error)
+    near = [k for k in keys if as_good(search, k, best) and search.error(k) < NEAR * search.error(best)]
+    return min(near or [best], key=lambda key: search.tried[key].merit)
 
 
 def _smaller(search: Search, key: Key, among: list[Key]) -> list[Key]:
@@ -94,7 +103,7 @@ def _helps(search: Search, smaller: Key, larger: Key) -> bool:
     return gained > error
 
 
-def _reasons(search: Search, chosen: Key) -> dict[Key, str]:
+def reasons(search: Search, chosen: Key) -> dict[Key, str]:
     """One reason for every set that was tried and not chosen."""
     found = {}
     own = search.error(chosen)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from residual.gap.blocks import Blocks
 from residual.gap.candidates import Candidate
 from residual.gap.model import Model
+from residual.gap.noise import Floor
 from residual.gap.samples import Samples
 
 Array = NDArray[np.float64]
@@ -68,6 +69,23 @@ class Foretold:
     shown: Array
 
 
+@dataclasses.dataclass(frozen=True)
+class Left:
+    """What a fit leaves.
+
+    Attributes:
+        adequate: Whether that is no more than noise, in every fold.
+        ratio: Largest residual of a channel over its noise.
+        force: What a force that would explain it follows, in words; empty if none stands out.
+        by_channel: Residual over noise of every measured channel.
+    """
+
+    adequate: bool
+    ratio: float
+    force: str
+    by_channel: tuple[float, ...]
+
+
 class Fitter(Protocol):
     """Fits models to the windows of one table."""
 
@@ -96,3 +114,9 @@ class Fitter(Protocol):
             which: Which of them each window has, (W,).
             fit: Where start states are sought from.
         """
+
+    def redrawn(self, fit: Fit, sigma: Array, rng: np.random.Generator) -> Fitter:
+        """The same windows filled with the fitted simulator's own motion and noise, sigma (m,)."""
+
+    def left(self, fit: Fit, floor: Floor) -> Left:
+        """What a fit leaves, beside the noise."""

@@ -111,7 +111,7 @@ class Model:
                 self._drives.clear()
             host = self.bind(theta)
             parts = []
-            fine = samples.substeps if samples.stride == 1 else 1
+            fine = max(1, samples.substeps // samples.stride)
             for run, recorded in enumerate(samples.recorded):
                 part = host.drive(recorded.actions, recorded.durations, fine, rises=True)
                 parts.append(samples.in_intervals(run, part if part.ndim == 5 else part[None]))

@@ -6,7 +6,8 @@ name, so both are settled on the nominal simulator.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,15 @@ from numpy.typing import NDArray
 from residual.gap import paths
 from residual.gap.model import Model
 from residual.gap.samples import Samples
+from residual.gap.search import Key, Search
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
+from sims.simulator import Hold
 
 Array = NDArray[np.float64]
 
+#: Part of the misfit that the other hold must take off to be believed.
+CLEARER = 0.05
 #: Rows in a forecast horizon that are enough to follow the motion.
 ROWS = 24
 #: Error of one interval by too few sub-steps, as a share of a channel's change in it (a
@@ -69,6 +74,55 @@ def _after(
     rows = np.unique(np.linspace(0, len(samples) - 1, min(len(samples), 800)).astype(int))
     after = model.advance(samples, nodes[rows][None], np.zeros((1, 0)), rows)[0]
     return after, nodes[rows]
+
+
+def better_hold(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory], horizon: float,
+    hold: Hold | Mapping[str, Hold] | None,
+) -> tuple[HostSimulator, list[str]]:  # fmt: skip
+    """The simulator with its inputs held as given, or as the nominal simulator fits better.
+
+    Returns:
+        The simulator, and what there is to say of it.
+    """
+    names = [channel.name for channel in simulator.action_channels]
+    if hold is not None:
+        wanted = hold if isinstance(hold, Mapping) else dict.fromkeys(names, hold)
+        return simulator.with_hold(wanted), []
+    if not names or simulator.has_contacts:
+        return simulator, []
+    from residual.gap.prepare import smooth_fitter
+
+    other = simulator.with_hold(
+        {c.name: "zero" if c.hold == "linear" else "linear" for c in simulator.action_channels}
+    )
+    fitter, _ = smooth_fitter(simulator, trajectories, horizon)
+    own, its = (fitter.fit(Model(s), np.zeros(0)).loss for s in (simulator, other))
+    gained = own - its
+    error = float(gained.std(ddof=1) * np.sqrt(len(gained))) if len(gained) > 1 else np.inf
+    if gained.sum() < max(CLEARER * own.sum(), 3 * error):
+        return simulator, []
+    kinds = {"linear": "run straight from sample to sample", "zero": "are held between samples"}
+    kind = kinds[other.action_channels[0].hold]
+    return other, [
+        f"inputs were taken to {kind}: the nominal simulator fits better so; set hold to say "
+        "otherwise"
+    ]
+
+
+def other_numerics(search: Search, key: Key) -> list[Array]:
+    """Numbers of a set fitted at half the step, and with inputs held the other way, each (p,)."""
+    fitter, fit = search.fitter, search.tried[key]
+    samples = dataclasses.replace(fitter.samples, substeps=2 * fitter.samples.substeps)
+    halved = dataclasses.replace(fitter, samples=samples)  # type: ignore[type-var]
+    found = [halved.fit(fit.model, fit.theta).theta]
+    simulator = search.simulator
+    if simulator.action_channels and not simulator.has_contacts:
+        flipped = simulator.with_hold(
+            {c.name: "zero" if c.hold == "linear" else "linear" for c in simulator.action_channels}
+        )
+        found.append(fitter.fit(Model(flipped, fit.model.chosen), fit.theta).theta)
+    return found
 
 
 def _power(count: int) -> int:

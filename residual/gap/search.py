@@ -185,6 +185,47 @@ class Search:
                     start[j] = np.clip(0.01 * model.knobs[j].step, model.low[j], model.high[j])
         return start
 
+    def add_without_each(self, key: Key) -> None:
+        """Fit what is left of a set without each of its members."""
+        for gone in key:
+            smaller, theta = self.merged(key, (), drop=(gone,))
+            self.add({smaller: theta})
+
+    def add_exchanged(self, key: Key, most: int) -> None:
+        """Fit sets in which one member of a set has been exchanged for what may do its work.
+
+        These are the effects that gain most where the member is missing, and its whole family.
+
+        Args:
+            key: A fitted set.
+            most: Effects that are tried in place of each member, beside its family.
+        """
+        self.add_without_each(key)
+        for gone in key:
+            rest = tuple(i for i in key if i != gone)
+            if rest not in self.tried:
+                continue
+            around, family = self.signatures(rest), self.family(gone)
+            taken: list[int] = []
+            for gain in gains(around):
+                number = around.variants[gain.variants[0]].candidate
+                near = len(taken) < most or (family and self.family(number) == family)
+                if number in key or number in taken or gain.value <= 0 or not near:
+                    continue
+                taken.append(number)
+                fresh, theta = self.merged(rest, [(number, gain.values[0])])
+                self.add({fresh: theta})
+
+    def family(self, number: int) -> str:
+        """What effects that differ in form more than in kind have in common, and where."""
+        effect = self.candidates[number].effect
+        family = effect.family_in(self.simulator)
+        return f"{family}@{self.place(number)}" if family else ""
+
+    def place(self, number: int) -> str:
+        """The joint, actuator, channel or parameter of a candidate."""
+        return self.candidates[number].effect.where
+
     # -- growing --------------------------------------------------------------------------
 
     def run(self, seeds: Proposals | None = None) -> Key:

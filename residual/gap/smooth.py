@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap import shooting
+from residual.gap.adequacy import ERRORS, remainder
 from residual.gap.blocks import Blocks
 from residual.gap.candidates import Candidate
-from residual.gap.fitting import Fit, Foretold
+from residual.gap.fitting import Fit, Foretold, Left
 from residual.gap.model import Model
+from residual.gap.noise import Floor
 from residual.gap.samples import Samples
 from residual.gap.slopes import observe
 from residual.gap.windows import carry
@@ -20,7 +22,7 @@ from residual.gap.windows import carry
 Array = NDArray[np.float64]
 
 #: Part of a window that a forecast's start state is fitted to, and its least number of samples.
-LEAD, LEAST = float(__import__('os').environ.get('LEAD', 0.25)), 5
+LEAD, LEAST = 0.25, 5
 #: Gauss-Newton turns of a start state.
 TURNS = 3
 #: Forecast errors count up to so many times the spread of a channel: a forecast that runs away
@@ -110,11 +112,52 @@ class SmoothFitter:
         columns = observe(samples, windows, shot.slope, response, self.sigma)
         measured = samples.measured
         direct = np.concatenate(shown, axis=2)[:, measured][windows.index] / self.sigma[:, None]
-        columns = columns + direct * self._valid[..., None]
+        columns = columns + direct * self.valid[..., None]
         return columns.reshape(len(windows), -1, columns.shape[-1])
 
+    def redrawn(self, fit: Fit, sigma: Array, rng: np.random.Generator) -> SmoothFitter:
+        """See ``Fitter.redrawn``."""
+        samples, windows = self.samples, self.blocks.windows
+        first = windows.index[:, 0]
+        start = fit.inner.nodes[first]
+        which = np.zeros(len(windows), np.int64)
+        length = windows.index.shape[1]
+        clean = self._shown(fit.model, first, start, length - 1, fit.theta[None], which)
+        noisy = clean + sigma * rng.standard_normal(clean.shape)
+        seen = np.full_like(samples.seen, np.nan)
+        for i, column in enumerate(samples.measured):
+            there = windows.inside & np.isfinite(samples.seen[windows.index, column])
+            seen[windows.index[there], column] = noisy[..., i][there]
+        return dataclasses.replace(self, samples=dataclasses.replace(samples, seen=seen))
+
+    def left(self, fit: Fit, floor: Floor) -> Left:
+        """See ``Fitter.left``: in every fold, and no generic force to be seen."""
+        samples, windows = self.samples, self.blocks.windows
+        found = remainder(fit.inner, samples, windows, self.sigma, floor, self.scale)
+        worst = float(np.max(found.ratio))
+        return Left(
+            found.adequate and self._quiet_in_every_fold(fit, floor), worst, found.force,
+            tuple(float(r) for r in found.ratio),
+        )  # fmt: skip
+
+    def _quiet_in_every_fold(self, fit: Fit, floor: Floor) -> bool:
+        """Whether no fold of the data has a residual beyond noise."""
+        windows = self.blocks.windows
+        count, length = windows.index.shape
+        square = fit.projected.reshape(count, length, -1) ** 2
+        leverage = (fit.basis**2).sum(axis=2).reshape(count, length, -1)
+        free = np.where(self.valid, 1 - leverage, 0.0)
+        for fold in range(self.blocks.folds):
+            own = self.blocks.fold_of_window == fold
+            freedom = np.maximum(free[own].sum(axis=(0, 1)), 1.0)
+            ratio = np.sqrt(square[own].sum(axis=(0, 1)) / freedom) * self.sigma / floor.sigma
+            spread = np.sqrt((floor.error / floor.sigma) ** 2 + 0.5 / freedom)
+            if (ratio > 1 + (ERRORS + 1) * spread).any():
+                return False
+        return True
+
     @property
-    def _valid(self) -> NDArray[np.bool_]:
+    def valid(self) -> NDArray[np.bool_]:
         samples, windows = self.samples, self.blocks.windows
         seen = np.isfinite(samples.seen[:, samples.measured])[windows.index]
         return seen & windows.inside[..., None]
@@ -137,7 +180,7 @@ class SmoothFitter:
         free = model.free
         moves = 1e-3 * self.scale[free]
         seen = samples.seen[windows.index][..., measured]
-        valid = self._valid & lead[..., None]
+        valid = self.valid & lead[..., None]
         length = int(lead.sum(axis=1).max())
         best, least = states, np.full(len(windows), np.inf)
         for turn in range(TURNS + 1):
@@ -175,7 +218,7 @@ class SmoothFitter:
         lengths = windows.inside.sum(axis=1)
         near = np.arange(windows.index.shape[1]) < 0.5 * lengths[:, None]
         return Foretold(
-            _mean(square, self._valid), _mean(square, self._valid & near[..., None]), full
+            _mean(square, self.valid), _mean(square, self.valid & near[..., None]), full
         )
 
     def _shown(

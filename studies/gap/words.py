@@ -143,7 +143,7 @@ def twins(result: GapResult) -> dict[str, tuple[str, ...]]:
     if not any(verdict.effect and verdict.alternatives for verdict in result.verdicts):
         return found  # the search below takes seconds for a walking robot
     for alias in exact_aliases(result.corrected):
-        if "combination" not in alias.says:
+        if not alias.combination:
             found.update({name: alias.effects for name in alias.effects})
     return found
 

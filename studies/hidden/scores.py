@@ -19,7 +19,7 @@ def same_motion() -> dict[str, frozenset[str]]:
     """For every effect the names that no data could tell from it, its own included."""
     found: dict[str, frozenset[str]] = {}
     for alias in exact_aliases(PendulumEquation()):
-        if "combination" not in alias.says:
+        if not alias.combination:
             names = frozenset(label.split("@")[0] for label in alias.effects)
             found.update(dict.fromkeys(names, names))
     return found
@@ -29,7 +29,7 @@ _SAME = same_motion()
 _COMBINED = [
     {label.split("@")[0] for label in alias.effects}
     for alias in exact_aliases(PendulumEquation())
-    if "combination" in alias.says
+    if alias.combination
 ]
 
 
