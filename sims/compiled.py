@@ -16,6 +16,12 @@ from numba.extending import intrinsic
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+def inlined(function: F) -> F:
+    """Compile as a part of every caller: a call that passes arrays costs more than a short loop."""
+    result: Any = numba.njit(inline="always", error_model="numpy")(function)
+    return result
+
+
 def compiled(function: F) -> F:
     """Compile at the first call, and keep the result on disk for the next process if possible.
 
