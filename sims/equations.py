@@ -11,14 +11,14 @@ import numpy as np
 
 from sims.effects.base import Effect
 from sims.effects.friction import DryFriction
-from sims.events import State
 from sims.host import HostSimulator, Joint
 from sims.motion import Motion, advance_smoothly
+from sims.rows import State
 from sims.simulator import Array, Channel, Parameter
 from sims.sliding import advance
 
 # Rows advanced together: many enough to hide Python, few enough to stay in the cache.
-BLOCK = 2048
+BLOCK = 4096
 
 
 class EquationOfMotion(HostSimulator):

@@ -1,6 +1,6 @@
 """What moves in a batch of rows: accelerations, and the forces that are added to them.
 
-Joints first and rows last, (n_joints, n): a column of one quantity is then contiguous.
+Joints first and rows last, (n_joints, n), as in ``sims.rows``.
 """
 
 from __future__ import annotations
@@ -10,12 +10,11 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sims.effects.backlash import Backlash
 from sims.effects.friction import CoulombFriction, DryFriction
 from sims.effects.joint import JointEffect
-from sims.events import Rows, State
+from sims.rows import Mask, Rows, State
 from sims.simulator import Array
 
 
@@ -72,7 +71,7 @@ class Motion:
         u: Array,
         load: Array,
         acceleration: Array,
-        asked: NDArray[np.bool_],
+        asked: Mask,
         rows: Rows,
     ) -> Array:
         """Acceleration of joint i per unit force on joint j, as [j, i, row].

@@ -16,20 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sims.events import (
-    Clocks,
-    Limits,
-    Mode,
-    Rows,
-    State,
-    begin,
-    finish,
-    inputs,
-    keep,
-    locate,
-    settle,
-)
+from sims.events import begin, finish, inputs, keep, locate, settle
 from sims.motion import Motion
+from sims.rows import Clocks, Limits, Mode, Rows, State
 from sims.simulator import Array
 
 # Coefficients of the cubic through values at 0, 1/3, 2/3 and 1.
