@@ -13,60 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from sims.compiled import call_at, compiled
+from sims.driven import DrivenJoint, Field
 from sims.simulator import Array
 
 MOST_EVENTS = 6
 
 # How a mode of motion can end.
 LETS_GO, LOWER, STOPS, UPPER = range(4)
-
-
-class Joint(NamedTuple):
-    """What moves, without what depends on the angle; SI units.
-
-    Args:
-        inertia: About the joint.
-        damping: Torque of the bearing per rate.
-        drive: Motor torque per input at rest.
-        back: Loss of motor torque per rate.
-        drag: Torque per squared rate.
-        coulomb: Dry friction of constant size.
-        sliding, breakaway, speed: Dry friction that drops with the rate, Stribeck's.
-        width: Play between motor and joint.
-        own_torque: Address of a C function (angle, rate) -> torque, 0 for none.
-        own_limit: Address of a C function (speed, 0) -> size of dry friction, 0 for none.
-    """
-
-    inertia: float
-    damping: float
-    drive: float
-    back: float
-    drag: float
-    coulomb: float
-    sliding: float
-    breakaway: float
-    speed: float
-    width: float
-    own_torque: int
-    own_limit: int
-
-
-class Field(NamedTuple):
-    """Torques that depend on the angle alone.
-
-    Args:
-        weight: Torque of gravity when level.
-        constant: A torque that never changes.
-        springs: (k, 3): stiffness, rest, and 1 (linear) or 3 (cubic).
-        waves: (k, 3): torques that repeat, sine, cosine and order.
-        own: Address of a C function (angle, 0) -> torque, 0 for none.
-    """
-
-    weight: float
-    constant: float
-    springs: Array
-    waves: Array
-    own: int
 
 
 class Mode(NamedTuple):
@@ -92,9 +45,9 @@ def swing_rows(
         states: (n, 3): angle, rate, place in the play.
         inputs: (n, 2 m): mean input in each half of m sub-steps.
         durations: (n,) seconds.
-        numbers: (n, 12): those of ``Joint`` but for addresses, then ``weight`` and ``constant``.
+        numbers: (n, 12): those of ``DrivenJoint`` but for addresses, then ``weight`` and ``constant``.
         springs, waves: (n, k, 3), see ``Field``.
-        own: Addresses of ``Joint`` and ``Field``, the same for all rows.
+        own: Addresses of ``DrivenJoint`` and ``Field``, the same for all rows.
 
     Returns:
         States at the end. Leapfrog errs in even powers of the sub-step; a second pass with twice
@@ -106,7 +59,7 @@ def swing_rows(
         for k in range(len(whole)):
             whole[k] = 0.5 * (inputs[i, 2 * k] + inputs[i, 2 * k + 1])
         a = numbers[i]
-        joint = Joint(
+        joint = DrivenJoint(
             a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], own[0], own[1]
         )  # fmt: skip
         field = Field(a[10], a[11], springs[i], waves[i], own[2])
@@ -122,7 +75,13 @@ def swing_rows(
 
 @compiled
 def swing(
-    joint: Joint, field: Field, angle: float, rate: float, x: float, inputs: Array, duration: float
+    joint: DrivenJoint,
+    field: Field,
+    angle: float,
+    rate: float,
+    x: float,
+    inputs: Array,
+    duration: float,
 ) -> tuple[float, float, float]:
     """Angle, rate and place in the play after a duration.
 
@@ -169,7 +128,7 @@ def standing(field: Field, angle: float) -> float:
 
 
 @compiled
-def limit(joint: Joint, rate: float) -> float:
+def limit(joint: DrivenJoint, rate: float) -> float:
     """Size of the dry friction."""
     size = joint.coulomb
     if joint.sliding != 0 or joint.breakaway != 0:
@@ -182,13 +141,13 @@ def limit(joint: Joint, rate: float) -> float:
 
 
 @compiled
-def pushing(joint: Joint, rate: float, u: float) -> float:
+def pushing(joint: DrivenJoint, rate: float, u: float) -> float:
     """Torque of the motor."""
     return joint.drive * u - joint.back * rate
 
 
 @compiled
-def torque(joint: Joint, angle: float, rate: float, load: float) -> float:
+def torque(joint: DrivenJoint, angle: float, rate: float, load: float) -> float:
     """Torque on the joint but for its motor and its dry friction."""
     total = load - joint.damping * rate
     if joint.drag != 0:
@@ -200,7 +159,7 @@ def torque(joint: Joint, angle: float, rate: float, load: float) -> float:
 
 @compiled
 def kick(
-    joint: Joint, angle: float, rate: float, x: float, load: float, u: float, h: float
+    joint: DrivenJoint, angle: float, rate: float, x: float, load: float, u: float, h: float
 ) -> tuple[float, float, float]:
     """Rate and place in the play after ``h`` seconds under a constant ``load`` and input.
 
@@ -252,7 +211,7 @@ def kick(
 
 
 @compiled
-def slope(joint: Joint, mode: Mode, rate: float) -> tuple[float, float]:
+def slope(joint: DrivenJoint, mode: Mode, rate: float) -> tuple[float, float]:
     """Acceleration, and speed in the play."""
     push = pushing(joint, rate, mode.u)
     running = push / joint.back if mode.opened else 0.0
@@ -267,7 +226,7 @@ def slope(joint: Joint, mode: Mode, rate: float) -> tuple[float, float]:
 
 
 @compiled
-def after(joint: Joint, mode: Mode, rate: float, x: float, h: float) -> tuple[float, float]:
+def after(joint: DrivenJoint, mode: Mode, rate: float, x: float, h: float) -> tuple[float, float]:
     """Rate and place in the play while the mode lasts, ``h`` seconds on."""
     a1, b1 = slope(joint, mode, rate)
     a2, b2 = slope(joint, mode, rate + 0.5 * h * a1)
@@ -277,7 +236,7 @@ def after(joint: Joint, mode: Mode, rate: float, x: float, h: float) -> tuple[fl
 
 
 @compiled
-def margin(joint: Joint, mode: Mode, end: int, rate: float, x: float) -> float:
+def margin(joint: DrivenJoint, mode: Mode, end: int, rate: float, x: float) -> float:
     """Positive while the mode lasts, negative beyond its end; 1 for an end that it cannot have."""
     if end == STOPS:
         return mode.slip * rate if mode.slip != 0 else 1.0
@@ -290,7 +249,9 @@ def margin(joint: Joint, mode: Mode, end: int, rate: float, x: float) -> float:
 
 
 @compiled
-def time_of(joint: Joint, mode: Mode, end: int, rate: float, x: float, within: float) -> float:
+def time_of(
+    joint: DrivenJoint, mode: Mode, end: int, rate: float, x: float, within: float
+) -> float:
     """When a mode ends that has ended ``within`` seconds.
 
     False position with the Illinois rule; a start at zero is left behind first.

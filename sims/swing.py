@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sims.driven import DrivenJoint, Field
 from sims.effects.backlash import Backlash
 from sims.effects.base import Effect
 from sims.effects.friction import CoulombFriction, DryFriction, StribeckFriction
@@ -21,13 +22,13 @@ from sims.effects.joint import (
     Value,
     ViscousFriction,
 )
-from sims.kick import Field, Joint, swing_rows
+from sims.kick import swing_rows
 from sims.simulator import Array
 
 C_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_double)
 
 # Where the kernel keeps the numbers of an effect, and how they are called there and here.
-COLUMNS = {name: i for i, name in enumerate((*Joint._fields[:10], *Field._fields[:2]))}
+COLUMNS = {name: i for i, name in enumerate((*DrivenJoint._fields[:10], *Field._fields[:2]))}
 NUMBERS: dict[type[Effect], dict[str, str]] = {
     ViscousFriction: {"damping": "coefficient"},
     QuadraticDrag: {"drag": "coefficient"},
@@ -51,7 +52,7 @@ def swing(
         states: (n, 2), then a place in each play; plays in a row are one of their sum.
         inputs: (n, 2 m): mean input in each half of m sub-steps.
         durations: (n,) seconds.
-        motor: The pendulum without effects, by the names of ``sims.kick.Joint`` and ``Field``;
+        motor: The pendulum without effects, by the names of ``sims.driven``;
             scalars or (n,).
         effects: On the joint, with scalars or (n,).
 
