@@ -45,7 +45,7 @@ def swing_rows(
         states: (n, 3): angle, rate, place in the play.
         inputs: (n, 2 m): mean input in each half of m sub-steps.
         durations: (n,) seconds.
-        numbers: (n, 12): those of ``DrivenJoint`` but for addresses, then ``weight`` and ``constant``.
+        numbers: (n, 12): ``DrivenJoint`` without addresses, then ``weight`` and ``constant``.
         springs, waves: (n, k, 3), see ``Field``.
         own: Addresses of ``DrivenJoint`` and ``Field``, the same for all rows.
 
