@@ -144,7 +144,7 @@ class Search:
         """Fit and validate sets that were not tried yet."""
         fresh = []
         for key, theta in proposals.items():
-            if key in self.tried or self.late:
+            if key in self.tried:
                 continue
             self.fit(key, theta)
             fresh.append(key)
@@ -270,6 +270,8 @@ class Search:
         for group in places:
             good = 0
             for gain in self._by_gain(around, group)[: 3 * wanted]:
+                if self.late:
+                    break
                 number = around.variants[gain.variants[0]].candidate
                 fresh, theta = self.merged(key, [(number, gain.values[0])])
                 if number in key or gain.value <= 0 or not self.fits_in(fresh):
@@ -279,7 +281,7 @@ class Search:
                     if fresh in self.tried and self.usable_set(fresh):
                         found.append(fresh)
                 good += fresh in found
-                if good >= wanted or self.late:
+                if good >= wanted:
                     break
         if not key:
             for pair in pair_gains(around, self.effort.pairs):
