@@ -13,11 +13,11 @@ from residual.gap.arena import Settings
 from residual.gap.candidates import candidates
 from residual.gap.claims import aliases, claim, evidence, hidden
 from residual.gap.contact.workflow import explain
+from residual.gap.data import examine
 from residual.gap.holdout import split
 from residual.gap.measure import measure, prove
 from residual.gap.model import Model
 from residual.gap.proposals import lookalikes
-from residual.gap.quality import check_usable, kinematics
 from residual.gap.result import GapResult
 from residual.gap.samples import Hold, Samples
 from residual.gap.search import search
@@ -98,21 +98,18 @@ def _find(
     ceiling: bool, settings: Settings, tell: Callable[[str], None],
 ) -> GapResult:  # fmt: skip
     clock = Clock()
-    check_usable(simulator, trajectories)
-    trajectories, quality = kinematics(simulator, trajectories)
+    examined = examine(simulator, trajectories)
+    trajectories = examined.trajectories
+    quality = [f"{found.where} {found.says}".strip() for found in examined.findings]
     if len(trajectories) == 1:
         quality.append(
             "one record only: its end was held out, which is the same experiment, so what is "
             "confirmed is provisional until a second record agrees"
         )
     train, held = split(trajectories)
-    if not len(train[0].actions):
-        raise ValueError("the first trajectory has no steps")
     substeps = substeps_for(simulator, trajectories)
     samples = Samples.join(train, substeps, hold)
     unseen = Samples.join(held, substeps, hold)
-    if not len(samples.measured):
-        raise ValueError("no state channel was measured: every value in the trajectories is NaN")
     if horizon is None:
         # After a few strikes of the ground no forecast of a walk means anything.
         horizon = (10 if simulator.has_contacts else 20) * simulator.dt
