@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from residual.gap.aliases import aliases, hidden
 from residual.gap.candidates import candidates
 from residual.gap.confirmation import Claim, claims, share
+from residual.gap.data import examine
 from residual.gap.explain import Explanation, explain
 from residual.gap.forecasts import gap, held_out, noise_floor, rollouts
 from residual.gap.horizon import usual_horizon
 from residual.gap.model import Model
 from residual.gap.numerics import better_hold, other_numerics
 from residual.gap.prepare import Prepared, prepare
-from residual.gap.quality import check_usable, kinematics
 from residual.gap.result import Gap, GapResult, Rival, Verdict
 from residual.gap.search import Effort, Key
 from residual.gap.verdicts import (
@@ -95,8 +95,11 @@ def find_gap(
     offered = tuple(library(simulator) if effects is None else effects)
     if measured_input:
         offered = tuple(e for e in offered if not e.upstream_of_sensor)
-    check_usable(simulator, trajectories)
-    runs, quality = kinematics(simulator, trajectories)
+    examined = examine(simulator, trajectories)
+    runs = examined.trajectories
+    quality = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
+    for says in quality:
+        tell(says)
     horizon = horizon or usual_horizon(simulator, runs)
     with workers(n_jobs):
         simulator, says = better_hold(simulator, runs, horizon, hold)
@@ -121,7 +124,7 @@ def find_gap(
         table = summed_up(answer)
         apart = None
         if held:
-            apart = judged_apart(answer, prepared, kinematics(simulator, held)[0], table)
+            apart = judged_apart(answer, prepared, examine(simulator, held).trajectories, table)
         clock.lap("forecast")
     return told(answer, table, apart, sets, tolerance, quality, clock.laps)
 
