@@ -14,7 +14,7 @@ from residual.gap.choice import AT_ONE
 from residual.gap.fitting import Fit
 from residual.gap.result import Number
 from residual.gap.search import Key, Search
-from residual.gap.significance import TIE, score
+from residual.gap.significance import score
 
 Array = NDArray[np.float64]
 
@@ -78,11 +78,11 @@ def claims(
     half = 1.96 * deviations(fit, search.fitter.blocks)
     found = []
     for place, number in enumerate(key):
-        own = np.flatnonzero(fit.model.owner == place)
+        own = [int(j) for j in np.flatnonzero(fit.model.owner == place)]
         label = search.candidates[number].label
         form, rivals = near(search, key, number, adequate)
         twins = tuple(name for name in groups.get(label, ()) if name != label)
-        strengths = [j for j in own if fit.model.knobs[j].strength] or list(own)
+        strengths = [j for j in own if fit.model.knobs[j].strength] or own
         found.append(
             Claim(
                 number,
@@ -105,7 +105,8 @@ def near(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Effects that do nearly as well in place of a chosen one: of its family, and others."""
     rest = set(key) - {number}
-    form, others = [], []
+    form: list[str] = []
+    others: list[str] = []
     for rival in search.usable():
         fresh = set(rival) - rest
         if len(rival) != len(key) or not rest < set(rival) or fresh == {number}:
@@ -128,7 +129,7 @@ def excluded(
     one that differs in form alone has to lose at the horizon and at half of it.
     """
     if adequate:
-        return score(search, rival) - score(search, key) > TIE
+        return score(search, rival) - score(search, key) > tie(search)
     group = where_it_matters(search, key, number)
     own, its = (search.validated[k] for k in (key, rival))
     ratio = _ratio(search, its.squares, own.squares, group)
@@ -138,6 +139,11 @@ def excluded(
         return False
     behind, error = search.currency.difference(its.squares, own.squares, group)
     return behind > error and _ratio(search, its.half, own.half, group) > 1.0 and ratio > 1.05
+
+
+def tie(search: Search) -> float:
+    """Difference of scores beyond which chance excludes a rival."""
+    return search.fitter.tie(search.tried[()])
 
 
 def _ratio(search: Search, one: Array, other: Array, group: int) -> float:
@@ -163,7 +169,7 @@ def needed(search: Search, key: Key, number: int, adequate: bool) -> bool:
     without, own = search.validated[rest].squares, search.validated[key].squares
     lost, error = search.currency.difference(without, own, group)
     if adequate:
-        return score(search, rest) - score(search, key) > TIE and lost > 0
+        return score(search, rest) - score(search, key) > tie(search) and lost > 0
     gone = 1 - 1 / max(_ratio(search, without, own, group), 1e-12)
     return lost > WORSE * error and gone > 0.5 * AT_ONE
 
@@ -191,9 +197,7 @@ def bounded(fit: Fit, j: int, half: float, numerics: Sequence[Array]) -> Number:
     knob, value = fit.model.knobs[j], float(fit.theta[j])
     fine = float(numerics[0][j]) if len(numerics) else value
     low, high = min(value, fine) - half, max(value, fine) + half
-    return Number(
-        value, max(low, knob.low), min(high, knob.high), knob.unit, at_bound(fit, j)
-    )
+    return Number(value, max(low, knob.low), min(high, knob.high), knob.unit, at_bound(fit, j))
 
 
 def share(search: Search, key: Key, number: int) -> tuple[float, float, float]:

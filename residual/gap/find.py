@@ -19,8 +19,8 @@ from residual.gap.horizon import usual_horizon
 from residual.gap.model import Model
 from residual.gap.numerics import better_hold, other_numerics
 from residual.gap.prepare import Prepared, prepare
-from residual.gap.result import Gap, GapResult, Rival, Verdict
-from residual.gap.search import Effort, Key
+from residual.gap.result import Blind, Gap, GapResult, Rival, Verdict
+from residual.gap.search import Key
 from residual.gap.verdicts import (
     FOOTNOTE,
     blind_verdict,
@@ -31,7 +31,6 @@ from residual.gap.verdicts import (
     no_gap_verdict,
     remainder_verdict,
 )
-from residual.gap.where import locate
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
@@ -102,12 +101,12 @@ def find_gap(
         tell(says)
     horizon = horizon or usual_horizon(simulator, runs)
     with workers(n_jobs):
-        simulator, says = better_hold(simulator, runs, horizon, hold)
-        quality += says
+        simulator, held_how = better_hold(simulator, runs, horizon, hold)
+        quality += held_how
         prepared = prepare(simulator, runs, horizon)
         groups, sets = aliases(simulator, offered)
         kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
-        pool = candidates(simulator, kept, prepared.fitter.samples)
+        pool = prepared.pool(candidates(simulator, kept, prepared.fitter.samples))
         clock.lap("read")
         tell(
             f"{len(prepared.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s, "
@@ -188,13 +187,11 @@ def summed_up(answer: Answer) -> Gap:
     return gap(search, answer.key, order, floor, (found.nominal_left.ratio, left.ratio))
 
 
-def judged_apart(
-    answer: Answer, prepared: Prepared, runs: Sequence[Trajectory], table: Gap
-) -> Gap:
+def judged_apart(answer: Answer, prepared: Prepared, runs: Sequence[Trajectory], table: Gap) -> Gap:
     """The same table for records that were set aside."""
     search = answer.found.search
     other = prepare(search.simulator, runs, prepared.horizon).fitter
-    other = dataclasses.replace(other, sigma=search.fitter.sigma)  # type: ignore[type-var]
+    other = other.weighed_like(search.fitter)
     fits = []
     for key in ((), answer.key):
         model = Model(search.model(key).bind(search.tried[key].theta))
@@ -213,13 +210,10 @@ def told(
     fit = search.tried[key]
     corrected = fit.model.bind(fit.theta)
     measured = [simulator.physical_channels[c] for c in fitter.samples.measured]
-    blind = ()
+    blind: tuple[Blind, ...] = ()
     if found.adequate:
         blind = hidden(search.signatures(key), search.candidates, key, found.needed)
-    where = locate(
-        Model(simulator), fitter.samples, fitter.blocks.windows, search.tried[()], fitter.sigma,
-        found.nominal_left.by_channel, found.floor,
-    )  # fmt: skip
+    where = fitter.where(search.tried[()], found.floor)
     return GapResult(
         verdicts=tuple(verdicts(answer, table, sets, tolerance, blind)),
         gap=table,
@@ -243,16 +237,15 @@ def told(
 
 def verdicts(
     answer: Answer, table: Gap, sets: Sequence[tuple[str, ...]], tolerance: float | None,
-    blind: Sequence[object],
+    blind: Sequence[Blind],
 ) -> list[Verdict]:  # fmt: skip
     """All verdicts, most important first."""
     found, search = answer.found, answer.found.search
     labels = [search.candidates[claim.number].label for claim in answer.claims]
+    blocks = len(search.fitter.blocks)
     made: list[Verdict] = []
     for claim, label in zip(answer.claims, labels, strict=True):
-        made.append(
-            effect_verdict(search, claim, len(search.fitter.blocks), *dependent(label, labels, sets))
-        )
+        made.append(effect_verdict(search, claim, blocks, *dependent(label, labels, sets)))
     left = search.fitter.left(search.tried[answer.key], found.floor)
     if tolerance is not None and table.before.value <= tolerance:
         made.insert(
@@ -270,7 +263,7 @@ def verdicts(
         if number not in answer.key:
             made.append(minor_verdict(search, number, share(search, with_it, number)))
     if blind:
-        made.append(blind_verdict(blind))  # type: ignore[arg-type]
+        made.append(blind_verdict(blind))
     return made
 
 
@@ -288,5 +281,3 @@ def evidence(answer: Answer) -> tuple[Rival, ...]:
         for key in search.tried
     ]  # fmt: skip
     return tuple(sorted(rows, key=lambda row: (not row.chosen, row.error))[:EVIDENCE])
-
-

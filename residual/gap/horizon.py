@@ -11,7 +11,7 @@ from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
 #: Windows that the records should at least be good for.
-WINDOWS = 16
+WINDOWS = 10
 #: Least samples of a window.
 SAMPLES = 8
 

@@ -124,7 +124,9 @@ class Search:
             self._signatures[key] = signatures(fit, trials(self.candidates), columns)
         return self._signatures[key]
 
-    def merged(self, key: Key, additions: Iterable[tuple[int, Array]], drop: Key = ()) -> tuple[Key, Array]:
+    def merged(
+        self, key: Key, additions: Iterable[tuple[int, Array]], drop: Key = ()
+    ) -> tuple[Key, Array]:
         """Sorted key and start vector of a set with some candidates added and some dropped."""
         values: dict[int, Array] = {}
         at = 0
@@ -154,13 +156,14 @@ class Search:
 
     def fit(self, key: Key, theta: Array) -> None:
         """Fit a set from start values, and from its nested sets if it ends worse than one."""
-        found = self.fitter.fit(self.model(key), theta)
         nested = [k for k in self.tried if len(k) < len(key) and set(k) < set(key)]
+        near = min(nested, key=lambda k: self.tried[k].merit, default=())
+        found = self.fitter.fit(self.model(key), theta, self.tried[near])
         if nested:
-            best = min(nested, key=lambda k: self.tried[k].merit)
-            floor = self.tried[best].merit
+            floor = self.tried[near].merit
             if found.merit > floor:
-                again = self.fitter.fit(self.model(key), self._from_nested(key, best, theta))
+                start = self._from_nested(key, near, theta)
+                again = self.fitter.fit(self.model(key), start, self.tried[near])
                 found = again if again.merit < found.merit else found
             if found.merit > 1.001 * floor:
                 self.unfit.add(key)
