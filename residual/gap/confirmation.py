@@ -37,7 +37,8 @@ class Claim:
         number: The candidate.
         numbers: Fitted numbers.
         form: Effects of the same family and place that do nearly as well.
-        rivals: Effects of other families that do nearly as well.
+        alike: Effects of other families that do, with the same motion in these data.
+        rivals: Effects of other families that do, with another motion.
         twins: Effects that make the same motion in any data.
         needed: Whether forecasts are clearly worse without it.
         steady: Whether its strength is about the same in every fold.
@@ -49,6 +50,7 @@ class Claim:
     number: int
     numbers: dict[str, Number]
     form: tuple[str, ...]
+    alike: tuple[str, ...]
     rivals: tuple[str, ...]
     twins: tuple[str, ...]
     needed: bool
@@ -80,7 +82,7 @@ def claims(
     for place, number in enumerate(key):
         own = [int(j) for j in np.flatnonzero(fit.model.owner == place)]
         label = search.candidates[number].label
-        form, rivals = near(search, key, number, adequate)
+        form, alike, rivals = near(search, key, number, adequate)
         twins = tuple(name for name in groups.get(label, ()) if name != label)
         strengths = [j for j in own if fit.model.knobs[j].strength] or own
         found.append(
@@ -88,6 +90,7 @@ def claims(
                 number,
                 {fit.model.knobs[j].field: bounded(fit, j, half[j], numerics) for j in own},
                 tuple(name for name in form if name not in twins),
+                tuple(name for name in alike if name not in twins),
                 tuple(name for name in rivals if name not in twins),
                 twins,
                 needed(search, key, number, adequate),
@@ -102,10 +105,11 @@ def claims(
 
 def near(
     search: Search, key: Key, number: int, adequate: bool
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Effects that do nearly as well in place of a chosen one: of its family, and others."""
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Effects that do nearly as well in place of a chosen one, see ``Claim``."""
     rest = set(key) - {number}
     form: list[str] = []
+    same: list[str] = []
     others: list[str] = []
     for rival in search.usable():
         fresh = set(rival) - rest
@@ -114,10 +118,15 @@ def near(
         (other,) = fresh
         family = search.family(number)
         alike = bool(family) and search.family(other) == family
-        if excluded(search, key, rival, number, adequate, alike):
-            continue
-        (form if alike else others).append(search.candidates[other].label)
-    return tuple(form), tuple(others)
+        label = search.candidates[other].label
+        out = excluded(search, key, rival, number, adequate, alike)
+        if alike and not out:
+            form.append(label)
+        elif not adequate and search.same_motion(tuple(sorted(rest)), number, other):
+            same.append(label)
+        elif not out:
+            others.append(label)
+    return tuple(form), tuple(same), tuple(others)
 
 
 def excluded(
@@ -167,11 +176,11 @@ def needed(search: Search, key: Key, number: int, adequate: bool) -> bool:
         return False
     group = where_it_matters(search, key, number)
     without, own = search.validated[rest].squares, search.validated[key].squares
-    lost, error = search.currency.difference(without, own, group)
+    lost, _ = search.currency.difference(without, own, group)
     if adequate:
         return score(search, rest) - score(search, key) > tie(search) and lost > 0
     gone = 1 - 1 / max(_ratio(search, without, own, group), 1e-12)
-    return lost > WORSE * error and gone > 0.5 * AT_ONE
+    return gone > 0.5 * AT_ONE and search.currency.clearly(without, own, group) > WORSE
 
 
 def steady(search: Search, key: Key, j: int) -> bool:

@@ -74,7 +74,7 @@ def find_gap(
             whichever the nominal simulator fits better.
         measured_input: True if the logged inputs were measured at the actuator's output; what
             happens before that (dead zone, saturation, lag) is then no candidate.
-        horizon: Forecast length in seconds; by default a quarter of the usual period of the motion,
+        horizon: Forecast length in seconds; by default a third of the usual period of the motion,
             see ``residual.gap.horizon``.
         minutes: Time budget; the search for rival explanations ends in time.
         n_jobs: Processes for a simulator that steps row by row.

@@ -107,13 +107,26 @@ def smooth_fitter(
     least = FINEST * scale[samples.measured]
     floor = dataclasses.replace(floor, sigma=np.maximum(floor.sigma, least))
     length = max(6, round(horizon / (1 - LEAD) / samples.step) + 1)
-    windows = cut(samples, floor.slope.by_state, scale, length)
+    windows = cut(samples, floor.slope.by_state, _foreseen(simulator, samples, scale), length)
     moving = np.array(noise.driven_states(model))
     most = AT_ONCE if simulator.advances_rows_at_once else BY_ROW
     grouped = blocks(samples, windows, drive(samples, nodes, moving), most)
     start = SmoothFitter(samples, grouped, nodes, floor.slope.by_state, floor.sigma, scale)
     nominal = start.fit(model, np.zeros(0))
     return weighted(start, nominal, floor.sigma), floor
+
+
+def _foreseen(simulator: HostSimulator, samples: Samples, scale: Array) -> Array:
+    """Scales by which to judge how the error of a start state grows.
+
+    The variation of a position that nobody measured is not known, so its channel's scale stands
+    for it: what moves nothing that was measured must not forbid a forecast.
+    """
+    channels = simulator.physical_channels
+    usual = np.array([channel.scale for channel in channels])
+    seen = np.isin(np.arange(len(channels)), samples.measured)
+    moving = np.array([channel.kind == "rate" for channel in channels])
+    return np.where(seen | moving, scale, np.maximum(scale, usual))
 
 
 def weighted(fitter: SmoothFitter, fit: Fit, sigma: Array) -> SmoothFitter:
