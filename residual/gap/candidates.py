@@ -123,6 +123,7 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     if not isinstance(effect, JointEffect) or joint is None or joint.position in measured:
         return False
     there = typical(effect, simulator)
+    assert isinstance(there, JointEffect)
     size = effect.measures(simulator)["position"][1] if joint.rate else 1.0
     places = size * np.array([-0.7, 0.0, 0.4, 1.0])
     return bool(np.ptp(there.force(places, np.zeros(4))) > 0)

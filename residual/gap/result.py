@@ -13,6 +13,9 @@ from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 Kind = Literal["confirmed", "ambiguous", "minor", "needs_data", "unexplained", "no_gap"]
+#: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
+#: between folds or with the numerics, lies at its bound, or an effect of another kind does as well.
+Doubt = Literal["not_needed", "unsteady", "numerics", "at_bound", "rivals"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,6 +57,11 @@ class Verdict:
         share: Part of the nominal simulator's cross-validated squared error that it takes off;
             of a remainder, the part that is left.
         provisional: True if too few blocks of data had to confirm it.
+        same_motion: Those of ``alternatives`` that no motion can tell from it.
+        together: Sets of effects that make the same motion in one exact proportion.
+        form: Those of ``alternatives`` that belong to its family and do nearly as well.
+        doubts: Why it is not certain.
+        follows: What the force that has no name looks like, empty if it follows nothing.
     """
 
     kind: Kind
@@ -65,6 +73,11 @@ class Verdict:
     says: str
     share: Span
     provisional: bool = False
+    same_motion: tuple[str, ...] = ()
+    together: tuple[tuple[str, ...], ...] = ()
+    form: tuple[str, ...] = ()
+    doubts: tuple[Doubt, ...] = ()
+    follows: str = ""
 
 
 @dataclasses.dataclass(frozen=True)

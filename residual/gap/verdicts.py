@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from residual.gap.confirmation import FEW, TOO_FEW, Claim
 from residual.gap.fitting import Left
-from residual.gap.result import Blind, Gap, Kind, Span, Verdict
+from residual.gap.result import Blind, Doubt, Gap, Kind, Span, Verdict
 from residual.gap.search import Search
 
 #: Families that an effect may be mistaken for and still be worth a name.
@@ -80,9 +80,22 @@ def effect_verdict(
         says.append("its size is at its bound")
     return Verdict(
         kind, effect.name, effect.where, claim.numbers,
-        tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family, "; ".join(says),
-        Span(*claim.share), blocks < FEW,
+        tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
+        "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
+        doubts(claim),
     )  # fmt: skip
+
+
+def doubts(claim: Claim) -> tuple[Doubt, ...]:
+    """Why an effect is not certain."""
+    why: dict[Doubt, bool] = {
+        "not_needed": not claim.needed,
+        "unsteady": not claim.steady,
+        "numerics": not claim.sound,
+        "at_bound": claim.bounded,
+        "rivals": bool(claim.rivals),
+    }
+    return tuple(doubt for doubt, there in why.items() if there)
 
 
 def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdict:
@@ -93,7 +106,7 @@ def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdic
         says += f"; it looks like a force that follows {left.force}"
     if leads:
         says += f"; {', '.join(leads)} would take some of it, and so would many others"
-    return Verdict("unexplained", "", "", {}, tuple(leads), "", says, share)
+    return Verdict("unexplained", "", "", {}, tuple(leads), "", says, share, follows=left.force)
 
 
 def minor_verdict(search: Search, number: int, share: tuple[float, float, float]) -> Verdict:
