@@ -16,36 +16,16 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sims import drive as path
+from sims.actuation import memory_channels, next_inputs, recorded_inputs, with_memory
+from sims.drive import lagged
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
 from sims.effects.base import Effect, place
 from sims.effects.joint import JointEffect
 from sims.effects.parameter import ParameterChange
-from sims.effects.sensor import SensorEffect
+from sims.effects.sensor import through_sensors
 from sims.simulator import Array, Channel, Hold, Simulator, random_values
-
-
-@dataclasses.dataclass(frozen=True)
-class Joint:
-    """A generalized coordinate that a force can act on.
-
-    Args:
-        name: Its name in effects and reports.
-        position: State channel of its position.
-        rate: State channel of its rate; None for a state of a first-order system, where a
-            "force" is a rate of change.
-        unit: Unit of the force, ``"N m"`` or ``"N"``.
-        scale: A typical force, or None to leave it to the simulator.
-        driven: False if no actuator acts on it, so that it cannot have backlash.
-    """
-
-    name: str
-    position: str
-    rate: str | None
-    unit: str
-    scale: float | None = None
-    driven: bool = True
+from sims.simulator import Joint as Joint
 
 
 class HostSimulator(Simulator):
@@ -73,7 +53,7 @@ class HostSimulator(Simulator):
     has_drive_force: bool = False
     has_contacts: bool = False
     advances_rows_at_once: bool = False
-    lagged = staticmethod(path.lagged)
+    lagged = staticmethod(lagged)
 
     @abc.abstractmethod
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
@@ -139,7 +119,7 @@ class HostSimulator(Simulator):
         changed.state_channels = self.physical_channels
         for effect in changed.effects:
             effect.measures(changed)
-        changed.state_channels += tuple(changed._memory_channels())
+        changed.state_channels += tuple(memory_channels(changed))
         return changed
 
     def with_parameters(self, **values: float | Array) -> Self:
@@ -240,7 +220,7 @@ class HostSimulator(Simulator):
             return self.integrate(states, inputs, np.full(len(states), self.dt))
         own = len(self.integrated_channels)
         following = np.empty_like(states)
-        inputs, following[:, own:] = self._inputs(states[:, own:], actions, upcoming)
+        inputs, following[:, own:] = next_inputs(self, states[:, own:], actions, upcoming)
         durations = np.full(len(states), self.dt)
         true = self.integrate(self.unsense(states[:, :own]), inputs, durations)
         following[:, :own] = self.sense(true)
@@ -285,42 +265,26 @@ class HostSimulator(Simulator):
                 f"actions have shape {actions.shape}, expected {expected}: a row for each of "
                 "the durations, which must be positive, and a column for each input"
             )
-        substeps = substeps or self.substeps
-        holds = self._holds(hold)
+        if hold is None or isinstance(hold, str):
+            hold = [hold or channel.hold for channel in self.action_channels]
+        if len(hold) != len(self.action_channels):
+            raise ValueError(f"hold has {len(hold)} entries for {len(self.action_channels)} inputs")
         earlier = np.empty((0, actions.shape[1])) if before is None else np.asarray(before, float)
         k = len(earlier)
         durations = np.concatenate([np.full(k, durations[:1]), durations])
         commands = self._clip(np.concatenate([earlier, actions]))
-        columns = []
-        for j, channel in enumerate(self.action_channels):
-            effects = self.actuator_effects(channel.name)
-            samples = path.shaped(commands[None, :, j], effects)
-            late = path.total_delay(effects)
-            if np.ndim(late):
-                samples = np.broadcast_to(samples, (len(np.asarray(late)), samples.shape[1]))
-            means, rise = path.substep_inputs(samples, durations, substeps, late, holds[j])
-            for lag in path.lags(effects):
-                shape = (lag.rows or len(means), *means.shape[1:])
-                means, rise = np.broadcast_to(means, shape), np.broadcast_to(rise, shape)
-                start = np.broadcast_to(samples[:, 0], len(means))
-                means, rise, _ = self.lagged(means, rise, durations, lag.time_constant, start)
-            columns.append((np.stack([means, rise], axis=-1) if rises else means)[:, k:])
+        inputs = recorded_inputs(self, commands, durations, substeps or self.substeps, hold)
+        inputs = inputs[:, k:] if rises else inputs[:, k:, ..., 0]
         rows = {e.rows for e in self.effects if isinstance(e, ActuatorEffect)} - {None}
-        if not columns:
-            shape = (len(actions), substeps, 0)
-            return np.empty((*shape, 2) if rises else shape)
-        inputs = np.stack(np.broadcast_arrays(*columns), axis=3)
-        if not rows:
-            return inputs[0]
-        return np.broadcast_to(inputs, (rows.pop() or 1, *inputs.shape[1:]))
+        return np.broadcast_to(inputs, (rows.pop() or 1, *inputs.shape[1:])) if rows else inputs[0]
 
     def sense(self, states: Array) -> Array:
         """What the sensors read of true states, (n, n_i) -> (n, n_i)."""
-        return self._sensors(states, forward=True)
+        return through_sensors(self, states, forward=True)
 
     def unsense(self, states: Array) -> Array:
         """True states from what the sensors read: the inverse of ``sense``."""
-        return self._sensors(states, forward=False)
+        return through_sensors(self, states, forward=False)
 
     def augment(self, states: ArrayLike, actions: ArrayLike | None = None) -> Array:
         """Physical states with a sensible memory of the effects appended.
@@ -334,111 +298,10 @@ class HostSimulator(Simulator):
             closed on the side that the drive pushes to.
         """
         states = np.asarray(states, float)
-        n, physical = states.shape
-        actions = np.zeros((n, len(self.action_channels))) if actions is None else actions
-        actions = self._clip(np.asarray(actions, float))
-        full = np.zeros((n, len(self.state_channels)))
-        full[:, :physical] = states
-        received = np.empty_like(actions)
-        at = physical + len(self.plays())
-        for j, channel in enumerate(self.action_channels):
-            effects = self.actuator_effects(channel.name)
-            received[:, j] = path.shaped(actions[:, j : j + 1], effects)[:, 0]
-            kept = self._history(channel.name)
-            full[:, at : at + kept] = actions[:, j : j + 1]
-            at += kept
-            count = len(path.lags(effects))
-            full[:, at : at + count] = received[:, j : j + 1]
-            at += count
-        if self.plays():
-            names = [joint.name for joint in self.joints]
-            sides = np.sign(self.drive_forces(states, received))
-            for i, play in enumerate(self.plays()):
-                full[:, physical + i] = 0.5 * play.width * sides[:, names.index(play.joint)]
-        return full
-
-    # -- details --------------------------------------------------------------------------
+        if actions is None:
+            actions = np.zeros((len(states), len(self.action_channels)))
+        return with_memory(self, states, self._clip(np.asarray(actions, float)))
 
     def _clip(self, actions: Array) -> Array:
         low = [channel.low for channel in self.action_channels]
         return np.clip(actions, low, [channel.high for channel in self.action_channels])
-
-    def _holds(self, hold: Hold | Sequence[Hold] | None) -> list[Hold]:
-        """How each input runs between samples."""
-        if hold is None:
-            return [channel.hold for channel in self.action_channels]
-        if isinstance(hold, str):
-            return [hold] * len(self.action_channels)
-        if len(hold) != len(self.action_channels):
-            raise ValueError(f"hold has {len(hold)} entries for {len(self.action_channels)} inputs")
-        return list(hold)
-
-    def _history(self, actuator: str) -> int:
-        """Past commands that the delays of an input reach back to."""
-        late = path.total_delay(self.actuator_effects(actuator))
-        return int(np.ceil(np.max(late) / self.dt - 1e-9))
-
-    def _memory_channels(self) -> Iterable[Channel]:
-        channels = {channel.name: channel for channel in self.state_channels}
-        joints = {joint.name: joint for joint in self.joints}
-        for play in self.plays():
-            position = channels[joints[play.joint].position]
-            yield Channel(f"{play.joint} play", position.unit, "memory", scale=position.scale)
-        for channel in self.action_channels:
-            for k in range(self._history(channel.name), 0, -1):
-                past = f"{channel.name} {k} ago"
-                yield Channel(past, channel.unit, "memory", scale=channel.scale)
-            for i, _ in enumerate(path.lags(self.actuator_effects(channel.name))):
-                name = f"{channel.name} lagged" + (f" {i + 1}" if i else "")
-                yield Channel(name, channel.unit, "memory", scale=channel.scale)
-
-    def _inputs(self, memory: Array, actions: Array, upcoming: Array | None) -> tuple[Array, Array]:
-        """Effective inputs of one control period and the memory after it.
-
-        The upcoming actions matter for inputs that run straight to them.
-        """
-        inputs = np.repeat(actions[:, None, :], self.substeps, axis=1)
-        acting = any(isinstance(effect, ActuatorEffect) for effect in self.effects)
-        if not acting and upcoming is None:
-            return inputs, memory
-        inputs = np.stack([inputs, np.zeros_like(inputs)], axis=-1)
-        after = np.empty_like(memory)
-        at = 0
-        for j, channel in enumerate(self.action_channels):
-            effects = self.actuator_effects(channel.name)
-            straight = upcoming is not None and channel.hold == "linear"
-            if not effects and not straight:
-                continue
-            kept = self._history(channel.name)
-            commands = np.concatenate([memory[:, at : at + kept], actions[:, j : j + 1]], axis=1)
-            after[:, at : at + kept] = commands[:, 1:]
-            at += kept
-            if upcoming is not None and straight:
-                commands = np.concatenate([commands, upcoming[:, j : j + 1]], axis=1)
-            means, rises = path.substep_inputs(
-                path.shaped(commands, effects),
-                np.full(commands.shape[1], self.dt),
-                self.substeps,
-                path.total_delay(effects),
-                "linear" if straight else "zero",
-            )
-            means, rises = means[:, kept : kept + 1], rises[:, kept : kept + 1]
-            for lag in path.lags(effects):
-                means, rises, after[:, at] = self.lagged(
-                    means, rises, np.array([self.dt]), lag.time_constant, memory[:, at]
-                )
-                at += 1
-            inputs[:, :, j] = np.stack([means[:, 0], rises[:, 0]], axis=-1)
-        return inputs, after
-
-    def _sensors(self, states: Array, forward: bool) -> Array:
-        effects = [e for e in self.effects if isinstance(e, SensorEffect) and not e.absent]
-        if not effects:
-            return states
-        states = np.array(states, float)
-        names = [channel.name for channel in self.physical_channels]
-        for effect in sorted(effects, key=lambda effect: effect.stage, reverse=not forward):
-            column = names.index(effect.channel)
-            change = effect.read if forward else effect.undo
-            states[:, column] = change(states[:, column])
-        return states

@@ -52,6 +52,28 @@ class Channel:
 
 
 @dataclasses.dataclass(frozen=True)
+class Joint:
+    """A generalized coordinate that a force can act on.
+
+    Args:
+        name: Its name in effects and reports.
+        position: State channel of its position.
+        rate: State channel of its rate; None for a state of a first-order system, where a
+            "force" is a rate of change.
+        unit: Unit of the force, ``"N m"`` or ``"N"``.
+        scale: A typical force, or None to leave it to the simulator.
+        driven: False if no actuator acts on it, so that it cannot have backlash.
+    """
+
+    name: str
+    position: str
+    rate: str | None
+    unit: str
+    scale: float | None = None
+    driven: bool = True
+
+
+@dataclasses.dataclass(frozen=True)
 class Parameter:
     """A physical parameter that a simulator declares: value, unit, meaning and bounds.
 

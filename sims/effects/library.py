@@ -107,10 +107,12 @@ class Alias:
         effects: Two that have the same consequence, or three or four of which any one
             equals a combination of the rest; written ``name@where``.
         says: The same in words.
+        combination: True if one equals a combination of the rest, False if each equals any other.
     """
 
     effects: tuple[str, ...]
     says: str
+    combination: bool = False
 
 
 def exact_aliases(
@@ -146,7 +148,7 @@ def exact_aliases(
             if _dependent(names, columns, blurs):
                 sets.append(set(names))
                 rest = ", ".join(names)
-                found.append(Alias(names, f"{rest}: any one is a combination of the others"))
+                found.append(Alias(names, f"{rest}: any one is a combination of the others", True))
     return tuple(found)
 
 

@@ -21,6 +21,7 @@ from sims.effects import (
     DeadZone,
     Delay,
     DirectionalFriction,
+    DryFriction,
     JointEffect,
     LinearSpring,
     ParameterChange,
@@ -189,6 +190,18 @@ def test_backlash_obeys_its_equation(host):
     truth = np.array([play_step(s, u, 0.2) for s, u in zip(start, actions[:, 0], strict=True)])
     assert (np.abs(found - truth).max(axis=0) < [1e-5, 2e-4, 1e-5]).all()
     assert np.abs(found[:, :2] - HOSTS[host].step(states, actions)).max() > 0.05
+
+
+def test_two_plays_of_one_drive_are_one_of_their_sum():
+    states, actions = rows(25, seed=3)
+    one, two = (
+        Pendulum(effects=[Backlash("pivot", width) for width in widths])
+        for widths in ((0.2,), (0.15, 0.05))
+    )
+    wanted = one.step(one.augment(states, -actions), actions)
+    found = two.step(two.augment(states, -actions), actions)
+    assert found[:, :2] == pytest.approx(wanted[:, :2], abs=1e-12)
+    assert found[:, 2:] == pytest.approx(wanted[:, 2:] * [0.75, 0.25], abs=1e-12)
 
 
 @host
@@ -432,3 +445,50 @@ def test_a_spring_may_rest_anywhere_and_is_absent_without_stiffness():
         assert kind("pivot", 0.0, 0.4).absent
         assert not np.any(kind("pivot", np.zeros(3), np.ones(3)).present())
         assert next(e for e in library(Pendulum()) if isinstance(e, kind)) == kind("pivot")
+
+
+@dataclasses.dataclass(frozen=True)
+class Seal(DryFriction):
+    level: float = number(force=1, low=0.0)
+    name = "seal"
+    sentence = "Dry friction of the user's own."
+    needs = "reversals of the motion"
+
+    def limit(self, v):
+        return self.level + 0.0 * v
+
+
+@dataclasses.dataclass(frozen=True)
+class Magnet(JointEffect):
+    level: float = number(force=1)
+    name = "magnet"
+    sentence = "A torque of the user's own that depends on the angle alone."
+    needs = "whole turns"
+    follows_rate = False
+
+    def force(self, q, v):
+        return self.level * np.sin(3 * q)
+
+
+@host
+def test_effects_of_the_users_own_move_like_those_of_the_library(host):
+    states, actions = rows(12)
+    states[::3, 1] = 0.0
+    levels = np.where(np.arange(12) % 2, 2e-3, 0.0)
+    for own, known in (
+        (Seal("pivot", levels), CoulombFriction("pivot", levels)),
+        (Magnet("pivot", levels), Cogging("pivot", levels, 0.0, 3.0)),
+    ):
+        found, wanted = (HOSTS[host].with_effects([e]).step(states, actions) for e in (own, known))
+        assert found == pytest.approx(wanted, abs=1e-12)
+        assert np.array_equal(found[::2], HOSTS[host].step(states, actions)[::2])
+
+
+@host
+def test_what_goes_wrong_in_an_effect_of_the_users_own_is_raised(host):
+    class Broken(Magnet):
+        def force(self, q, v):
+            raise KeyError("level of the magnet")
+
+    with pytest.raises(KeyError, match="level of the magnet"):
+        HOSTS[host].with_effects([Broken("pivot", 1e-3)]).step(*rows(2))

@@ -64,7 +64,7 @@ def test_effects_come_beside_those_that_are_there():
 
 def test_a_class_without_effects_among_its_arguments_gets_them_too():
     plain = {
-        "class_path": "studies.real_systems.GearedPendulum",
+        "class_path": "studies.real.systems.GearedPendulum",
         "init_args": {"inertia": 0.2, "moment": 0.4},
     }
     effects = [CoulombFriction("angle", 0.3), ActuatorLag("torque", 0.02)]

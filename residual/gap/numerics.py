@@ -1,0 +1,125 @@
+"""Numerics before physics: thinning of fast logs, sub-steps, and how inputs run between samples.
+
+An integration error or a wrong hold is as systematic as a missing effect and would be given its
+name, so both are settled on the nominal simulator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap import paths
+from residual.gap.model import Model
+from residual.gap.samples import Samples
+from residual.gap.search import Key, Search
+from residual.trajectories import Trajectory
+from sims.host import HostSimulator
+from sims.simulator import Hold
+
+Array = NDArray[np.float64]
+
+#: Part of the misfit that the other hold must take off to be believed.
+CLEARER = 0.05
+#: Rows in a forecast horizon that are enough to follow the motion.
+ROWS = 24
+#: Error of one interval by too few sub-steps, as a share of a channel's change in it (a
+#: twentieth of the rows of a window add up).
+FINE = 2e-4
+
+
+def stride_for(trajectories: Sequence[Trajectory], horizon: float) -> int:
+    """Recorded samples in an interval, so that a horizon has about ``ROWS`` rows."""
+    step = float(np.median(np.concatenate([t.durations for t in trajectories])))
+    wanted = max(1, int(horizon / ROWS / step + 1e-9))
+    # Powers of two, so that an interval has whole sub-steps of recorded ones.
+    return 2 ** int(np.log2(wanted))
+
+
+def substeps_for(simulator: HostSimulator, trajectories: Sequence[Trajectory], stride: int) -> int:
+    """Sub-steps of an interval: as few as change nothing, at most as fine as the simulator's own.
+
+    The nominal simulator is advanced from every row with so many sub-steps and twice as many; the
+    worst twentieth of the rows decides.
+    """
+    longest = stride * max(float(np.quantile(t.durations, 0.95)) for t in trajectories)
+    own = max(1, int(np.ceil(simulator.substeps * longest / simulator.dt - 1e-6)))
+    most = _power(own) if stride == 1 else min(_power(own), stride)
+    if not simulator.advances_rows_at_once:
+        return own if stride == 1 else most
+    count = 1
+    after = _after(simulator, trajectories, count, stride)
+    while count < most:
+        finer = _after(simulator, trajectories, 2 * count, stride) if 2 * count <= most else after
+        change = np.abs(finer[0] - after[0])
+        moved = np.quantile(np.abs(finer[0] - finer[1]), 0.8, axis=0)
+        allowed = FINE * np.maximum(moved, 1e-3 * np.abs(finer[0]).max(axis=0))
+        if (np.quantile(change, 0.95, axis=0) <= allowed).all():
+            break
+        count, after = 2 * count, finer
+    return min(count, own) if stride == 1 else count
+
+
+def _after(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory], substeps: int, stride: int
+) -> tuple[Array, Array]:
+    samples = Samples.join(trajectories, substeps, stride)
+    model = Model(simulator)
+    nodes = paths.measured(model, samples, np.zeros(0))
+    rows = np.unique(np.linspace(0, len(samples) - 1, min(len(samples), 800)).astype(int))
+    after = model.advance(samples, nodes[rows][None], np.zeros((1, 0)), rows)[0]
+    return after, nodes[rows]
+
+
+def better_hold(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory], horizon: float,
+    hold: Hold | Mapping[str, Hold] | None,
+) -> tuple[HostSimulator, list[str]]:  # fmt: skip
+    """The simulator with its inputs held as given, or as the nominal simulator fits better.
+
+    Returns:
+        The simulator, and what there is to say of it.
+    """
+    names = [channel.name for channel in simulator.action_channels]
+    if hold is not None:
+        wanted = hold if isinstance(hold, Mapping) else dict.fromkeys(names, hold)
+        return simulator.with_hold(wanted), []
+    if not names or simulator.has_contacts:
+        return simulator, []
+    from residual.gap.prepare import smooth_fitter
+
+    other = simulator.with_hold(
+        {c.name: "zero" if c.hold == "linear" else "linear" for c in simulator.action_channels}
+    )
+    fitter, _ = smooth_fitter(simulator, trajectories, horizon)
+    own, its = (fitter.fit(Model(s), np.zeros(0)).loss for s in (simulator, other))
+    gained = own - its
+    error = float(gained.std(ddof=1) * np.sqrt(len(gained))) if len(gained) > 1 else np.inf
+    if gained.sum() < max(CLEARER * own.sum(), 3 * error):
+        return simulator, []
+    kinds = {"linear": "run straight from sample to sample", "zero": "are held between samples"}
+    kind = kinds[other.action_channels[0].hold]
+    return other, [
+        f"inputs were taken to {kind}: the nominal simulator fits better so; set hold to say "
+        "otherwise"
+    ]
+
+
+def other_numerics(search: Search, key: Key) -> list[Array]:
+    """Numbers of a set fitted at half the step, and with inputs held the other way, each (p,)."""
+    fitter, fit = search.fitter, search.tried[key]
+    found = [fitter.halved().fit(fit.model, fit.theta, fit).theta]
+    simulator = search.simulator
+    if simulator.action_channels and not simulator.has_contacts:
+        flipped = simulator.with_hold(
+            {c.name: "zero" if c.hold == "linear" else "linear" for c in simulator.action_channels}
+        )
+        found.append(fitter.fit(Model(flipped, fit.model.chosen), fit.theta).theta)
+    return found
+
+
+def _power(count: int) -> int:
+    """The smallest power of two that is not smaller."""
+    return 2 ** int(np.ceil(np.log2(count)))
