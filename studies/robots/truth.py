@@ -47,7 +47,7 @@ class Truth:
         path: The nominal model.
         hidden: Size by name: attributes as ``"frictionloss of joint elbow"``, effects as
             ``"delay@elbow_motor"``; sizes are changes, those of gains and groups shares.
-        finer: Steps of the truth in one of the nominal; by default 10, or 50 where the truth has
+        finer: Steps of the truth in one of the nominal; by default 10, or 250 where the truth has
             the integrator of lower order, whose error would be a gap of its own.
 
     Raises:
@@ -60,7 +60,7 @@ class Truth:
         first = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
         kinds = mujoco.mjtIntegrator
         model.opt.integrator = kinds.mjINT_IMPLICITFAST if first else kinds.mjINT_RK4
-        model.opt.timestep /= finer or (50 if first else 10)
+        model.opt.timestep /= finer or (250 if first else 10)
         model.dof_solimp[:, :3] = HARDER
         self.loads = np.zeros(model.nv)
         self.delay = np.zeros(model.nu)
@@ -164,7 +164,10 @@ class Truth:
         step = float(model.opt.timestep)
         fine = round(sensors.period / step)
         count = round(seconds / sensors.period)
-        stays = np.exp(-step / np.maximum(self.lag, 1e-12))
+        # Commands on their way are looked at every tenth of a millisecond.
+        moving = bool(self.delay.any() or self.lag.any())
+        together = max(1, round(1e-4 / step)) if moving else fine
+        stays = np.exp(-together * step / np.maximum(self.lag, 1e-12))
         positions, rates = [np.array(data.qpos)], [np.array(data.qvel)]
         commands: list[Array] = []
         past: list[Array] = []
@@ -178,13 +181,13 @@ class Truth:
             command = np.where(limited, np.clip(command, low, high), command)
             commands.append(command)
             past.append(self._shaped(command))
-            for i in range(fine):
+            for i in range(0, fine, together):
                 late = (k * sensors.period + i * step - self.delay) / sensors.period
                 index = np.clip(np.floor(late + 1e-9).astype(int), 0, k)
                 wanted = np.array([past[n][j] for j, n in enumerate(index)])
                 received = wanted if received is None else wanted + (received - wanted) * stays
                 data.ctrl[:] = received
-                mujoco.mj_step(model, data)
+                mujoco.mj_step(model, data, min(together, fine - i))
             positions.append(np.array(data.qpos))
             rates.append(np.array(data.qvel))
             if stop is not None and stop(data.qpos):
