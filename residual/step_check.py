@@ -118,6 +118,24 @@ def fine_enough(
     return None
 
 
+def advice(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[str]:
+    """What to tell before anything is named: nothing, or that the step shows and what to do.
+
+    Only simulators are asked whose step is part of the model, see ``Refinable``.
+    """
+    if not isinstance(simulator, Refinable):
+        return []
+    check = check_step(simulator, trajectories)
+    if not check.visible:
+        return []
+    if simulator.has_contacts:
+        return [f"{check.says}; contacts are as fine as the step, so small effects are in doubt"]
+    found = fine_enough(simulator, trajectories)
+    if found is None:
+        return [f"{check.says}; none of the finer versions tried is fine enough"]
+    return [f"{check.says}; run again with {found[0]}"]
+
+
 def _windows(
     simulator: HostSimulator, trajectories: Sequence[Trajectory], measured: NDArray[np.int64]
 ) -> Iterator[tuple[Array, Array, Array]]:

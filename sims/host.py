@@ -96,6 +96,10 @@ class HostSimulator(Simulator):
         """It as files of the format that it came from, by name, for tools that read that format."""
         return {}
 
+    def not_in_own_files(self) -> tuple[str, ...]:
+        """What those files cannot hold, or hold a little differently, one line each."""
+        return ()
+
     # -- what it is made of ---------------------------------------------------------------
 
     @property

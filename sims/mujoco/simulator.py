@@ -223,6 +223,11 @@ class MujocoSimulator(HostSimulator):
         """``corrected.xml`` and what it includes; see ``sims.mujoco.corrected``."""
         return corrected_files(self).files
 
+    def not_in_own_files(self) -> tuple[str, ...]:
+        """Effects that MJCF cannot express, or not exactly."""
+        corrected = corrected_files(self)
+        return (*corrected.missing, *(f"{line} (nearly)" for line in corrected.rough))
+
     def row_fields(self, rows: int) -> dict[str, Array]:
         """Fields of the model that attributes and effects on joints change, (rows, ...)."""
         fields = row_fields(self.model, self.attributes, self.parameter_values(), rows)
