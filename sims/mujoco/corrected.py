@@ -229,6 +229,8 @@ class _Writer:
             return "MJCF has no such element"
         if smooth and not reason:
             self.rough.append(f"{effect}: RK4 follows the command inside a step too")
+        elif "ctrlrange" in circuit.plain and "delay" in circuit.plain and not reason:
+            self.rough.append(f"{effect}: MuJoCo cuts commands after their delay")
         return reason
 
     def _option(self, fields: dict[str, Array]) -> None:

@@ -47,7 +47,11 @@ def at_a_usual_size(effect, simulator):
 
 CASES = [
     (name, str(effect), integrator)
-    for name, integrator in (("cart_pole", None), ("arm2", "implicitfast"), ("arm6", "Euler"))
+    for name, integrator in (
+        ("cart_pole", None),
+        ("arm2", "implicitfast"),
+        ("arm6", "implicitfast"),
+    )
     for effect in robot(name).offered_effects()
     if effect.enters != "sensor" and not isinstance(effect, DeadZone)
 ]
@@ -80,7 +84,6 @@ def test_effects_of_the_usual_library_are_written_too(tmp_path):
             ActuatorGain("elbow_motor", 0.1),
             ActuatorBias("elbow_motor", 0.05),
             Delay("shoulder_motor", 0.006),
-            Saturation("shoulder_motor", 1.5),
             AttributeChange("mass of body fore", 0.1),
             AttributeChange("gain of actuator shoulder_motor", 0.1),
             AttributeChange("gravity x", 0.2),
@@ -88,7 +91,17 @@ def test_effects_of_the_usual_library_are_written_too(tmp_path):
     )
     corrected, path = saved(changed, tmp_path)
     assert not corrected.missing
+    assert not corrected.rough
     assert agreement(changed, path) < 1e-9
+
+
+def test_a_delay_of_commands_that_are_cut_is_said_to_be_near(tmp_path):
+    simulator = robot("arm2", integrator="implicitfast")
+    cut, late = Saturation("shoulder_motor", 1.5), Delay("shoulder_motor", 0.006)
+    changed = simulator.with_effects([cut, late])
+    corrected, path = saved(changed, tmp_path)
+    assert "after their delay" in corrected.rough[0]
+    assert agreement(changed, path) < 0.02 * agreement(simulator, path)
 
 
 def test_with_runge_kutta_a_delay_is_said_to_be_near(tmp_path):
