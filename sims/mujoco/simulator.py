@@ -29,6 +29,7 @@ from sims.mujoco.corrected import corrected_files
 from sims.mujoco.effects import AttributeChange
 from sims.mujoco.forces import Placed, place
 from sims.mujoco.lag import lagged_at_ends
+from sims.mujoco.render import MujocoRenderer
 from sims.mujoco.rows import BLOCK, Rows
 from sims.simulator import Array, random_values
 
@@ -219,6 +220,10 @@ class MujocoSimulator(HostSimulator):
     def runge_kutta(self) -> bool:
         """Whether the model is integrated by RK4, which is of fourth order; all others of first."""
         return int(self.model.opt.integrator) == int(INTEGRATORS["RK4"])
+
+    def renderer(self) -> MujocoRenderer:
+        """Draws states; see ``sims.render``."""
+        return MujocoRenderer(self.model)
 
     def joint_index(self, name: str) -> int:
         """Index of a joint in the model."""
