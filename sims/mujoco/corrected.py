@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
 from sims.effects.actuator import (
@@ -26,7 +24,8 @@ from sims.mujoco.actuators import Circuit, written
 from sims.mujoco.attributes import nominal_field
 from sims.mujoco.compiled import HARD_FRICTION, model_text
 from sims.mujoco.forces import native
-from sims.mujoco.markup import Document, Markup, Tag
+from sims.mujoco.markup import Document
+from sims.mujoco.places import Places
 from sims.simulator import Array
 
 if TYPE_CHECKING:
@@ -59,24 +58,18 @@ def corrected_files(simulator: MujocoSimulator, name: str = "corrected.xml") -> 
         name: File name of the model.
     """
     text = model_text(simulator.source)
-    writer = _Writer(simulator, Document.read(simulator.source.path, text))
+    places = Places(Document.read(simulator.source.path, text), simulator.model)
+    writer = _Writer(simulator, places)
     writer.write()
-    return Corrected(writer.files(name), tuple(writer.missing), tuple(writer.rough))
+    return Corrected(places.files(name), tuple(writer.missing), tuple(writer.rough))
 
 
 class _Writer:
-    def __init__(self, simulator: MujocoSimulator, document: Document) -> None:
-        self.simulator, self.document = simulator, document
+    def __init__(self, simulator: MujocoSimulator, places: Places) -> None:
+        self.simulator, self.places = simulator, places
         self.model = simulator.model
-        self.missing: list[str] = []
+        self.missing = places.missing
         self.rough: list[str] = []
-        self.root = document.files[next(iter(document.files))]
-        angles = [
-            tag.attributes["angle"]
-            for _, tag in document.tags
-            if tag.name == "compiler" and "angle" in tag.attributes
-        ]
-        self.degrees = not angles or angles[-1] == "degree"
 
     # -- what has changed -------------------------------------------------------------------
 
@@ -133,11 +126,11 @@ class _Writer:
             if _changed(model, fields, "qpos_spring", at):
                 rest = float(_value(model, fields, "qpos_spring", at))
                 turns = int(model.jnt_type[j]) == elements.HINGE
-                if turns and self.degrees:
+                if turns and self.places.degrees:
                     rest = float(np.degrees(rest))
                 values["springref"] = written([rest])
             if values:
-                self._set("joint", j, values)
+                self.places.set("joint", j, values)
 
     def _bodies(self, fields: dict[str, Array]) -> None:
         model = self.model
@@ -153,7 +146,7 @@ class _Writer:
                 "mass": written([_value(model, fields, "body_mass", b)]),
                 "diaginertia": written(_value(model, fields, "body_inertia", b)),
             }
-            found = self._find("body", b)
+            found = self.places.find("body", b)
             if found is None:
                 continue
             markup, tag = found
@@ -169,7 +162,7 @@ class _Writer:
 
     def _inertials_count(self, own: bool, b: int) -> bool:
         """Whether the inertia written for a body is the one that MuJoCo takes."""
-        for markup, tag in self.document.tags:
+        for markup, tag in self.places.document.tags:
             if tag.name != "compiler":
                 continue
             name = elements.name_of("body", self.model, b)
@@ -177,7 +170,7 @@ class _Writer:
                 self.missing.append(f"mass of body {name}: the file scales masses to a total")
                 return False
             if markup.now(tag, "inertiafromgeom") == "true":
-                others = self.document.find(("inertial",), "worldbody")
+                others = self.places.document.find(("inertial",), "worldbody")
                 if own or others:
                     self.missing.append(
                         f"mass of body {name}: compiler inertiafromgeom overrides inertial elements"
@@ -191,7 +184,7 @@ class _Writer:
         for g in range(self.model.ngeom):
             if _changed(self.model, fields, "geom_friction", g):
                 numbers = _value(self.model, fields, "geom_friction", g)
-                self._set("geom", g, {"friction": written(numbers)})
+                self.places.set("geom", g, {"friction": written(numbers)})
 
     def _actuators(self, fields: dict[str, Array]) -> None:
         model, simulator = self.model, self.simulator
@@ -206,7 +199,7 @@ class _Writer:
                 on = [c for a, c in enumerate(circuits) if elements.joint_of(model, a) == j]
                 self._cannot(load, on[0].push(float(load.load)) if on else "nothing drives it")
         for a, circuit in enumerate(circuits):
-            found = self._find("actuator", a) if circuit.changed else None
+            found = self.places.find("actuator", a) if circuit.changed else None
             if found is not None:
                 reason = circuit.write(*found)
                 if reason:
@@ -247,7 +240,7 @@ class _Writer:
             return
         last = [
             (markup, tag)
-            for markup, tag in self.document.tags
+            for markup, tag in self.places.document.tags
             if tag.name == "option" and tag.parents == ("mujoco",)
         ]
         if last:
@@ -255,127 +248,7 @@ class _Writer:
             markup.set(tag, **values)
         else:
             text = " ".join(f'{key}="{value}"' for key, value in values.items())
-            self.root.insert(self.root.tags[0], f"\n  <option {text}/>")
-
-    # -- where it stands ----------------------------------------------------------------------
-
-    def _set(self, kind: str, index: int, values: dict[str, str | None]) -> None:
-        found = self._find(kind, index)
-        if found is not None:
-            markup, tag = found
-            markup.set(tag, **values)
-
-    def _find(self, kind: str, index: int) -> tuple[Markup, Tag] | None:
-        """The tag of an element by its name, or by its place if it has none."""
-        names, section = {
-            "joint": (("joint", "freejoint"), "worldbody"),
-            "body": (("body",), "worldbody"),
-            "geom": (("geom",), "worldbody"),
-            "actuator": ((), "actuator"),
-        }[kind]
-        tags = self.document.find(names, section)
-        name = elements.name_of(kind, self.model, index)
-        named = [found for found in tags if found[1].attributes.get("name") == name]
-        if len(named) == 1:
-            return named[0]
-        counts = {
-            "joint": self.model.njnt,
-            "body": self.model.nbody - 1,
-            "geom": self.model.ngeom,
-            "actuator": len(self.model.actuator_trntype),
-        }
-        place = index - 1 if kind == "body" else index
-        if len(tags) == counts[kind] and "name" not in tags[place][1].attributes:
-            return tags[place]
-        self.missing.append(f"{kind} {name}: not found in the text of the file")
-        return None
-
-    def files(self, name: str) -> dict[str, bytes]:
-        """The text of every file that changed, by its new name."""
-        main, *others = self.document.files
-        self._name_folders(main)
-        found = {}
-        stem = Path(name).stem
-        # An included file that changed is a new file, which the files around it have to name.
-        for path in others:
-            text = self.document.files[path].render()
-            if text != self.document.files[path].text:
-                found[f"{stem}-{path.name}"] = text
-        for markup in self.document.files.values():
-            for tag in markup.tags:
-                if tag.name == "include":
-                    file = main.parent / tag.attributes.get("file", "")
-                    copied = f"{stem}-{file.name}"
-                    markup.set(tag, file=copied if copied in found else str(file.resolve()))
-        for path in others:
-            if f"{stem}-{path.name}" in found:
-                found[f"{stem}-{path.name}"] = self.document.files[path].render()
-        return {name: self.document.files[main].render(), **found}
-
-    def _name_folders(self, main: Path) -> None:
-        """Folders of assets, in full."""
-        model = self.model
-        if not (model.nmesh or model.ntex or model.nhfield or model.nskin):
-            return
-        folder = main.parent.resolve()
-        compilers = [(markup, tag) for markup, tag in self.document.tags if tag.name == "compiler"]
-        if not compilers:
-            self.root.insert(
-                self.root.tags[0], f'\n  <compiler meshdir="{folder}" texturedir="{folder}"/>'
-            )
-            return
-        named = set()
-        for markup, tag in compilers:
-            for attribute in ("assetdir", "meshdir", "texturedir"):
-                if attribute in tag.attributes:
-                    named.add(attribute)
-                    full = str((folder / tag.attributes[attribute]).resolve())
-                    markup.set(tag, **{attribute: full})
-        if "assetdir" not in named:
-            markup, tag = compilers[0]
-            for attribute in {"meshdir", "texturedir"} - named:
-                markup.set(tag, **{attribute: str(folder)})
-
-
-def agreement(simulator: MujocoSimulator, path: str | Path, seconds: float = 1.0) -> float:
-    """How far plain MuJoCo with a model file is from a simulator, over an open-loop rollout.
-
-    From rest in the reference pose, with smoothly varying controls.
-
-    Args:
-        simulator: With scalar values.
-        path: The model file.
-        seconds: Length of the rollout.
-
-    Returns:
-        The largest difference of a position or velocity, in their SI units.
-    """
-    model = mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(model)
-    count = max(1, round(seconds / simulator.dt))
-    times = simulator.dt * np.arange(count)
-    controls = (
-        np.stack(
-            [
-                0.4 * c.scale * np.sin(2 * np.pi * (0.7 + 0.3 * k) * times)
-                for k, c in enumerate(simulator.action_channels)
-            ],
-            axis=1,
-        )
-        if simulator.action_channels
-        else np.empty((count, 0))
-    )
-    width = simulator.model.nq + simulator.model.nv
-    start = np.concatenate([simulator.model.qpos0, np.zeros(simulator.model.nv)])
-    start = np.append(start, np.zeros(len(simulator.physical_channels) - width))
-    ours = simulator.rollout(simulator.augment(start[None])[0], controls)
-    worst = 0.0
-    for k, control in enumerate(controls):
-        data.ctrl[:] = control
-        mujoco.mj_step(model, data, simulator.substeps)
-        theirs = np.concatenate([data.qpos, data.qvel])
-        worst = max(worst, float(np.abs(ours[k + 1, :width] - theirs).max()))
-    return worst
+            self.places.root.insert(self.places.root.tags[0], f"\n  <option {text}/>")
 
 
 def _changed(model: Any, fields: dict[str, Array], field: str, index: int) -> bool:

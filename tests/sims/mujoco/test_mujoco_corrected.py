@@ -24,7 +24,8 @@ from sims.effects import (
     typical,
 )
 from sims.mujoco import AttributeChange, MujocoSimulator
-from sims.mujoco.corrected import agreement, corrected_files
+from sims.mujoco.agreement import agreement
+from sims.mujoco.corrected import corrected_files
 from tests.sims.mujoco.robots import MODELS, robot
 
 

@@ -34,6 +34,7 @@ class Rest(Task):
         return -(next_states**2).sum(axis=1)
 
 
+@pytest.mark.filterwarnings("ignore:.*WARN")
 def test_it_is_a_gymnasium_environment():
     env = SimulatorEnv(robot("arm2"), Rest())
     gymnasium.utils.env_checker.check_env(env, skip_render_check=True)

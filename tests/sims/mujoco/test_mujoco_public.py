@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sims.mujoco import AttributeChange, MujocoSimulator
-from sims.mujoco.corrected import agreement, corrected_files
+from sims.mujoco.agreement import agreement
+from sims.mujoco.corrected import corrected_files
 
 ASSETS = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
 SMOOTH = ("inverted_pendulum", "inverted_double_pendulum", "reacher", "swimmer", "pusher")
