@@ -99,48 +99,45 @@ class Pendulum(HostSimulator):
         Pymunk steps the rows without effects; rows with effects are stepped by the same scheme,
         compiled, and agree with it to rounding.
         """
-        states, durations = np.asarray(states, float), np.asarray(durations, float)
-        halves = _halves(np.asarray(inputs, float))
-        n = len(states)
+        states, inputs = np.asarray(states, float), np.asarray(inputs, float)
+        durations = np.asarray(durations, float)
+        there = [np.broadcast_to(effect.present(), len(states)) for effect in self.effects]
+        acting = np.logical_or.reduce(there) if there else np.zeros(0, dtype=bool)
+        if 0 < np.count_nonzero(acting) < len(states):
+            after = np.empty_like(states)
+            for rows in (np.flatnonzero(acting), np.flatnonzero(~acting)):
+                part = states[rows], inputs[rows], durations[rows]
+                after[rows] = self.take(rows).integrate(*part)
+            return after
+        motor, halves = self._motor(), _halves(inputs)
+        if acting.any():
+            effects = [*self.joint_effects(), *self.plays()]
+            return swing(states, halves, durations, motor, effects)
+        constants = [_by_row(value, len(states)) for value in motor.values()]
+        after = states.copy()
+        zipped = zip(states.tolist(), halves.tolist(), durations.tolist(), *constants, strict=True)
+        for i, (state, voltages, duration, *own) in enumerate(zipped):
+            # Leapfrog errs in even powers of the sub-step; this removes the second.
+            whole = [0.5 * (a + b) for a, b in zip(voltages[::2], voltages[1::2], strict=True)]
+            fine = self._swing(state, voltages, duration, *own)
+            coarse = self._swing(state, whole, duration, *own)
+            after[i, :2] = [f + (f - c) / 3 for f, c in zip(fine, coarse, strict=True)]
+        return after
+
+    def _motor(self) -> dict[str, Any]:
+        """The pendulum without effects, by the names of ``sims.driven``."""
         p: dict[str, Any] = self.parameter_values()
         inertia = p["inertia"]
         if self.inertia_follows_mass:
             inertia = inertia + (p["mass"] - IDEALISED_MASS) * p["length"] ** 2
         drive = p["torque_constant"] / p["resistance"]
-        weight = p["mass"] * p["gravity"] * p["length"]
-        motor = {
+        return {
             "inertia": inertia,
-            "weight": weight,
+            "weight": p["mass"] * p["gravity"] * p["length"],
             "damping": p["damping"],
             "drive": drive,
             "back": p["torque_constant"] * drive,
         }
-        there = np.zeros(n, dtype=bool)
-        for effect in self.effects:
-            there |= effect.present()
-        after = np.empty_like(states)
-        rows = np.flatnonzero(there)
-        if rows.size:
-            some = self.take(rows)
-            after[rows] = swing(
-                states[rows],
-                halves[rows],
-                durations[rows],
-                {k: value[rows] if np.ndim(value) else value for k, value in motor.items()},
-                [*some.joint_effects(), *some.plays()],
-            )
-        rows = np.flatnonzero(~there)
-        constants = [np.broadcast_to(value, n)[rows].tolist() for value in motor.values()]
-        for i, *own in zip(rows.tolist(), *constants, strict=True):
-            voltages, duration = halves[i].tolist(), float(durations[i])
-            # Leapfrog errs in even powers of the sub-step; this removes the second.
-            whole = [0.5 * (a + b) for a, b in zip(voltages[::2], voltages[1::2], strict=True)]
-            start = states[i, :2].tolist()
-            fine = self._swing(start, voltages, duration, *own)
-            coarse = self._swing(start, whole, duration, *own)
-            after[i, :2] = [f + (f - c) / 3 for f, c in zip(fine, coarse, strict=True)]
-            after[i, 2:] = states[i, 2:]
-        return after
 
     # Pymunk first moves the angle at the old rate and then changes the rate. An angle that
     # starts half a sub-step back is thus at the middle of the sub-step when the torque acts:
@@ -159,7 +156,7 @@ class Pendulum(HostSimulator):
     ) -> tuple[float, float]:
         """One control period without effects; NaN if the pendulum runs away."""
         body, advance, sin = self._body, self._space.step, math.sin
-        angle, rate = state
+        angle, rate, *_ = state
         friction = damping + back
         h = duration / len(voltages)
         middle = angle + 0.5 * h * rate
@@ -194,6 +191,10 @@ class Pendulum(HostSimulator):
         # Copies get a body of their own: the body is a scratch pad, not a state.
         self.__dict__.update(state)
         self._make_body()
+
+
+def _by_row(value: float | Array, n: int) -> list[float]:
+    return np.broadcast_to(value, n).tolist() if np.ndim(value) else [float(value)] * n
 
 
 def _halves(inputs: Array) -> Array:
