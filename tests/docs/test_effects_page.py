@@ -7,7 +7,6 @@ import pytest
 
 from sims import effects
 from sims.effects import Effect, library
-from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
 
 PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
@@ -49,4 +48,3 @@ def test_the_page_says_which_lie_upstream_of_a_sensor():
 def test_what_one_derives_from_is_there():
     for name in ("JointEffect", "DryFriction", "StaticActuatorEffect", "SensorEffect"):
         assert f"`{name}`" in PAGE.read_text(encoding="utf-8") and hasattr(effects, name)
-    assert FirstOrderSystem.advances_rows_at_once
