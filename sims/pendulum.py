@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 import pymunk
+from numpy.typing import NDArray
 
 from sims.effects.base import Effect
 from sims.host import HostSimulator, Joint
@@ -45,8 +46,8 @@ class Pendulum(HostSimulator):
 
     A Pymunk body of moment J turns about the pivot, where its centre of gravity is put, and
     gravity acts as a torque: a joint would damp the swing numerically, at first order. It
-    hosts every effect, as a torque inside every sub-step; with effects the same scheme is
-    stepped by compiled code instead of Pymunk.
+    hosts every effect, as a torque inside every sub-step. What has effects, and what is
+    integrated for the fit of a log, is moved by the same scheme in compiled code.
 
     Args:
         mass: kg; 0.055 is the paper's idealised pendulum, 0.090 its true one.
@@ -60,6 +61,7 @@ class Pendulum(HostSimulator):
     name = "pendulum"
     joints = JOINTS
     has_drive_force = True
+    advances_rows_at_once = True
 
     def __init__(
         self,
@@ -95,29 +97,29 @@ class Pendulum(HostSimulator):
         return (drive * (inputs[:, 0] - p["torque_constant"] * states[:, 1]))[:, None]
 
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
-        """See ``HostSimulator.integrate``.
-
-        Pymunk steps the rows without effects; rows with effects are stepped by the same scheme,
-        compiled, and agree with it to rounding.
-        """
+        """See ``HostSimulator.integrate``; compiled, and equal to Pymunk's steps to rounding."""
         states, inputs = np.asarray(states, float), np.asarray(inputs, float)
-        durations = np.asarray(durations, float)
+        effects = [*self.joint_effects(), *self.plays()]
+        return swing(states, _halves(inputs), np.asarray(durations, float), self._motor(), effects)
+
+    def _move(self, states: Array, inputs: Array, durations: Array) -> Array:
+        """``step`` moves the rows without effects by Pymunk."""
         there = [np.broadcast_to(effect.present(), len(states)) for effect in self.effects]
-        acting = np.logical_or.reduce(there) if there else np.zeros(0, dtype=bool)
-        if 0 < np.count_nonzero(acting) < len(states):
-            after = np.empty_like(states)
-            for rows in (np.flatnonzero(acting), np.flatnonzero(~acting)):
-                part = states[rows], inputs[rows], durations[rows]
-                after[rows] = self.take(rows).integrate(*part)
-            return after
-        motor, halves = self._motor(), _halves(inputs)
-        if acting.any():
-            effects = [*self.joint_effects(), *self.plays()]
-            return swing(states, halves, durations, motor, effects)
-        constants = [_by_row(value, len(states)) for value in motor.values()]
+        plain = ~np.logical_or.reduce(there) if there else np.ones(len(states), dtype=bool)
+        if not plain.any():
+            return self.integrate(states, inputs, durations)
         after = states.copy()
-        zipped = zip(states.tolist(), halves.tolist(), durations.tolist(), *constants, strict=True)
-        for i, (state, voltages, duration, *own) in enumerate(zipped):
+        if not plain.all():
+            after[~plain] = self.take(~plain).integrate(
+                states[~plain], inputs[~plain], durations[~plain]
+            )
+            states, inputs, durations = states[plain], inputs[plain], durations[plain]
+        constants = [_by_row(value, len(plain), plain) for value in self._motor().values()]
+        rows = zip(
+            np.flatnonzero(plain).tolist(), states.tolist(), _halves(inputs).tolist(),
+            durations.tolist(), *constants, strict=True,
+        )  # fmt: skip
+        for i, state, voltages, duration, *own in rows:
             # Leapfrog errs in even powers of the sub-step; this removes the second.
             whole = [0.5 * (a + b) for a, b in zip(voltages[::2], voltages[1::2], strict=True)]
             fine = self._swing(state, voltages, duration, *own)
@@ -194,8 +196,10 @@ class Pendulum(HostSimulator):
         self._make_body()
 
 
-def _by_row(value: float | Array, n: int) -> list[float]:
-    return np.broadcast_to(value, n).tolist() if np.ndim(value) else [float(value)] * n
+def _by_row(value: float | Array, n: int, rows: NDArray[np.bool_]) -> list[float]:
+    if np.ndim(value):
+        return np.broadcast_to(value, n)[rows].tolist()
+    return [float(value)] * int(np.count_nonzero(rows))
 
 
 def _halves(inputs: Array) -> Array:
