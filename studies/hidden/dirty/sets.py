@@ -152,10 +152,10 @@ def _sized(
     period: float, config: Mapping[str, Any],
 ) -> float:  # fmt: skip
     """The strength at which the nominal's forecasts are ``size`` times as bad as without it."""
-    seconds = min(6.0 if plain.system != "oven" else 120.0, 1500 * period)
+    seconds = min(0.5 * SECONDS[plain.system], 2000 * period)
 
     def error(truth: Truth) -> float:
-        runs = records(truth, sensors, "single", period, seconds, (int(config["seed"]), 4))
+        runs = records(truth, sensors, "ramp", period, seconds, (int(config["seed"]), 4))
         horizon = HORIZON[plain.system]
         groups = plan(simulator, runs, horizon, LEAD * horizon, most=40)
         return relative_error(simulator, groups)
