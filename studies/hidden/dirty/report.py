@@ -10,6 +10,7 @@ import pandas as pd
 
 from studies.hidden.dirty.score import finite
 from studies.hidden.report import count, share
+from studies.reporting.markdown import markdown
 from studies.running.files import atomic_write_text
 
 #: Held-out error over the oracle's that is asked for, and room for "never worse than nominal".
@@ -172,9 +173,3 @@ def write_dirty(results: Sequence[Mapping[str, Any]], output: Path) -> None:
         "".join(f"- {line}\n" for line in misses(rows)) or "none\n",
     ]  # fmt: skip
     atomic_write_text(output / "dirty.md", "\n".join(parts))
-
-
-def markdown(data: pd.DataFrame) -> str:
-    """A table as Markdown."""
-    rows = [list(data.columns), ["---"] * len(data.columns), *data.astype(str).to_numpy().tolist()]
-    return "".join("| " + " | ".join(row) + " |\n" for row in rows)
