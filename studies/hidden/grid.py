@@ -61,6 +61,7 @@ class DirtyBlock:
         name: ``hidden``; ``dirt only``, with nothing hidden; or ``removed``, with what is hidden
             taken out of the library.
         systems: Of ``studies.hidden.dirty.systems``.
+        effects: What is hidden, ``name@where`` or a parameter; by default everything that can be.
         size: Forecast error of the nominal simulator, in errors with the dirt alone.
         layout: ``ramp``: six runs driven harder and harder; ``single``: one long run; ``many``:
             twelve runs alike.
@@ -71,6 +72,7 @@ class DirtyBlock:
     systems: list[Literal["arm", "two-link arm", "cart", "oven"]] = dataclasses.field(
         default_factory=lambda: list(SYSTEMS)  # type: ignore[arg-type]
     )
+    effects: list[str] | None = None
     size: list[float] = dataclasses.field(default_factory=lambda: [3.0, 6.0])
     layout: list[Layout] = dataclasses.field(default_factory=lambda: ["ramp", "single", "many"])
     repeats: PositiveInt = 1
@@ -134,8 +136,17 @@ def trials_of(study: HiddenStudy) -> list[dict[str, Any]]:
 def _dirty_cells(block: DirtyBlock) -> list[dict[str, Any]]:
     """Settings of every set of a block of the dirty world."""
     cells: list[dict[str, Any]] = []
+    known = {label for system in block.systems for label in LABELS[system]}
+    wanted = known if block.effects is None else set(block.effects)
+    if wanted - known:
+        raise ValueError(
+            f"nothing called {min(wanted - known)!r} can be hidden in {', '.join(block.systems)}; "
+            f"there are {', '.join(sorted(known))}"
+        )
     for system in block.systems:
-        labels = [""] if block.name == "dirt only" else list(LABELS[system])
+        labels = [label for label in LABELS[system] if label in wanted]
+        if block.name == "dirt only":
+            labels = [""]
         for label, _ in itertools.product(labels, range(block.repeats)):
             turn = len(cells)
             cells.append(

@@ -155,7 +155,15 @@ def test_misses_are_told_in_words():
     assert table["or its family"].startswith("67 % (2/3")
 
 
-@pytest.mark.long
+def test_an_effect_that_cannot_be_hidden_is_one_line(tmp_path, capsys):
+    block = json.dumps([{"name": "hidden", "systems": ["oven"], "effects": ["mass"]}])
+    with pytest.raises(SystemExit) as stop:
+        main(["--dirty", block, "--output", str(tmp_path / "out")])
+    assert stop.value.code == 2
+    assert "'mass'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_fast_subset(tmp_path, capsys):
     main(["--config", "studies/configs/hidden_effects/dirty_fast.yaml", "--output", str(tmp_path)])
     assert "or its family" in capsys.readouterr().out
@@ -163,4 +171,5 @@ def test_fast_subset(tmp_path, capsys):
     assert "## Every cell" in text and "## Misses" in text
     results = [json.loads(p.read_text()) for p in tmp_path.glob("sets/*/results.json")]
     hidden = [r["answers"]["find_gap"] for r in results if r["config"]["hidden"]]
-    assert sum(answer["family"] for answer in hidden) >= len(hidden) - 1
+    assert all(answer["family"] for answer in hidden)
+    assert all(answer["corrected"] < answer["nominal"] for answer in hidden)
