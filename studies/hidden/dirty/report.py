@@ -63,6 +63,7 @@ def headlines(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
         lambda r: _ratio(r) <= RATIO,
     )
     add("95 % intervals with the oracle's strength", "85 %", known, lambda r: r["covered"])
+    add("or with the true strength", "", known, lambda r: r.get("covered_truth"))
     add("removed from the library: a confirmed wrong name", "at most 2 %", removed,
         lambda r: r["wrong_sure"])  # fmt: skip
     add("the same, parameters that are truly off left out", "", removed,

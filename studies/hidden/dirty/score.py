@@ -76,6 +76,7 @@ def errors(result: GapResult, made: Dirty) -> dict[str, Any]:
         if _label(verdict) == made.label and verdict.kind in ("confirmed", "ambiguous"):
             number = verdict.parameters[field]
             covered = bool(number.low <= row["oracle_strength"] <= number.high)
+            row["covered_truth"] = bool(number.low <= made.truth.strength <= number.high)
             break
     row["covered"] = covered
     return row

@@ -61,7 +61,6 @@ class Truth:
         strength: In its unit; for a parameter the absolute change.
         soft: Speed over which dry friction builds up.
         presliding: Distance that dry friction gives way elastically; 0 for the soft law.
-        stray: Viscous friction in every coordinate that nobody looks for.
         flexible: Share of the inertia that hangs on a spring.
         resonance: Of that part, in Hz.
         filtered: Time constant of the sensors in s, 0 for none.
@@ -74,7 +73,6 @@ class Truth:
     strength: float = 0.0
     soft: float = 0.01
     presliding: float = 0.0
-    stray: float = 0.0
     flexible: float = 0.0
     resonance: float = 6.0
     filtered: float = 0.0
@@ -183,7 +181,7 @@ def simulate(
         state = y.tolist()
         q, v = state[:c], state[c : 2 * c]
         u = inputs(t, state)
-        force = [0.0] * c if thermal else [-truth.stray * rate for rate in v]
+        force = [0.0] * c
         bristle = 0.0
         if at >= 0:
             x, w = q[at], v[at]
