@@ -152,6 +152,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         cells = trials_of(study)
     except ValueError as error:
         fail(str(error))
+    if not cells:
+        fail("nothing to run: expected blocks or dirty, as in studies/configs/hidden_effects/")
     folders = {trial_folder(output / "sets", _title(c), c): c for c in cells}
     settings = json.loads(parser.dump(given, format="json"))
     atomic_write_json(output / "settings.json", settings)

@@ -155,6 +155,13 @@ def test_misses_are_told_in_words():
     assert table["or its family"].startswith("67 % (2/3")
 
 
+def test_nothing_to_run_is_one_line(tmp_path, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--output", str(tmp_path / "out")])
+    assert stop.value.code == 2
+    assert "nothing to run" in capsys.readouterr().err
+
+
 def test_an_effect_that_cannot_be_hidden_is_one_line(tmp_path, capsys):
     block = json.dumps([{"name": "hidden", "systems": ["oven"], "effects": ["mass"]}])
     with pytest.raises(SystemExit) as stop:
