@@ -16,8 +16,8 @@ from studies.hidden.dirty.sets import LEAD, Dirty, make_set, oracle_effect
 from studies.judging.forecasts import Forecasts, plan, relative_error, root_mean_squares
 from studies.judging.oracle import fit_effects
 
-#: Forecasts by which the oracle is fitted, and by which all are judged, for each run.
-FITTED, JUDGED = 60, 40
+#: Forecasts by which the oracle is fitted, in all, and by which all are judged, for each run.
+FITTED, JUDGED = 120, 20
 
 
 def run_dirty(config: Mapping[str, Any]) -> dict[str, Any]:
@@ -89,7 +89,7 @@ def oracle(made: Dirty, fit: Sequence[Forecasts]) -> tuple[Effect, ...]:
 
 
 def _fitted(made: Dirty) -> int:
-    return max(20, FITTED * 6 // len(made.logs))
+    return max(1, FITTED // len(made.logs))
 
 
 def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, Any]:
