@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from residual.gap import GapResult, find_gap
+from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.effects.library import exact_aliases, library
 from sims.host import HostSimulator
@@ -16,8 +17,8 @@ from studies.hidden.dirty.sets import LEAD, Dirty, make_set, oracle_effect
 from studies.judging.forecasts import Forecasts, plan, relative_error, root_mean_squares
 from studies.judging.oracle import fit_effects
 
-#: Forecasts by which the oracle is fitted, in all, and by which all are judged, for each run.
-FITTED, JUDGED = 120, 20
+#: Forecasts by which the oracle is fitted, and by which all are judged.
+FORECASTS = 120
 
 
 def run_dirty(config: Mapping[str, Any]) -> dict[str, Any]:
@@ -58,14 +59,14 @@ def run_dirty(config: Mapping[str, Any]) -> dict[str, Any]:
 
 def errors(result: GapResult, made: Dirty) -> dict[str, Any]:
     """Held-out errors of the nominal, the corrected simulator and the oracle; its strength."""
-    held = plan(made.simulator, made.held, made.horizon, LEAD * made.horizon, JUDGED)
+    held = plan(made.simulator, made.held, made.horizon, LEAD * made.horizon, _each(made.held))
     row: dict[str, Any] = {
         "nominal": relative_error(made.simulator, held),
         "corrected": relative_error(result.corrected, held),
     }
     if not made.label:
         return row
-    fit = plan(made.simulator, made.logs, made.horizon, LEAD * made.horizon, _fitted(made))
+    fit = plan(made.simulator, made.logs, made.horizon, LEAD * made.horizon, _each(made.logs))
     (found,) = oracle(made, fit)
     repaired = made.simulator.with_effects([found])
     row["oracle"] = relative_error(repaired, held)
@@ -88,8 +89,8 @@ def oracle(made: Dirty, fit: Sequence[Forecasts]) -> tuple[Effect, ...]:
     return fit_effects(made.simulator, [oracle_effect(made.label, made.simulator)], fit, channels)
 
 
-def _fitted(made: Dirty) -> int:
-    return max(1, FITTED // len(made.logs))
+def _each(runs: Sequence[Trajectory]) -> int:
+    return max(1, FORECASTS // len(runs))
 
 
 def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, Any]:

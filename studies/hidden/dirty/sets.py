@@ -109,7 +109,7 @@ def make_set(config: Mapping[str, Any]) -> Dirty:
         strength = _sized(plain, sensors, simulator, name, where, usual, period, config)
         truth = dataclasses.replace(plain, effect=name, where=where, strength=strength)
     logs = records(truth, sensors, layout, period, seconds, (seed, 2))
-    held = records(truth, sensors, "ramp", period, 0.5 * seconds, (seed, 3))
+    held = records(truth, sensors, layout, period, 0.5 * seconds, (seed, 3))
     return Dirty(logs, held, simulator, str(config["hidden"]), truth, sensors, HORIZON[system])
 
 
