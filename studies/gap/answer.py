@@ -47,7 +47,8 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
     before = quantity_text(gap.before.value, gap.unit)
     if tolerance is not None and gap.before.value <= tolerance:
         allowed = quantity_text(tolerance, gap.unit)
-        return f"Nothing that matters: the {ahead(gap)} is {before}, allowed is {allowed}."
+        smaller = " What is named below is smaller than that." if result.effects else ""
+        return f"Nothing that matters: the {ahead(gap)} is {before}, allowed is {allowed}.{smaller}"
     named = [v for v in result.verdicts if v.kind in ("confirmed", "ambiguous")]
     if named:
         words = listed([_in_lead(verdict, result) for verdict in named])
