@@ -214,7 +214,7 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
         answers: dict[str, Any] = {}
         if "find_gap" in config["methods"]:
             begin = time.process_time()
-            result = find_gap(simulator, logs, effects=offered, ceiling=False)
+            result = find_gap(simulator, logs, effects=offered)
             used = {"processor_seconds": time.process_time() - begin}
             answers["find_gap"] = score(result, strengths, bool(outside)) | used
         names = [*strengths, *outside]

@@ -10,8 +10,8 @@ from scipy.stats import chi2
 
 from residual.gap.noise import Floor, driven_states, push
 from residual.gap.samples import Samples
-from residual.gap.shooting import Shot
 from residual.gap.screening import flatten, project_out
+from residual.gap.shooting import Shot
 from residual.gap.slopes import observe
 from residual.gap.windows import Windows, carry
 from sims.host import HostSimulator

@@ -66,9 +66,7 @@ def blocks(samples: Samples, windows: Windows, drive: Array, most: int) -> Block
         groups = _groups(windows, size)
         if len(groups) >= ENOUGH:
             break
-    hard = np.array(
-        [drive[windows.index[group][windows.inside[group]]].mean() for group in groups]
-    )
+    hard = np.array([drive[windows.index[group][windows.inside[group]]].mean() for group in groups])
     order = np.argsort(hard, kind="stable")
     size = max(len(group) for group in groups)
     keep = min(len(groups), max(ENOUGH, most // size))

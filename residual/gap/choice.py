@@ -66,7 +66,9 @@ def choose(search: Search) -> Choice:
 def _better_fit(search: Search, keys: list[Key]) -> Key:
     """The set that forecasts best, or one that is as good within chance and fits better."""
     best = min(keys, key=search.error)
-    near = [k for k in keys if as_good(search, k, best) and search.error(k) < NEAR * search.error(best)]
+    near = [
+        k for k in keys if as_good(search, k, best) and search.error(k) < NEAR * search.error(best)
+    ]
     return min(near or [best], key=lambda key: search.tried[key].merit)
 
 
@@ -86,7 +88,7 @@ def as_good(search: Search, key: Key, best: Key) -> bool:
 
 
 def material(search: Search, smaller: Key, larger: Key) -> bool:
-    """Whether a set takes a fifth off what a smaller one leaves, or a third at one of its joints."""
+    """Whether a set takes a fifth off what a smaller one leaves, or a third at one joint."""
     before = search.currency.by_group(search.validated[smaller].squares)
     after = search.currency.by_group(search.validated[larger].squares)
     gained = before - after

@@ -14,7 +14,7 @@ from residual.gap.choice import AT_ONE
 from residual.gap.fitting import Fit
 from residual.gap.result import Number
 from residual.gap.search import Key, Search
-from residual.gap.significance import TIE, score
+from residual.gap.significance import score
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,8 @@ class Claim:
         number: The candidate.
         numbers: Fitted numbers.
         form: Effects of the same family and place that do nearly as well.
-        rivals: Effects of other families that do nearly as well.
+        alike: Effects of other families that do, with the same motion in these data.
+        rivals: Effects of other families that do, with another motion.
         twins: Effects that make the same motion in any data.
         needed: Whether forecasts are clearly worse without it.
         steady: Whether its strength is about the same in every fold.
@@ -49,6 +50,7 @@ class Claim:
     number: int
     numbers: dict[str, Number]
     form: tuple[str, ...]
+    alike: tuple[str, ...]
     rivals: tuple[str, ...]
     twins: tuple[str, ...]
     needed: bool
@@ -78,16 +80,17 @@ def claims(
     half = 1.96 * deviations(fit, search.fitter.blocks)
     found = []
     for place, number in enumerate(key):
-        own = np.flatnonzero(fit.model.owner == place)
+        own = [int(j) for j in np.flatnonzero(fit.model.owner == place)]
         label = search.candidates[number].label
-        form, rivals = near(search, key, number, adequate)
+        form, alike, rivals = near(search, key, number, adequate)
         twins = tuple(name for name in groups.get(label, ()) if name != label)
-        strengths = [j for j in own if fit.model.knobs[j].strength] or list(own)
+        strengths = [j for j in own if fit.model.knobs[j].strength] or own
         found.append(
             Claim(
                 number,
                 {fit.model.knobs[j].field: bounded(fit, j, half[j], numerics) for j in own},
                 tuple(name for name in form if name not in twins),
+                tuple(name for name in alike if name not in twins),
                 tuple(name for name in rivals if name not in twins),
                 twins,
                 needed(search, key, number, adequate),
@@ -102,10 +105,12 @@ def claims(
 
 def near(
     search: Search, key: Key, number: int, adequate: bool
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Effects that do nearly as well in place of a chosen one: of its family, and others."""
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Effects that do nearly as well in place of a chosen one, see ``Claim``."""
     rest = set(key) - {number}
-    form, others = [], []
+    form: list[str] = []
+    same: list[str] = []
+    others: list[str] = []
     for rival in search.usable():
         fresh = set(rival) - rest
         if len(rival) != len(key) or not rest < set(rival) or fresh == {number}:
@@ -113,10 +118,15 @@ def near(
         (other,) = fresh
         family = search.family(number)
         alike = bool(family) and search.family(other) == family
-        if excluded(search, key, rival, number, adequate, alike):
-            continue
-        (form if alike else others).append(search.candidates[other].label)
-    return tuple(form), tuple(others)
+        label = search.candidates[other].label
+        out = excluded(search, key, rival, number, adequate, alike)
+        if alike and not out:
+            form.append(label)
+        elif not adequate and search.same_motion(tuple(sorted(rest)), number, other):
+            same.append(label)
+        elif not out:
+            others.append(label)
+    return tuple(form), tuple(same), tuple(others)
 
 
 def excluded(
@@ -128,7 +138,7 @@ def excluded(
     one that differs in form alone has to lose at the horizon and at half of it.
     """
     if adequate:
-        return score(search, rival) - score(search, key) > TIE
+        return score(search, rival) - score(search, key) > tie(search)
     group = where_it_matters(search, key, number)
     own, its = (search.validated[k] for k in (key, rival))
     ratio = _ratio(search, its.squares, own.squares, group)
@@ -138,6 +148,11 @@ def excluded(
         return False
     behind, error = search.currency.difference(its.squares, own.squares, group)
     return behind > error and _ratio(search, its.half, own.half, group) > 1.0 and ratio > 1.05
+
+
+def tie(search: Search) -> float:
+    """Difference of scores beyond which chance excludes a rival."""
+    return search.fitter.tie(search.tried[()])
 
 
 def _ratio(search: Search, one: Array, other: Array, group: int) -> float:
@@ -161,11 +176,11 @@ def needed(search: Search, key: Key, number: int, adequate: bool) -> bool:
         return False
     group = where_it_matters(search, key, number)
     without, own = search.validated[rest].squares, search.validated[key].squares
-    lost, error = search.currency.difference(without, own, group)
+    lost, _ = search.currency.difference(without, own, group)
     if adequate:
-        return score(search, rest) - score(search, key) > TIE and lost > 0
+        return score(search, rest) - score(search, key) > tie(search) and lost > 0
     gone = 1 - 1 / max(_ratio(search, without, own, group), 1e-12)
-    return lost > WORSE * error and gone > 0.5 * AT_ONE
+    return gone > 0.5 * AT_ONE and search.currency.clearly(without, own, group) > WORSE
 
 
 def steady(search: Search, key: Key, j: int) -> bool:
@@ -191,9 +206,7 @@ def bounded(fit: Fit, j: int, half: float, numerics: Sequence[Array]) -> Number:
     knob, value = fit.model.knobs[j], float(fit.theta[j])
     fine = float(numerics[0][j]) if len(numerics) else value
     low, high = min(value, fine) - half, max(value, fine) + half
-    return Number(
-        value, max(low, knob.low), min(high, knob.high), knob.unit, at_bound(fit, j)
-    )
+    return Number(value, max(low, knob.low), min(high, knob.high), knob.unit, at_bound(fit, j))
 
 
 def share(search: Search, key: Key, number: int) -> tuple[float, float, float]:

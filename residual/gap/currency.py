@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.validation import Validated
 from sims.simulator import Channel
 
 Array = NDArray[np.float64]
@@ -60,7 +59,25 @@ class Currency:
         spread = float(per_block.std(ddof=1) * np.sqrt(n)) if n > 1 else np.inf
         return float(per_block.sum()), spread
 
-    def share(self, less: Array, more: Array, rng: np.random.Generator) -> tuple[float, float, float]:
+    def clearly(self, one: Array, other: Array, group: int) -> float:
+        """Standard errors by which one set is worse than another, block by block.
+
+        Ratios of the blocks' errors are compared, weighed by what is at stake: blocks are driven
+        unequally hard, so that differences would have the spread of the drive.
+        """
+        a, b = (self.by_block(squares)[:, group] for squares in (one, other))
+        there = (a > 0) & (b > 0)
+        if there.sum() < 3:
+            return 0.0
+        ratios, weights = np.log(a[there] / b[there]), a[there] / a[there].sum()
+        mean = float(weights @ ratios)
+        n = int(there.sum())
+        error = float(np.sqrt((weights**2) @ (ratios - mean) ** 2 * n / (n - 1)))
+        return mean / max(error, 1e-12)
+
+    def share(
+        self, less: Array, more: Array, rng: np.random.Generator
+    ) -> tuple[float, float, float]:
         """Part of the nominal squared error that lies between two sets, with a 95 % interval.
 
         Args:
@@ -74,8 +91,3 @@ class Currency:
         drawn = np.stack([gained[:, list(g)].mean(axis=1) for g in self.groups], axis=1).mean(1)
         low, high = np.quantile(drawn[1:], [0.025, 0.975])
         return float(drawn[0]), float(min(low, drawn[0])), float(max(high, drawn[0]))
-
-
-def relative(currency: Currency, found: Validated) -> float:
-    """Cross-validated relative error of a set."""
-    return currency.error(found.squares)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +11,9 @@ from numpy.typing import NDArray
 from residual.gap.candidates import Candidate
 from residual.gap.choice import Choice, choose, reasons
 from residual.gap.fitting import Fit, Fitter, Left
-from residual.gap.noise import Floor
+from residual.gap.noise import Noise
 from residual.gap.search import Effort, Key, Proposals, Search
-from residual.gap.significance import significant, threshold
-from residual.gap.significance import size as residuals
+from residual.gap.significance import significant
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -30,16 +28,9 @@ RIVALS, EXCHANGES = 5, 3
 SEEDS = 12
 
 
-class Weighing(Protocol):
-    """Makes the fitter whose channels are weighed by what a fit leaves of them."""
-
-    def __call__(self, now: Fitter, fit: Fit) -> tuple[Fitter, Floor]:
-        """The fitter, and the noise around the fit.
-
-        Args:
-            now: The fitter that made the fit.
-            fit: What to weigh by.
-        """
+#: From the fitter that made a fit, and the fit: the fitter whose channels are weighed by what that
+#: leaves of them, and the noise around it.
+Weighing = Callable[[Fitter, Fit], tuple[Fitter, Noise]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,7 +50,7 @@ class Explanation:
     choice: Choice
     left: Left
     nominal_left: Left
-    floor: Floor
+    floor: Noise
     needed: float
 
     @property
@@ -77,7 +68,7 @@ def explain(
     simulator: HostSimulator,
     pool: Sequence[Candidate],
     fitter: Fitter,
-    floor: Floor,
+    floor: Noise,
     weigh: Weighing,
     effort: Effort,
     tell: Callable[[str], None],
@@ -116,7 +107,7 @@ def _best_explained(search: Search) -> Key:
     return choose(search).key
 
 
-def settle(search: Search, floor: Floor, key: Key) -> Explanation:
+def settle(search: Search, floor: Noise, key: Key) -> Explanation:
     """The final choice, after everything chosen has met its rivals."""
     fitter = search.fitter
     nominal_left = fitter.left(search.tried[()], floor)
@@ -125,7 +116,7 @@ def settle(search: Search, floor: Floor, key: Key) -> Explanation:
     for _ in range(EXCHANGES):
         quiet = [k for k in {(), choice.key, search.best()} if _quiet(search, k, floor)]
         if quiet:
-            needed = threshold(search.signatures(()), residuals(search))
+            needed = fitter.needed(search.signatures(()), search.tried[()])
             key = significant(search, needed)
             choice = Choice(key, reasons(search, key), {})
         else:
@@ -142,5 +133,5 @@ def settle(search: Search, floor: Floor, key: Key) -> Explanation:
     return Explanation(search, choice, left, nominal_left, floor, needed)
 
 
-def _quiet(search: Search, key: Key, floor: Floor) -> bool:
+def _quiet(search: Search, key: Key, floor: Noise) -> bool:
     return search.fitter.left(search.tried[key], floor).adequate

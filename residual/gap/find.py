@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from residual.gap.aliases import aliases, hidden
 from residual.gap.candidates import candidates
 from residual.gap.confirmation import Claim, claims, share
+from residual.gap.data import examine
 from residual.gap.explain import Explanation, explain
 from residual.gap.forecasts import gap, held_out, noise_floor, rollouts
 from residual.gap.horizon import usual_horizon
 from residual.gap.model import Model
 from residual.gap.numerics import better_hold, other_numerics
 from residual.gap.prepare import Prepared, prepare
-from residual.gap.quality import check_usable, kinematics
-from residual.gap.result import Gap, GapResult, Rival, Verdict
-from residual.gap.search import Effort, Key
+from residual.gap.result import Blind, Gap, GapResult, Rival, Verdict
+from residual.gap.search import Key
 from residual.gap.verdicts import (
     FOOTNOTE,
     blind_verdict,
@@ -31,7 +31,6 @@ from residual.gap.verdicts import (
     no_gap_verdict,
     remainder_verdict,
 )
-from residual.gap.where import locate
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
@@ -75,7 +74,7 @@ def find_gap(
             whichever the nominal simulator fits better.
         measured_input: True if the logged inputs were measured at the actuator's output; what
             happens before that (dead zone, saturation, lag) is then no candidate.
-        horizon: Forecast length in seconds; by default a quarter of the usual period of the motion,
+        horizon: Forecast length in seconds; by default a third of the usual period of the motion,
             see ``residual.gap.horizon``.
         minutes: Time budget; the search for rival explanations ends in time.
         n_jobs: Processes for a simulator that steps row by row.
@@ -95,16 +94,19 @@ def find_gap(
     offered = tuple(library(simulator) if effects is None else effects)
     if measured_input:
         offered = tuple(e for e in offered if not e.upstream_of_sensor)
-    check_usable(simulator, trajectories)
-    runs, quality = kinematics(simulator, trajectories)
+    examined = examine(simulator, trajectories)
+    runs = examined.trajectories
+    quality = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
+    for says in quality:
+        tell(says)
     horizon = horizon or usual_horizon(simulator, runs)
     with workers(n_jobs):
-        simulator, says = better_hold(simulator, runs, horizon, hold)
-        quality += says
+        simulator, held_how = better_hold(simulator, runs, horizon, hold)
+        quality += held_how
         prepared = prepare(simulator, runs, horizon)
         groups, sets = aliases(simulator, offered)
         kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
-        pool = candidates(simulator, kept, prepared.fitter.samples)
+        pool = prepared.pool(candidates(simulator, kept, prepared.fitter.samples))
         clock.lap("read")
         tell(
             f"{len(prepared.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s, "
@@ -121,7 +123,7 @@ def find_gap(
         table = summed_up(answer)
         apart = None
         if held:
-            apart = judged_apart(answer, prepared, kinematics(simulator, held)[0], table)
+            apart = judged_apart(answer, prepared, examine(simulator, held).trajectories, table)
         clock.lap("forecast")
     return told(answer, table, apart, sets, tolerance, quality, clock.laps)
 
@@ -185,13 +187,11 @@ def summed_up(answer: Answer) -> Gap:
     return gap(search, answer.key, order, floor, (found.nominal_left.ratio, left.ratio))
 
 
-def judged_apart(
-    answer: Answer, prepared: Prepared, runs: Sequence[Trajectory], table: Gap
-) -> Gap:
+def judged_apart(answer: Answer, prepared: Prepared, runs: Sequence[Trajectory], table: Gap) -> Gap:
     """The same table for records that were set aside."""
     search = answer.found.search
     other = prepare(search.simulator, runs, prepared.horizon).fitter
-    other = dataclasses.replace(other, sigma=search.fitter.sigma)  # type: ignore[type-var]
+    other = other.weighed_like(search.fitter)
     fits = []
     for key in ((), answer.key):
         model = Model(search.model(key).bind(search.tried[key].theta))
@@ -210,13 +210,10 @@ def told(
     fit = search.tried[key]
     corrected = fit.model.bind(fit.theta)
     measured = [simulator.physical_channels[c] for c in fitter.samples.measured]
-    blind = ()
+    blind: tuple[Blind, ...] = ()
     if found.adequate:
         blind = hidden(search.signatures(key), search.candidates, key, found.needed)
-    where = locate(
-        Model(simulator), fitter.samples, fitter.blocks.windows, search.tried[()], fitter.sigma,
-        found.nominal_left.by_channel, found.floor,
-    )  # fmt: skip
+    where = fitter.where(search.tried[()], found.floor)
     return GapResult(
         verdicts=tuple(verdicts(answer, table, sets, tolerance, blind)),
         gap=table,
@@ -240,16 +237,15 @@ def told(
 
 def verdicts(
     answer: Answer, table: Gap, sets: Sequence[tuple[str, ...]], tolerance: float | None,
-    blind: Sequence[object],
+    blind: Sequence[Blind],
 ) -> list[Verdict]:  # fmt: skip
     """All verdicts, most important first."""
     found, search = answer.found, answer.found.search
     labels = [search.candidates[claim.number].label for claim in answer.claims]
+    blocks = len(search.fitter.blocks)
     made: list[Verdict] = []
     for claim, label in zip(answer.claims, labels, strict=True):
-        made.append(
-            effect_verdict(search, claim, len(search.fitter.blocks), *dependent(label, labels, sets))
-        )
+        made.append(effect_verdict(search, claim, blocks, *dependent(label, labels, sets)))
     left = search.fitter.left(search.tried[answer.key], found.floor)
     if tolerance is not None and table.before.value <= tolerance:
         made.insert(
@@ -267,7 +263,7 @@ def verdicts(
         if number not in answer.key:
             made.append(minor_verdict(search, number, share(search, with_it, number)))
     if blind:
-        made.append(blind_verdict(blind))  # type: ignore[arg-type]
+        made.append(blind_verdict(blind))
     return made
 
 
@@ -285,5 +281,3 @@ def evidence(answer: Answer) -> tuple[Rival, ...]:
         for key in search.tried
     ]  # fmt: skip
     return tuple(sorted(rows, key=lambda row: (not row.chosen, row.error))[:EVIDENCE])
-
-

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,12 @@ from numpy.typing import NDArray
 from residual.gap.blocks import Blocks
 from residual.gap.candidates import Candidate
 from residual.gap.model import Model
-from residual.gap.noise import Floor
+from residual.gap.noise import Noise
+from residual.gap.result import Where
 from residual.gap.samples import Samples
+
+if TYPE_CHECKING:
+    from residual.gap.screening import Signatures
 
 Array = NDArray[np.float64]
 
@@ -89,9 +93,23 @@ class Left:
 class Fitter(Protocol):
     """Fits models to the windows of one table."""
 
-    samples: Samples
-    blocks: Blocks
-    sigma: Array
+    @property
+    def samples(self) -> Samples:
+        """The table."""
+
+    @property
+    def blocks(self) -> Blocks:
+        """Its windows in blocks and folds."""
+
+    @property
+    def sigma(self) -> Array:
+        """Weight of every measured channel: an error of this size counts one, (m,)."""
+
+    def halved(self) -> Fitter:
+        """The same with half the integration step."""
+
+    def weighed_like(self, other: Fitter) -> Fitter:
+        """The same with the weights of another."""
 
     def fit(self, model: Model, theta: Array, near: Fit | None = None) -> Fit:
         """Numbers and start states of least loss, from ``theta`` on.
@@ -118,5 +136,19 @@ class Fitter(Protocol):
     def redrawn(self, fit: Fit, sigma: Array, rng: np.random.Generator) -> Fitter:
         """The same windows filled with the fitted simulator's own motion and noise, sigma (m,)."""
 
-    def left(self, fit: Fit, floor: Floor) -> Left:
+    def left(self, fit: Fit, floor: Noise) -> Left:
         """What a fit leaves, beside the noise."""
+
+    def where(self, nominal: Fit, floor: Noise) -> Where:
+        """Where the nominal simulator fails."""
+
+    def needed(self, around: Signatures, nominal: Fit) -> float:
+        """Fall of the loss that earns an effect a name where only noise is left.
+
+        Args:
+            around: Signatures of all candidates around the nominal simulator.
+            nominal: Its fit.
+        """
+
+    def tie(self, nominal: Fit) -> float:
+        """Difference of the loss beyond which a rival is excluded where only noise is left."""

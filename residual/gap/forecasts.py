@@ -1,4 +1,4 @@
-"""Forecast errors in the units of the channels: before, after, step by step, and what noise allows."""
+"""Forecast errors in the units of the channels: before, step by step, after, noise alone."""
 
 from __future__ import annotations
 

@@ -10,14 +10,16 @@ from residual.gap.smooth import LEAD
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
+#: Part of the usual period of the motion.
+PART = 1 / 3
 #: Windows that the records should at least be good for.
-WINDOWS = 16
+WINDOWS = 10
 #: Least samples of a window.
 SAMPLES = 8
 
 
 def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> float:
-    """A quarter of the usual period of the motion, or less if the records are short, in s.
+    """A third of the usual period of the motion, or less if the records are short, in s.
 
     The period is that of a sine with the same spread and the same spread of its rate, the middle
     one over channels. At least the records have to hold ``WINDOWS`` windows of ``SAMPLES`` samples.
@@ -44,7 +46,7 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
         period = _period(trajectories, column)
         if np.isfinite(period):
             periods.append(period)
-    wanted = 0.25 * float(np.median(periods)) if periods else 20 * simulator.dt
+    wanted = PART * float(np.median(periods)) if periods else 20 * simulator.dt
     most = (1 - LEAD) * min(total / WINDOWS, longest)
     return float(max(min(wanted, most), (1 - LEAD) * SAMPLES * step))
 

@@ -16,20 +16,29 @@ Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True)
-class Floor:
-    """What a smooth missing force cannot explain.
+class Noise:
+    """Sensor noise.
 
     Attributes:
         sigma: Noise of every measured channel, (m,).
         error: Standard error of each sigma, (m,).
+    """
+
+    sigma: Array
+    error: Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Floor(Noise):
+    """What a smooth missing force cannot explain.
+
+    Attributes:
         nodes: Smoothed state at every sample, (n, n_s).
         slope: Derivatives at the nodes.
         force: Missing acceleration (rate of change for first-order states) at every sample,
             (n, number of driven states).
     """
 
-    sigma: Array
-    error: Array
     nodes: Array
     slope: Slope
     force: Array

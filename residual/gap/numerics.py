@@ -6,7 +6,6 @@ name, so both are settled on the nominal simulator.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -39,9 +38,7 @@ def stride_for(trajectories: Sequence[Trajectory], horizon: float) -> int:
     return 2 ** int(np.log2(wanted))
 
 
-def substeps_for(
-    simulator: HostSimulator, trajectories: Sequence[Trajectory], stride: int
-) -> int:
+def substeps_for(simulator: HostSimulator, trajectories: Sequence[Trajectory], stride: int) -> int:
     """Sub-steps of an interval: as few as change nothing, at most as fine as the simulator's own.
 
     The nominal simulator is advanced from every row with so many sub-steps and twice as many; the
@@ -113,9 +110,7 @@ def better_hold(
 def other_numerics(search: Search, key: Key) -> list[Array]:
     """Numbers of a set fitted at half the step, and with inputs held the other way, each (p,)."""
     fitter, fit = search.fitter, search.tried[key]
-    samples = dataclasses.replace(fitter.samples, substeps=2 * fitter.samples.substeps)
-    halved = dataclasses.replace(fitter, samples=samples)  # type: ignore[type-var]
-    found = [halved.fit(fit.model, fit.theta).theta]
+    found = [fitter.halved().fit(fit.model, fit.theta, fit).theta]
     simulator = search.simulator
     if simulator.action_channels and not simulator.has_contacts:
         flipped = simulator.with_hold(

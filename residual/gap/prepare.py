@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from residual.gap import noise, paths
 from residual.gap.blocks import blocks, drive
+from residual.gap.candidates import Candidate
 from residual.gap.fitting import Fit, Fitter
+from residual.gap.impacts.prepare import impact_fitter, simple, weigh_impacts
 from residual.gap.model import Model
 from residual.gap.numerics import stride_for, substeps_for
 from residual.gap.samples import Samples
@@ -41,13 +43,15 @@ class Prepared:
         weigh: Weighs the channels anew, see ``residual.gap.explain.Weighing``.
         effort: How hard to search.
         horizon: Forecast length in s.
+        pool: Which candidates, and trials of them, are worth their cost.
     """
 
     fitter: Fitter
-    floor: noise.Floor
-    weigh: Callable[[Fitter, Fit], tuple[Fitter, noise.Floor]]
+    floor: noise.Noise
+    weigh: Callable[[Fitter, Fit], tuple[Fitter, noise.Noise]]
     effort: Effort
     horizon: float
+    pool: Callable[[Sequence[Candidate]], list[Candidate]] = list
 
 
 def prepare(
@@ -58,9 +62,13 @@ def prepare(
     Raises:
         ValueError: Nothing was measured, or every record is too short.
     """
+    if simulator.has_contacts:
+        impacts, around = impact_fitter(simulator, trajectories, horizon)
+        effort = Effort(5, 4, 1, 3, 3)
+        return Prepared(impacts, around, weigh_impacts, effort, horizon, simple)
     fitter, floor = smooth_fitter(simulator, trajectories, horizon)
 
-    def weigh(now: Fitter, fit: Fit) -> tuple[Fitter, noise.Floor]:
+    def weigh(now: Fitter, fit: Fit) -> tuple[Fitter, noise.Noise]:
         assert isinstance(now, SmoothFitter)
         around = floor
         if len(fit.theta):
@@ -99,13 +107,26 @@ def smooth_fitter(
     least = FINEST * scale[samples.measured]
     floor = dataclasses.replace(floor, sigma=np.maximum(floor.sigma, least))
     length = max(6, round(horizon / (1 - LEAD) / samples.step) + 1)
-    windows = cut(samples, floor.slope.by_state, scale, length)
+    windows = cut(samples, floor.slope.by_state, _foreseen(simulator, samples, scale), length)
     moving = np.array(noise.driven_states(model))
     most = AT_ONCE if simulator.advances_rows_at_once else BY_ROW
     grouped = blocks(samples, windows, drive(samples, nodes, moving), most)
     start = SmoothFitter(samples, grouped, nodes, floor.slope.by_state, floor.sigma, scale)
     nominal = start.fit(model, np.zeros(0))
     return weighted(start, nominal, floor.sigma), floor
+
+
+def _foreseen(simulator: HostSimulator, samples: Samples, scale: Array) -> Array:
+    """Scales by which to judge how the error of a start state grows.
+
+    The variation of a position that nobody measured is not known, so its channel's scale stands
+    for it: what moves nothing that was measured must not forbid a forecast.
+    """
+    channels = simulator.physical_channels
+    usual = np.array([channel.scale for channel in channels])
+    seen = np.isin(np.arange(len(channels)), samples.measured)
+    moving = np.array([channel.kind == "rate" for channel in channels])
+    return np.where(seen | moving, scale, np.maximum(scale, usual))
 
 
 def weighted(fitter: SmoothFitter, fit: Fit, sigma: Array) -> SmoothFitter:
@@ -124,5 +145,3 @@ def weighted(fitter: SmoothFitter, fit: Fit, sigma: Array) -> SmoothFitter:
     costs = (square * (fitter.sigma / fresh.sigma) ** 2).sum(axis=(1, 2))
     cap = ROBUST * max(float(np.quantile(costs, 0.75)), float(np.median(valid.sum(axis=(1, 2)))))
     return dataclasses.replace(fresh, cap=cap)
-
-

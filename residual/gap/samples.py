@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -57,9 +58,7 @@ class Samples:
     recorded: tuple[Recorded, ...]
 
     @classmethod
-    def join(
-        cls, trajectories: Sequence[Trajectory], substeps: int, stride: int = 1
-    ) -> Samples:
+    def join(cls, trajectories: Sequence[Trajectory], substeps: int, stride: int = 1) -> Samples:
         """All trajectories below each other, whatever their order is.
 
         Raises:
@@ -76,9 +75,13 @@ class Samples:
             steps = np.diff(run.times[rows])
             parts.append((run.states[rows], actions, np.append(steps, steps[-1]), run.times[rows]))
             ends.append(ends[-1] + len(rows))
+        seen, actions, durations, times = (np.concatenate(c) for c in zip(*parts, strict=True))
         return cls(
-            *(np.concatenate(columns).astype(float) for columns in zip(*parts, strict=True)),
-            runs=tuple(zip(ends[:-1], ends[1:], strict=True)),
+            seen=seen.astype(float),
+            actions=actions.astype(float),
+            durations=durations,
+            times=times,
+            runs=tuple(itertools.pairwise(ends)),
             names=tuple(t.name for t in usable),
             substeps=substeps,
             stride=stride,

@@ -28,6 +28,10 @@ Key = tuple[int, ...]
 Proposals = dict[Key, Array]
 
 
+#: Cosine of what two effects do, start states allowed for, beyond which it is one motion.
+SAME_MOTION = 0.995
+
+
 @dataclasses.dataclass(frozen=True)
 class Effort:
     """How hard to search.
@@ -124,7 +128,9 @@ class Search:
             self._signatures[key] = signatures(fit, trials(self.candidates), columns)
         return self._signatures[key]
 
-    def merged(self, key: Key, additions: Iterable[tuple[int, Array]], drop: Key = ()) -> tuple[Key, Array]:
+    def merged(
+        self, key: Key, additions: Iterable[tuple[int, Array]], drop: Key = ()
+    ) -> tuple[Key, Array]:
         """Sorted key and start vector of a set with some candidates added and some dropped."""
         values: dict[int, Array] = {}
         at = 0
@@ -154,13 +160,14 @@ class Search:
 
     def fit(self, key: Key, theta: Array) -> None:
         """Fit a set from start values, and from its nested sets if it ends worse than one."""
-        found = self.fitter.fit(self.model(key), theta)
         nested = [k for k in self.tried if len(k) < len(key) and set(k) < set(key)]
+        near = min(nested, key=lambda k: self.tried[k].merit, default=())
+        found = self.fitter.fit(self.model(key), theta, self.tried[near])
         if nested:
-            best = min(nested, key=lambda k: self.tried[k].merit)
-            floor = self.tried[best].merit
+            floor = self.tried[near].merit
             if found.merit > floor:
-                again = self.fitter.fit(self.model(key), self._from_nested(key, best, theta))
+                start = self._from_nested(key, near, theta)
+                again = self.fitter.fit(self.model(key), start, self.tried[near])
                 found = again if again.merit < found.merit else found
             if found.merit > 1.001 * floor:
                 self.unfit.add(key)
@@ -221,6 +228,16 @@ class Search:
         effect = self.candidates[number].effect
         family = effect.family_in(self.simulator)
         return f"{family}@{self.place(number)}" if family else ""
+
+    def same_motion(self, rest: Key, one: int, other: int) -> bool:
+        """Whether two effects make the same motion in these data beside some others."""
+        around = self.signatures(rest)
+        columns = {v.candidate: v.columns for v in around.variants}
+        if any(len(columns[number]) != 1 for number in (one, other)):
+            return False
+        a, b = (around.matrix[:, columns[number][0]] for number in (one, other))
+        lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
+        return lengths > 0 and abs(float(a @ b)) > SAME_MOTION * lengths
 
     def place(self, number: int) -> str:
         """The joint, actuator, channel or parameter of a candidate."""

@@ -209,8 +209,8 @@ class _Problem:
         projected = flat - (basis_rows @ (inner @ flat[..., None]))[..., 0]
         by_knob = columns[..., f:] - basis_rows @ (inner @ columns[..., f:])
         found = Shot(
-            theta, nodes, costs, float(capped(costs, self.cap).sum()), self.cap, residual, basis_rows, by_knob,
-            projected, slope, model,
+            theta, nodes, costs, float(capped(costs, self.cap).sum()), self.cap, residual,
+            basis_rows, by_knob, projected, slope, model,
         )  # fmt: skip
         return found, _Tangent(response, columns, flat, basis, triangle)
 

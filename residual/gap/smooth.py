@@ -12,11 +12,15 @@ from residual.gap import shooting
 from residual.gap.adequacy import ERRORS, remainder
 from residual.gap.blocks import Blocks
 from residual.gap.candidates import Candidate
-from residual.gap.fitting import Fit, Foretold, Left
+from residual.gap.chance import TIE, threshold
+from residual.gap.fitting import Fit, Fitter, Foretold, Left
 from residual.gap.model import Model
-from residual.gap.noise import Floor
+from residual.gap.noise import Floor, Noise
+from residual.gap.result import Where
 from residual.gap.samples import Samples
+from residual.gap.screening import Signatures
 from residual.gap.slopes import observe
+from residual.gap.where import locate
 from residual.gap.windows import carry
 
 Array = NDArray[np.float64]
@@ -53,6 +57,15 @@ class SmoothFitter:
     scale: Array
     cap: float = np.inf
     turns: int = 8
+
+    def halved(self) -> SmoothFitter:
+        """See ``Fitter.halved``."""
+        samples = dataclasses.replace(self.samples, substeps=2 * self.samples.substeps)
+        return dataclasses.replace(self, samples=samples)
+
+    def weighed_like(self, other: Fitter) -> SmoothFitter:
+        """See ``Fitter.weighed_like``."""
+        return dataclasses.replace(self, sigma=other.sigma)
 
     def fit(self, model: Model, theta: Array, near: Fit | None = None) -> Fit:
         """See ``Fitter.fit``; always from the measured path, since a rival's may mislead."""
@@ -130,8 +143,9 @@ class SmoothFitter:
             seen[windows.index[there], column] = noisy[..., i][there]
         return dataclasses.replace(self, samples=dataclasses.replace(samples, seen=seen))
 
-    def left(self, fit: Fit, floor: Floor) -> Left:
+    def left(self, fit: Fit, floor: Noise) -> Left:
         """See ``Fitter.left``: in every fold, and no generic force to be seen."""
+        assert isinstance(floor, Floor)
         samples, windows = self.samples, self.blocks.windows
         found = remainder(fit.inner, samples, windows, self.sigma, floor, self.scale)
         worst = float(np.max(found.ratio))
@@ -156,8 +170,25 @@ class SmoothFitter:
                 return False
         return True
 
+    def where(self, nominal: Fit, floor: Noise) -> Where:
+        """See ``Fitter.where``."""
+        assert isinstance(floor, Floor)
+        return locate(
+            Model(nominal.model.simulator), self.samples, self.blocks.windows, nominal, self.sigma,
+            self.left(nominal, floor).by_channel, floor,
+        )  # fmt: skip
+
+    def needed(self, around: Signatures, nominal: Fit) -> float:
+        """See ``Fitter.needed``: what noise alone reaches once in a thousand logs."""
+        return threshold(around, int(self.valid.sum()))
+
+    def tie(self, nominal: Fit) -> float:
+        """See ``Fitter.tie``: what a true rival falls short by once in a thousand logs."""
+        return TIE
+
     @property
     def valid(self) -> NDArray[np.bool_]:
+        """Where there is a measurement inside a window, (W, L, m)."""
         samples, windows = self.samples, self.blocks.windows
         seen = np.isfinite(samples.seen[:, samples.measured])[windows.index]
         return seen & windows.inside[..., None]
@@ -204,7 +235,9 @@ class SmoothFitter:
             slope = (path[1:] - path[0]) / moves[:, None, None, None] / self.sigma
             slope = np.where(there, np.clip(slope, -1e8, 1e8), 0.0)
             slope = slope.reshape(len(free), len(windows), -1).transpose(1, 2, 0)
-            ridge = np.broadcast_to(np.diag(1e-2 / self.scale[free]), (len(windows), len(free), len(free)))
+            ridge = np.broadcast_to(
+                np.diag(1e-2 / self.scale[free]), (len(windows), len(free), len(free))
+            )
             basis, triangle = np.linalg.qr(np.concatenate([slope, ridge], axis=1))
             right = np.concatenate([gap, np.zeros((len(windows), len(free)))], axis=1)
             step = np.linalg.solve(triangle, basis.transpose(0, 2, 1) @ right[..., None])[..., 0]

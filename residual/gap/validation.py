@@ -73,5 +73,7 @@ def by_block(squares: Array, blocks: Blocks) -> Array:
         own = squares[blocks.block == number]
         there = np.isfinite(own)
         total = np.where(there, own, 0.0).sum(axis=0)
-        found[number] = np.where(there.any(axis=0), total / np.maximum(there.sum(axis=0), 1), np.nan)
+        found[number] = np.where(
+            there.any(axis=0), total / np.maximum(there.sum(axis=0), 1), np.nan
+        )
     return found

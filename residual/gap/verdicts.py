@@ -21,7 +21,10 @@ def nameable(search: Search, claim: Claim, blocks: int) -> bool:
 
 
 def families(search: Search, claim: Claim) -> set[str]:
-    """Families that an effect cannot be told from, its own included; a loner is its own."""
+    """Families that an effect cannot be told from, its own included; a loner is its own.
+
+    What makes the same motion counts as one.
+    """
     numbers = {candidate.label: i for i, candidate in enumerate(search.candidates)}
     own = search.family(claim.number) or search.candidates[claim.number].label
     return {own} | {search.family(numbers[label]) or label for label in claim.rivals}
@@ -46,7 +49,7 @@ def effect_verdict(
     effect = search.candidates[claim.number].effect
     sure = (
         claim.needed and claim.steady and claim.sound and not claim.bounded
-        and not claim.rivals and blocks >= TOO_FEW
+        and not claim.rivals and not claim.alike and blocks >= TOO_FEW
     )  # fmt: skip
     kind: Kind = "confirmed" if sure else "ambiguous"
     family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""
@@ -57,6 +60,8 @@ def effect_verdict(
     says = [f"{effect}: {numbers}"]
     if claim.form:
         says.append(f"{family}, form undecided: {', '.join(claim.form)} would do as well")
+    if claim.alike:
+        says.append(f"the same motion in these data: {', '.join(claim.alike)}")
     if claim.rivals:
         says.append(f"these data cannot exclude {', '.join(claim.rivals)}")
     twins = tuple(dict.fromkeys((*claim.twins, *stand_ins)))
@@ -75,8 +80,9 @@ def effect_verdict(
         says.append("its size is at its bound")
     return Verdict(
         kind, effect.name, effect.where, claim.numbers,
-        tuple(dict.fromkeys((*twins, *claim.form, *claim.rivals))), family, "; ".join(says),
-        Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form, doubts(claim),
+        tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
+        "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
+        doubts(claim),
     )  # fmt: skip
 
 

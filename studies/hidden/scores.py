@@ -6,13 +6,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from residual.gap import GapResult
-from residual.gap.verdicts import FAMILIES
 from sims.effects.library import exact_aliases
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.strengths import HIDDEN
 
 #: Declared near-twins: forms of one effect that most data hardly tell apart.
-TWINS: tuple[frozenset[str], ...] = (FAMILIES["delay or lag"], FAMILIES["dry friction"])
+TWINS: tuple[frozenset[str], ...] = (
+    frozenset({"delay", "actuator_lag"}),
+    frozenset({"coulomb_friction", "stribeck_friction", "directional_friction"}),
+)
 
 
 def same_motion() -> dict[str, frozenset[str]]:

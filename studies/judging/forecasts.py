@@ -1,10 +1,12 @@
-"""Errors of open-loop forecasts: any simulator, from measured states, over one horizon."""
+"""Errors of open-loop forecasts: any simulator, from measured states, over one horizon.
+
+How inputs run between samples is said by the simulator's input channels.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,6 @@ from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
-Hold = Literal["zero", "linear"]
 
 #: A forecast that leaves its channel by more than this many times its spread is lost; how far
 #: it then goes means nothing.
@@ -30,7 +31,6 @@ class Forecasts:
         states: Start states, shape (n, n_physical).
         seen: What was measured from the start on, shape (n, steps + 1, n_physical), NaN where it
             was not.
-        hold: How inputs run between samples.
         limits: Largest error that counts, by channel, shape (n_physical,).
     """
 
@@ -38,7 +38,6 @@ class Forecasts:
     starts: NDArray[np.int64]
     states: Array
     seen: Array
-    hold: Hold
     limits: Array
 
     @property
@@ -52,9 +51,7 @@ class Forecasts:
         durations = []
         for run in self.runs:
             substeps = substeps_of(simulator, run)
-            driven.append(simulator.drive(
-                run.actions, run.durations, substeps, hold=self.hold, rises=True
-            ))  # fmt: skip
+            driven.append(simulator.drive(run.actions, run.durations, substeps, rises=True))
             durations.append(run.durations)
         offsets = np.cumsum([0, *(len(run) for run in self.runs)])[:-1]
         inputs, times = np.concatenate(driven), np.concatenate(durations)
@@ -94,7 +91,6 @@ def plan(
     simulator: HostSimulator,
     runs: Sequence[Trajectory],
     horizon: float,
-    hold: Hold = "zero",
     most: int = 200,
 ) -> list[Forecasts]:
     """Forecasts that overlap by half, spread evenly over all runs.
@@ -103,7 +99,6 @@ def plan(
         simulator: Gives the channels.
         runs: Measured; a forecast begins where every physical channel has a value.
         horizon: In s; a run that is shorter is forecast once, as far as it goes.
-        hold: How inputs run between samples.
         most: Forecasts for each run.
 
     Returns:
@@ -133,7 +128,7 @@ def plan(
         own = tuple(run for run, _ in members)
         starts = np.array([(i, row) for i, (_, rows) in enumerate(members) for row in rows])
         seen = np.stack([own[i].states[row : row + steps + 1, :physical] for i, row in starts])
-        found.append(Forecasts(own, starts, seen[:, 0], seen, hold, limits))
+        found.append(Forecasts(own, starts, seen[:, 0], seen, limits))
     return found
 
 

@@ -101,7 +101,10 @@ class Judge:
         made = parser.instantiate(
             parser.parse_object({**self.settings, "output": "unused", "jobs": 1})
         )
-        self.simulator: HostSimulator = made["simulator"]
+        asked: HostSimulator = made["simulator"]
+        self.simulator = asked.with_hold(
+            {channel.name: made["hold"] for channel in asked.action_channels}
+        )
         self._format: LogFormat = made["columns"]
         self._fit = self._read(rig.fit, logs)
         self._runs = self._read(rig.judge, files_of(rig, rig.judge, data, scratch))
@@ -125,8 +128,7 @@ class Judge:
         return self.simulator.with_effects(found)
 
     def _plan(self, runs: Sequence[Trajectory]) -> list[Forecasts]:
-        hold = self.settings.get("hold", "zero")
-        return plan(self.simulator, runs, self.rig.horizon, hold)
+        return plan(self.simulator, runs, self.rig.horizon)
 
     def _read(self, part: Part, logs: Sequence[Path]) -> list[Trajectory]:
         changed = {

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
+from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.host import HostSimulator
 from studies.real.rigs import Rig
@@ -32,7 +33,7 @@ class Named:
 
 def named(rig: Rig, simulator: HostSimulator, verdicts: Sequence[Any]) -> Named:
     """Compare verdicts with the key of a rig."""
-    family = {str(effect): getattr(effect, "family", effect.name) for effect in library(simulator)}
+    family = {str(effect): _family(effect, simulator) for effect in library(simulator)}
     right = []
     for accepted in rig.wanted:
         found = "missing"
@@ -59,3 +60,9 @@ def label_of(verdict: Any) -> str:
         if verdict.where in ("", verdict.effect)
         else f"{verdict.effect}@{verdict.where}"
     )
+
+
+def _family(effect: Effect, simulator: HostSimulator) -> str:
+    """Family and place, so that the friction of two joints is not one thing."""
+    family = effect.family_in(simulator)
+    return f"{family}@{effect.where}" if family and effect.enters != "parameter" else str(effect)

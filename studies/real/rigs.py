@@ -14,7 +14,13 @@ from sims.effects.base import Effect
 from studies.real.prepare import cut_coast, sum_accelerations
 
 #: What takes energy out of a joint.
-DISSIPATION = ("viscous_friction", "coulomb_friction", "stribeck_friction", "quadratic_drag")
+FRICTION = (
+    "viscous_friction",
+    "coulomb_friction",
+    "stribeck_friction",
+    "directional_friction",
+)
+DISSIPATION = (*FRICTION, "quadratic_drag")
 LATE = ("delay", "actuator_lag")
 
 
@@ -164,7 +170,8 @@ RIGS: Sequence[Rig] = (
         judged=(("angle",),),
         key=(known.ActuatorGain("torque"), known.CoulombFriction("angle")),
         wanted=(frozenset({"actuator_gain@torque", "payload", "inertia"}),),
-        supported=_at(("coulomb_friction", "stribeck_friction"), "angle") | {"moment"},
+        supported=_at(("coulomb_friction", "stribeck_friction", "directional_friction"), "angle")
+        | {"moment"},
     ),
     Rig(
         "arm-three-axes",
@@ -173,7 +180,7 @@ RIGS: Sequence[Rig] = (
         horizon=0.1,
         judged=(("rate 1",), ("rate 4",), ("rate 6",)),
         key=_drives("146", _viscous, _coulomb),
-        wanted=tuple(_at(DISSIPATION[:3], f"angle {n}") for n in "146"),
+        wanted=tuple(_at(FRICTION, f"angle {n}") for n in "146"),
         slopes=0.02,
     ),
     Rig(
@@ -183,7 +190,7 @@ RIGS: Sequence[Rig] = (
         horizon=0.3,
         judged=(("rate 1",), ("rate 5",), ("rate 6",)),
         key=_drives("156", _viscous, _inertia),
-        wanted=tuple(_at(DISSIPATION[:3], f"angle {n}") for n in "156"),
+        wanted=tuple(_at(FRICTION, f"angle {n}") for n in "156"),
         supported=frozenset({"inertia 1", "inertia 5", "inertia 6"}),
     ),
     Rig(

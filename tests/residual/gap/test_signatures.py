@@ -3,10 +3,9 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.optimize import nnls
-
 from residual.gap.confirm import earns_place, span
 from residual.gap.signatures import constrained, project_out
+from scipy.optimize import nnls
 
 
 @given(st.integers(0, 10_000), st.integers(1, 3))

@@ -1,9 +1,9 @@
 """What is said of effects that exactly dependent sets could imitate."""
 
 import numpy as np
-
 from residual.gap.confirm import earns_place, is_silent
 from residual.gap.holdout import end_of_training
+
 from residual.gap.verdicts import dependent, family
 from residual.trajectories import Trajectory
 from sims.effects.library import near_combinations

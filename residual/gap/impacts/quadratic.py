@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.contact.student import losses, weights
+from residual.gap.impacts.robust import losses, weights
 
 Array = NDArray[np.float64]
 

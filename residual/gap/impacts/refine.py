@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.contact.columns import chosen_changes
-from residual.gap.contact.quadratic import Quadratic, minimise
-from residual.gap.contact.shots import Aimed, Shots, aim, residual, shoot
-from residual.gap.contact.student import losses
+from residual.gap.impacts.columns import chosen_changes
+from residual.gap.impacts.quadratic import Quadratic, minimise
+from residual.gap.impacts.robust import losses
+from residual.gap.impacts.single_shooting import Aimed, Shots, aim, residual, shoot
 from residual.gap.model import Model
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What the data say about themselves, before any physics."""
+"""Whether positions and their measured rates are on one scale."""
 
 from __future__ import annotations
 
@@ -8,51 +8,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.logs.checks import Finding
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
 
-# No log says much of a system of which it has one sample in so many control periods.
-_SLOWEST = 100.0
-
-
-def check_usable(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> None:
-    """Refuse logs from which nothing can be found.
-
-    Args:
-        simulator: Gives the control period and the channels.
-        trajectories: Measured runs.
-
-    Raises:
-        ValueError: There are none, samples are so rare that their times must be in another unit
-            than s, or a system that strikes the ground was logged without one of its positions.
-    """
-    if not trajectories:
-        raise ValueError("there are no trajectories: give at least one measured run")
-    for run in trajectories:
-        if len(run.durations) and run.durations.min() > _SLOWEST * simulator.dt:
-            period = float(np.median(run.durations))
-            raise ValueError(
-                f"{run.name}: a sample every {period:.4g} s, {period / simulator.dt:.0f} control "
-                f"periods of {simulator.name}: if the times are in ms, set columns.time to "
-                "{column: time, unit: ms}"
-            )
-    if not simulator.has_contacts:
-        return
-    seen = np.any([np.isfinite(run.states).any(axis=0) for run in trajectories], axis=0)
-    for channel, logged in zip(simulator.physical_channels, seen, strict=True):
-        if channel.kind != "rate" and not logged:
-            raise ValueError(
-                f"{trajectories[0].name}: the channel {channel.name!r} was not logged; of a system "
-                f"that strikes the ground, as {simulator.name} does, every position is needed"
-            )
-
-
 def kinematics(
     simulator: HostSimulator, trajectories: Sequence[Trajectory]
-) -> tuple[list[Trajectory], list[str]]:
+) -> tuple[list[Trajectory], list[Finding]]:
     """Compare the change of each position with the integral of its measured rate.
 
     A rate on another scale than its position is a fault of the log, not of the simulator; left
@@ -77,10 +42,11 @@ def kinematics(
         # Two rules that disagree say that the sampling is too coarse for this check.
         fine = abs(scale - rough) < 0.25 * abs(scale - 1)
         if fine and abs(scale - 1) > max(4 * error, 0.005):
-            findings.append(
+            says = (
                 f"{channel.rate_of} changes {scale:.4f} times as much as the integral of "
                 f"{channel.name}: {channel.name} was multiplied by {scale:.4f}"
             )
+            findings.append(Finding("kinematics", channel.name, says, {"scale": scale}, "warning"))
             runs = [_multiplied(run, column, scale) for run in runs]
     return runs, findings
 

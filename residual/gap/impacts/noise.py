@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.contact.shots import Aimed, Shots, aim
-from residual.gap.contact.student import weights
+from residual.gap.impacts.robust import weights
+from residual.gap.impacts.single_shooting import Aimed, Shots, aim
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap import noise
-from residual.gap.contact.noise import first_guess, with_noise
-from residual.gap.contact.shots import Shots
+from residual.gap import paths
+from residual.gap.impacts.noise import first_guess, with_noise
+from residual.gap.impacts.single_shooting import Shots
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from residual.gap.windows import Windows
@@ -44,7 +44,7 @@ def lay_out(simulator: HostSimulator, samples: Samples, cut: list[tuple[int, int
         )
     model = Model(simulator)
     windows = Windows.cut(cut)
-    nodes = noise.first_path(model, samples, np.zeros(0))
+    nodes = paths.measured(model, samples, np.zeros(0))
     scale = scales(simulator)
     measured = np.isin(np.arange(len(scale)), samples.measured)
     doubt = np.where(measured, np.inf, scale)
