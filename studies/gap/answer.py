@@ -68,7 +68,7 @@ def _in_lead(verdict: Verdict, result: GapResult) -> str:
     others = rivals(verdict)
     if 0 < len(others) <= FEW_RIVALS:
         return f"{name} or {names_of(others)}"
-    return f"perhaps {name}"
+    return f"{name} or one of {len(others)} others" if others else f"perhaps {name}"
 
 
 def _short(verdict: Verdict, result: GapResult) -> str:
@@ -134,11 +134,13 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         return _remainder_notes(verdict, result)
     if verdict.kind not in ("confirmed", "ambiguous"):
         return []
-    found = [f"takes off {percent(verdict.share.value)} of the gap"]
+    found = [f"without it, {percent(verdict.share.value)} of the gap would be back"]
     doubts = [DOUBTS[doubt] for doubt in verdict.doubts if doubt != "rivals"]
     others = rivals(verdict)
     if others:
-        doubts.append(f"these data cannot tell it from {names_of(others)}")
+        found.append(
+            f"one of {names_of((label_of(verdict), *others))}: these data cannot tell which"
+        )
     if doubts:
         found.append(f"not certain: {listed(doubts)}")
     if verdict.form:
