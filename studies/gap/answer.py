@@ -47,27 +47,54 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
     before = quantity_text(gap.before.value, gap.unit)
     if tolerance is not None and gap.before.value <= tolerance:
         allowed = quantity_text(tolerance, gap.unit)
-        return f"Nothing that matters: the {ahead(gap)} is {before}, allowed is {allowed}."
-    named = [v for v in result.verdicts if v.kind in ("confirmed", "ambiguous")]
-    if named:
-        words = listed([_in_lead(verdict, result) for verdict in named])
-        return f"{_first(percent(gap.share.value))} of the gap is {words}."
+        smaller = " What is named below is smaller than that." if result.effects else ""
+        return f"Nothing that matters: the {ahead(gap)} is {before}, allowed is {allowed}.{smaller}"
+    if any(verdict.kind in ("confirmed", "ambiguous") for verdict in result.verdicts):
+        return f"{_first(percent(gap.share.value))} of the gap is {_what(result)}."
     if any(v.kind == "unexplained" for v in result.verdicts):
         return f"The gap has no name: the {ahead(gap)} is {before}."
     floor = quantity_text(gap.noise_floor.value, gap.unit)
     return f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
 
 
-def _in_lead(verdict: Verdict, result: GapResult) -> str:
-    name = effect_name(_short(verdict, result))
-    if verdict.family:
-        name = f"{verdict.family} ({name}, form undecided)"
-    if verdict.kind == "confirmed":
-        return name
-    others = rivals(verdict)
-    if 0 < len(others) <= FEW_RIVALS:
+def _what(result: GapResult) -> str:
+    """What the gap is made of, certain names first."""
+    certain = [v for v in result.verdicts if v.kind == "confirmed"]
+    others = [v for v in result.verdicts if v.kind == "ambiguous"]
+    sure = listed(_by_place([_briefly(verdict, result) for verdict in certain]))
+    if not others:
+        return sure
+    if len(others) == 1:
+        doubtful = _with_rivals(others[0], result)
+    else:
+        doubtful = "perhaps " + listed(_by_place([_briefly(v, result) for v in others]))
+    return f"{sure} and {doubtful}" if sure else doubtful
+
+
+def _briefly(verdict: Verdict, result: GapResult) -> str:
+    """The family if the form is undecided, else the effect."""
+    if not verdict.family:
+        return effect_name(_short(verdict, result))
+    _, at, place = effect_name(_short(verdict, result)).partition(" at ")
+    return f"{verdict.family}{at}{place}"
+
+
+def _with_rivals(verdict: Verdict, result: GapResult) -> str:
+    name, others = _briefly(verdict, result), rivals(verdict)
+    if not others:
+        return f"perhaps {name}"
+    if len(others) <= FEW_RIVALS:
         return f"{name} or {names_of(others)}"
-    return f"perhaps {name}"
+    return f"{name} or one of {len(others)} others"
+
+
+def _by_place(names: Sequence[str]) -> list[str]:
+    """``friction at a`` and ``friction at b`` as ``friction at a and b``."""
+    places: dict[str, list[str]] = {}
+    for name in names:
+        what, _, place = name.partition(" at ")
+        places.setdefault(what, []).append(place)
+    return [f"{what} at {listed(found)}" if all(found) else what for what, found in places.items()]
 
 
 def _short(verdict: Verdict, result: GapResult) -> str:
@@ -133,11 +160,13 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         return _remainder_notes(verdict, result)
     if verdict.kind not in ("confirmed", "ambiguous"):
         return []
-    found = [f"takes off {percent(verdict.share.value)} of the gap"]
+    found = [f"without it, {percent(verdict.share.value)} of the gap would be back"]
     doubts = [DOUBTS[doubt] for doubt in verdict.doubts if doubt != "rivals"]
     others = rivals(verdict)
     if others:
-        doubts.append(f"these data cannot tell it from {names_of(others)}")
+        found.append(
+            f"one of {names_of((label_of(verdict), *others))}: these data cannot tell which"
+        )
     if doubts:
         found.append(f"not certain: {listed(doubts)}")
     if verdict.form:

@@ -85,7 +85,7 @@ def set_aside(result: GapResult) -> list[Section]:
             ["channel", "nominal", "corrected", "noise floor"],
             _errors(gap),
             f"Root mean square errors over {seconds_text(gap.horizon_s)} in the records that were "
-            "set aside with `--held-out`, which had no part in the answer.",
+            "held out: they had no part in the answer.",
             heading="Records set aside",
         )
     ]

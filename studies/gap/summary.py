@@ -61,9 +61,11 @@ def bars(gap: Gap) -> list[str]:
     """The shrinking gap."""
     rows = gap_rows(gap)
     width = max(len(name) for name, _ in rows)
+    wide = max(len(span_text(span)) for _, span in rows)
     top = max(span.value for _, span in rows) or 1.0
+    full = 24 / top
     return [
-        f"  {name:<{width}}  {span_text(span):<28} {'█' * max(1, round(24 * span.value / top))}"
+        f"  {name:<{width}}  {span_text(span):<{wide}}  {'█' * max(1, round(full * span.value))}"
         for name, span in rows
     ]
 

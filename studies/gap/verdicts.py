@@ -29,6 +29,8 @@ TONES: dict[str, Tone] = {
 }
 #: Explanations listed.
 RIVALS = 12
+#: Sets of effects listed that make the same motion together.
+TOGETHER = 2
 
 
 def banners(result: GapResult, tolerance: float | None) -> list[Section]:
@@ -108,7 +110,7 @@ def apart(result: GapResult) -> list[Section]:
             (answer.form, "these data, and it is of the same family", False),
             (answer.same_motion, "the same motion in any data", True),
             (
-                tuple(" with ".join(names) for names in answer.together),
+                tuple(" with ".join(names) for names in answer.together[:TOGETHER]),
                 "the same motion in any data, in one exact proportion",
                 True,
             ),
