@@ -69,6 +69,9 @@ def test_a_model_file_is_a_simulator_wherever_one_is_expected(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     (effect,) = chosen_effects(simulator, ["mass of body fore"])
     assert str(effect) == "mass of body fore"
+    # Not offered by default, but there.
+    (effect,) = chosen_effects(robot("hopper"), ["friction of geom foot"])
+    assert effect.quantities(robot("hopper"))["change"].unit == "1"
 
 
 def test_a_model_file_in_a_config_may_lie_beside_it(tmp_path):
