@@ -40,7 +40,7 @@ def test_files_that_are_missing_broken_or_lack_a_mesh(tmp_path):
 
 def test_models_with_hidden_state_or_without_motion(tmp_path):
     text = (MODELS / "cart_pole.xml").read_text()
-    late = written(tmp_path, text.replace('gear="10"', 'gear="10" nsample="3" delay="0.01"'))
+    late = written(tmp_path, text.replace('gear="10"', 'gear="10" nsample="3" delay="0.012"'))
     assert "delay" in refused(late)
     still = written(tmp_path, "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
     assert "no joint moves" in refused(still)
