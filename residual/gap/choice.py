@@ -9,6 +9,7 @@ on logs that the rule had not been made with; see docs/find-gap.md.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 from residual.gap.search import Key, Search
 
@@ -37,11 +38,12 @@ class Choice:
     minor: dict[int, Key]
 
 
-def choose(search: Search) -> Choice:
+def choose(search: Search, enough: Callable[[Key], bool] = lambda _: False) -> Choice:
     """The set with the fewest numbers among those that forecast best, each effect material.
 
     Args:
         search: Fitted and cross-validated sets.
+        enough: Whether a set leaves so little more than noise that no larger one is asked for.
     """
     open_ = search.usable()
     best = min(open_, key=search.error)
@@ -50,7 +52,7 @@ def choose(search: Search) -> Choice:
     minor: dict[int, Key] = {}
     while key:
         smaller = _smaller(search, key, open_)
-        short = next((k for k in smaller if not material(search, k, key)), None)
+        short = next((k for k in smaller if enough(k) or not material(search, k, key)), None)
         if short is None:
             break
         for number in set(key) - set(short):

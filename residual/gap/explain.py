@@ -18,6 +18,8 @@ from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
+#: Residual over noise below which a remainder is a footnote.
+FOOTNOTE = 1.1
 #: Times that channels are weighed anew by what the best set leaves of them.
 ROUNDS = 3
 #: Change of a weight that is worth another search.
@@ -112,7 +114,11 @@ def settle(search: Search, floor: Noise, key: Key) -> Explanation:
     fitter = search.fitter
     nominal_left = fitter.left(search.tried[()], floor)
     needed = np.inf
-    choice = choose(search)
+
+    def enough(key: Key) -> bool:
+        return fitter.left(search.tried[key], floor).ratio < FOOTNOTE
+
+    choice = choose(search, enough)
     for _ in range(EXCHANGES):
         quiet = [k for k in {(), choice.key, search.best()} if _quiet(search, k, floor)]
         if quiet:
@@ -121,13 +127,13 @@ def settle(search: Search, floor: Noise, key: Key) -> Explanation:
             choice = Choice(key, reasons(search, key), {})
         else:
             needed = np.inf
-            choice = choose(search)
+            choice = choose(search, enough)
             key = choice.key
         before = len(search.tried)
         search.add_exchanged(key, RIVALS)
         if len(search.tried) == before or search.late:
             break
-        if not quiet and choose(search).key == key:
+        if not quiet and choose(search, enough).key == key:
             break
     left = fitter.left(search.tried[choice.key], floor)
     return Explanation(search, choice, left, nominal_left, floor, needed)

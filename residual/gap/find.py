@@ -13,7 +13,7 @@ from residual.gap.aliases import aliases, hidden
 from residual.gap.candidates import candidates
 from residual.gap.confirmation import Claim, claims, share
 from residual.gap.data import examine
-from residual.gap.explain import Explanation, explain
+from residual.gap.explain import FOOTNOTE, Explanation, explain
 from residual.gap.forecasts import gap, held_out, noise_floor, rollouts
 from residual.gap.horizon import usual_horizon
 from residual.gap.model import Model
@@ -22,7 +22,6 @@ from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import Blind, Gap, GapResult, Rival, Verdict
 from residual.gap.search import Key
 from residual.gap.verdicts import (
-    FOOTNOTE,
     blind_verdict,
     dependent,
     effect_verdict,
@@ -177,8 +176,8 @@ def confirm(found: Explanation, prepared: Prepared, groups: dict[str, tuple[str,
         # The one that matters least goes first: what is left may have fewer rivals.
         gone = lost[-1].number
         leads = (search.candidates[gone].label, *leads)
-        key = tuple(i for i in key if i != gone)
-        search.add({key: search.merged((*key, gone), (), drop=(gone,))[1]} if key else {})
+        key, theta = search.merged(key, (), drop=(gone,))
+        search.add({key: theta})
         search.add_exchanged(key, 3)
 
 

@@ -103,7 +103,12 @@ class Search:
         return sum(len(self.candidates[i].knobs) for i in key)
 
     def fits_in(self, key: Key) -> bool:
-        """Whether a set has few enough numbers for the windows there are."""
+        """Whether a set has few enough numbers for the windows there are, and each effect once.
+
+        A law beside its own special case is one law too many.
+        """
+        if any(self.contains(one, other) for one in key for other in key):
+            return False
         windows = len(self.fitter.blocks.windows)
         return len(key) <= self.effort.most and self.numbers(key) <= max(3, windows // 2)
 
@@ -222,6 +227,11 @@ class Search:
                 taken.append(number)
                 fresh, theta = self.merged(rest, [(number, gain.values[0])])
                 self.add({fresh: theta})
+
+    def contains(self, one: int, other: int) -> bool:
+        """Whether an effect is a special case of another at the same place."""
+        law, case = self.candidates[one].effect, self.candidates[other].effect
+        return case.name in law.special_cases and law.where == case.where
 
     def family(self, number: int) -> str:
         """What effects that differ in form more than in kind have in common, and where."""

@@ -11,8 +11,6 @@ from residual.gap.search import Search
 
 #: Families that an effect may be mistaken for and still be worth a name.
 MOST_FAMILIES = 3
-#: Residual over noise beyond which a remainder is told as such; below it is a footnote.
-FOOTNOTE = 1.1
 
 
 def nameable(search: Search, claim: Claim, blocks: int) -> bool:
