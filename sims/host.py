@@ -206,14 +206,18 @@ class HostSimulator(Simulator):
     def _step(self, states: Array, actions: Array, upcoming: Array | None = None) -> Array:
         if not self.effects and upcoming is None:
             inputs = np.repeat(actions[:, None, :], self.substeps, axis=1)
-            return self.integrate(states, inputs, np.full(len(states), self.dt))
+            return self._move(states, inputs, np.full(len(states), self.dt))
         own = len(self.integrated_channels)
         following = np.empty_like(states)
         inputs, following[:, own:] = next_inputs(self, states[:, own:], actions, upcoming)
         durations = np.full(len(states), self.dt)
-        true = self.integrate(self.unsense(states[:, :own]), inputs, durations)
+        true = self._move(self.unsense(states[:, :own]), inputs, durations)
         following[:, :own] = self.sense(true)
         return following
+
+    def _move(self, states: Array, inputs: Array, durations: Array) -> Array:
+        """What ``step`` integrates with; a subclass may have something slower of record."""
+        return self.integrate(states, inputs, durations)
 
     def drive(
         self,

@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 import pymunk
+from numpy.typing import NDArray
 
 from sims.effects.base import Effect
 from sims.host import HostSimulator, Joint
@@ -45,7 +46,8 @@ class Pendulum(HostSimulator):
 
     A Pymunk body of moment J turns about the pivot, where its centre of gravity is put, and
     gravity acts as a torque: a joint would damp the swing numerically, at first order. It
-    hosts every effect, as a torque inside every sub-step.
+    hosts every effect, as a torque inside every sub-step. What has effects, and what is
+    integrated for the fit of a log, is moved by the same scheme in compiled code.
 
     Args:
         mass: kg; 0.055 is the paper's idealised pendulum, 0.090 its true one.
@@ -59,6 +61,7 @@ class Pendulum(HostSimulator):
     name = "pendulum"
     joints = JOINTS
     has_drive_force = True
+    advances_rows_at_once = True
 
     def __init__(
         self,
@@ -94,53 +97,50 @@ class Pendulum(HostSimulator):
         return (drive * (inputs[:, 0] - p["torque_constant"] * states[:, 1]))[:, None]
 
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
-        """See ``HostSimulator.integrate``.
+        """See ``HostSimulator.integrate``; compiled, and equal to Pymunk's steps to rounding."""
+        states, inputs = np.asarray(states, float), np.asarray(inputs, float)
+        effects = [*self.joint_effects(), *self.plays()]
+        return swing(states, _halves(inputs), np.asarray(durations, float), self._motor(), effects)
 
-        Pymunk steps the rows without effects; rows with effects are stepped by the same scheme,
-        compiled, and agree with it to rounding.
-        """
-        states, durations = np.asarray(states, float), np.asarray(durations, float)
-        halves = _halves(np.asarray(inputs, float))
-        n = len(states)
+    def _move(self, states: Array, inputs: Array, durations: Array) -> Array:
+        """``step`` moves the rows without effects by Pymunk."""
+        there = [np.broadcast_to(effect.present(), len(states)) for effect in self.effects]
+        plain = ~np.logical_or.reduce(there) if there else np.ones(len(states), dtype=bool)
+        if not plain.any():
+            return self.integrate(states, inputs, durations)
+        after = states.copy()
+        if not plain.all():
+            after[~plain] = self.take(~plain).integrate(
+                states[~plain], inputs[~plain], durations[~plain]
+            )
+            states, inputs, durations = states[plain], inputs[plain], durations[plain]
+        constants = [_by_row(value, len(plain), plain) for value in self._motor().values()]
+        rows = zip(
+            np.flatnonzero(plain).tolist(), states.tolist(), _halves(inputs).tolist(),
+            durations.tolist(), *constants, strict=True,
+        )  # fmt: skip
+        for i, state, voltages, duration, *own in rows:
+            # Leapfrog errs in even powers of the sub-step; this removes the second.
+            whole = [0.5 * (a + b) for a, b in zip(voltages[::2], voltages[1::2], strict=True)]
+            fine = self._swing(state, voltages, duration, *own)
+            coarse = self._swing(state, whole, duration, *own)
+            after[i, :2] = [f + (f - c) / 3 for f, c in zip(fine, coarse, strict=True)]
+        return after
+
+    def _motor(self) -> dict[str, Any]:
+        """The pendulum without effects, by the names of ``sims.driven``."""
         p: dict[str, Any] = self.parameter_values()
         inertia = p["inertia"]
         if self.inertia_follows_mass:
             inertia = inertia + (p["mass"] - IDEALISED_MASS) * p["length"] ** 2
         drive = p["torque_constant"] / p["resistance"]
-        weight = p["mass"] * p["gravity"] * p["length"]
-        motor = {
+        return {
             "inertia": inertia,
-            "weight": weight,
+            "weight": p["mass"] * p["gravity"] * p["length"],
             "damping": p["damping"],
             "drive": drive,
             "back": p["torque_constant"] * drive,
         }
-        there = np.zeros(n, dtype=bool)
-        for effect in self.effects:
-            there |= effect.present()
-        after = np.empty_like(states)
-        rows = np.flatnonzero(there)
-        if rows.size:
-            some = self.take(rows)
-            after[rows] = swing(
-                states[rows],
-                halves[rows],
-                durations[rows],
-                {k: value[rows] if np.ndim(value) else value for k, value in motor.items()},
-                [*some.joint_effects(), *some.plays()],
-            )
-        rows = np.flatnonzero(~there)
-        constants = [np.broadcast_to(value, n)[rows].tolist() for value in motor.values()]
-        for i, *own in zip(rows.tolist(), *constants, strict=True):
-            voltages, duration = halves[i].tolist(), float(durations[i])
-            # Leapfrog errs in even powers of the sub-step; this removes the second.
-            whole = [0.5 * (a + b) for a, b in zip(voltages[::2], voltages[1::2], strict=True)]
-            start = states[i, :2].tolist()
-            fine = self._swing(start, voltages, duration, *own)
-            coarse = self._swing(start, whole, duration, *own)
-            after[i, :2] = [f + (f - c) / 3 for f, c in zip(fine, coarse, strict=True)]
-            after[i, 2:] = states[i, 2:]
-        return after
 
     # Pymunk first moves the angle at the old rate and then changes the rate. An angle that
     # starts half a sub-step back is thus at the middle of the sub-step when the torque acts:
@@ -159,7 +159,7 @@ class Pendulum(HostSimulator):
     ) -> tuple[float, float]:
         """One control period without effects; NaN if the pendulum runs away."""
         body, advance, sin = self._body, self._space.step, math.sin
-        angle, rate = state
+        angle, rate, *_ = state
         friction = damping + back
         h = duration / len(voltages)
         middle = angle + 0.5 * h * rate
@@ -194,6 +194,12 @@ class Pendulum(HostSimulator):
         # Copies get a body of their own: the body is a scratch pad, not a state.
         self.__dict__.update(state)
         self._make_body()
+
+
+def _by_row(value: float | Array, n: int, rows: NDArray[np.bool_]) -> list[float]:
+    if np.ndim(value):
+        return np.broadcast_to(value, n)[rows].tolist()
+    return [float(value)] * int(np.count_nonzero(rows))
 
 
 def _halves(inputs: Array) -> Array:

@@ -21,6 +21,7 @@ import pandas as pd
 
 from studies.real.judge import Judged, ask
 from studies.real.rigs import RIGS
+from studies.reporting.markdown import markdown
 from studies.running.command import HelpFormatter, Parser, fail
 from studies.running.files import atomic_write_json, atomic_write_text
 
@@ -126,12 +127,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if failed:
         print(f"failed: {', '.join(failed)}", file=sys.stderr)
         raise SystemExit(1)
-
-
-def markdown(data: pd.DataFrame) -> str:
-    """A table as Markdown."""
-    rows = [list(data.columns), ["---"] * len(data.columns), *data.astype(str).to_numpy().tolist()]
-    return "".join("| " + " | ".join(row) + " |\n" for row in rows)
 
 
 def _errors(errors: dict[str, float]) -> str:

@@ -42,6 +42,8 @@ Array = NDArray[np.float64]
 
 #: Sets listed as evidence.
 EVIDENCE = 40
+#: Rise of the loss with inputs held the other way, as a share of it, that rules that out.
+OTHER_HOLD = 0.5
 #: Part of the time budget after which nothing new is tried.
 SEARCHING = 0.7
 
@@ -164,7 +166,9 @@ def confirm(found: Explanation, prepared: Prepared, groups: dict[str, tuple[str,
     search, key = found.search, found.key
     leads: tuple[str, ...] = ()
     while True:
-        numerics = other_numerics(search, key) if key else []
+        fit = search.tried[key]
+        slack = search.fitter.tie(search.tried[()]) if found.adequate else OTHER_HOLD * fit.merit
+        numerics = other_numerics(search, key, slack) if key else []
         made = claims(search, key, found.adequate, groups, numerics)
         blocks = len(search.fitter.blocks)
         lost = [claim for claim in made if not nameable(search, claim, blocks)]

@@ -13,7 +13,7 @@ from sims.host import HostSimulator
 #: Part of the usual period of the motion.
 PART = 1 / 3
 #: Windows that the records should at least be good for.
-WINDOWS = 10
+WINDOWS = 8
 #: Least samples of a window.
 SAMPLES = 8
 

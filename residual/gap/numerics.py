@@ -6,12 +6,12 @@ name, so both are settled on the nominal simulator.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap import paths
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from residual.gap.search import Key, Search
@@ -25,9 +25,8 @@ Array = NDArray[np.float64]
 CLEARER = 0.05
 #: Rows in a forecast horizon that are enough to follow the motion.
 ROWS = 24
-#: Error of one interval by too few sub-steps, as a share of a channel's change in it (a
-#: twentieth of the rows of a window add up).
-FINE = 2e-4
+#: Error of one interval by too few sub-steps, as a share of what counts; those of a window add up.
+FINE = 0.01
 
 
 def stride_for(trajectories: Sequence[Trajectory], horizon: float) -> int:
@@ -38,39 +37,46 @@ def stride_for(trajectories: Sequence[Trajectory], horizon: float) -> int:
     return 2 ** int(np.log2(wanted))
 
 
-def substeps_for(simulator: HostSimulator, trajectories: Sequence[Trajectory], stride: int) -> int:
-    """Sub-steps of an interval: as few as change nothing, at most as fine as the simulator's own.
-
-    The nominal simulator is advanced from every row with so many sub-steps and twice as many; the
-    worst twentieth of the rows decides.
-    """
+def own_substeps(simulator: HostSimulator, trajectories: Sequence[Trajectory], stride: int) -> int:
+    """Sub-steps of an interval that are as fine as the simulator's own."""
     longest = stride * max(float(np.quantile(t.durations, 0.95)) for t in trajectories)
     own = max(1, int(np.ceil(simulator.substeps * longest / simulator.dt - 1e-6)))
-    most = _power(own) if stride == 1 else min(_power(own), stride)
+    return own if stride == 1 else min(_power(own), stride)
+
+
+def enough_substeps(
+    simulator: HostSimulator, samples: Samples, nodes: Array, sigma: Array, most: int
+) -> int:
+    """As few sub-steps as change nothing that could be seen, at most ``most``.
+
+    The nominal simulator is advanced from rows of the table with so many sub-steps and twice as
+    many; the worst twentieth of the rows decides.
+
+    Args:
+        simulator: The nominal simulator.
+        samples: The table.
+        nodes: States at its rows, (n, n_s).
+        sigma: Error of every measured channel that counts one, (m,).
+        most: The simulator's own.
+    """
     if not simulator.advances_rows_at_once:
-        return own if stride == 1 else most
-    count = 1
-    after = _after(simulator, trajectories, count, stride)
-    while count < most:
-        finer = _after(simulator, trajectories, 2 * count, stride) if 2 * count <= most else after
-        change = np.abs(finer[0] - after[0])
-        moved = np.quantile(np.abs(finer[0] - finer[1]), 0.8, axis=0)
-        allowed = FINE * np.maximum(moved, 1e-3 * np.abs(finer[0]).max(axis=0))
-        if (np.quantile(change, 0.95, axis=0) <= allowed).all():
-            break
-        count, after = 2 * count, finer
-    return min(count, own) if stride == 1 else count
-
-
-def _after(
-    simulator: HostSimulator, trajectories: Sequence[Trajectory], substeps: int, stride: int
-) -> tuple[Array, Array]:
-    samples = Samples.join(trajectories, substeps, stride)
+        return most
     model = Model(simulator)
-    nodes = paths.measured(model, samples, np.zeros(0))
-    rows = np.unique(np.linspace(0, len(samples) - 1, min(len(samples), 800)).astype(int))
-    after = model.advance(samples, nodes[rows][None], np.zeros((1, 0)), rows)[0]
-    return after, nodes[rows]
+    rows = np.unique(np.linspace(0, len(samples) - 1, min(len(samples), 400)).astype(int))
+    states = nodes[rows][None, :, : model.physical]
+
+    def after(count: int) -> Array:
+        table = dataclasses.replace(samples, substeps=count)
+        return Model(simulator).advance(table, states, np.zeros((1, 0)), rows)[0]
+
+    count, coarse = 1, after(1)
+    while count < most:
+        fine = after(min(2 * count, most))
+        change = np.abs(fine - coarse)[:, samples.measured]
+        if (np.quantile(change, 0.95, axis=0) <= FINE * sigma).all():
+            return count
+        count, coarse = min(2 * count, most), fine
+    return most
 
 
 def better_hold(
@@ -107,8 +113,16 @@ def better_hold(
     ]
 
 
-def other_numerics(search: Search, key: Key) -> list[Array]:
-    """Numbers of a set fitted at half the step, and with inputs held the other way, each (p,)."""
+def other_numerics(search: Search, key: Key, tie: float) -> list[Array]:
+    """Numbers of a set fitted at half the step, and with inputs held the other way, each (p,).
+
+    Where the data say clearly how inputs are held, the other hold is no question.
+
+    Args:
+        search: With the fitted set.
+        key: The set.
+        tie: Rise of the loss beyond which the other hold is out.
+    """
     fitter, fit = search.fitter, search.tried[key]
     found = [fitter.halved().fit(fit.model, fit.theta, fit).theta]
     simulator = search.simulator
@@ -116,7 +130,9 @@ def other_numerics(search: Search, key: Key) -> list[Array]:
         flipped = simulator.with_hold(
             {c.name: "zero" if c.hold == "linear" else "linear" for c in simulator.action_channels}
         )
-        found.append(fitter.fit(Model(flipped, fit.model.chosen), fit.theta).theta)
+        other = fitter.fit(Model(flipped, fit.model.chosen), fit.theta)
+        if other.merit - fit.merit < tie:
+            found.append(other.theta)
     return found
 
 

@@ -14,7 +14,7 @@ from residual.gap.candidates import Candidate
 from residual.gap.fitting import Fit, Fitter
 from residual.gap.impacts.prepare import impact_fitter, simple, weigh_impacts
 from residual.gap.model import Model
-from residual.gap.numerics import stride_for, substeps_for
+from residual.gap.numerics import enough_substeps, own_substeps, stride_for
 from residual.gap.samples import Samples
 from residual.gap.search import Effort
 from residual.gap.smooth import LEAD, SmoothFitter
@@ -67,16 +67,18 @@ def prepare(
         effort = Effort(5, 4, 1, 3, 3)
         return Prepared(impacts, around, weigh_impacts, effort, horizon, simple)
     fitter, floor = smooth_fitter(simulator, trajectories, horizon)
+    finest = own_substeps(simulator, trajectories, fitter.samples.stride)
 
     def weigh(now: Fitter, fit: Fit) -> tuple[Fitter, noise.Noise]:
         assert isinstance(now, SmoothFitter)
         around = floor
         if len(fit.theta):
             # Noise suffers from a large gap, so it is estimated around the better model.
-            again = _noise_around(fit, fitter, floor)
-            smaller = again.sigma < floor.sigma
-            around = again if smaller.all() else floor
-        return weighted(now, fit, around.sigma), around
+            better = _noise_around(fit, fitter, floor)
+            around = better if (better.sigma < floor.sigma).all() else floor
+        again = weighted(now, fit, around.sigma)
+        few = enough_substeps(simulator, now.samples, now.nodes, again.sigma, finest)
+        return again.with_substeps(max(few, now.samples.substeps)), around
 
     effort = Effort() if simulator.advances_rows_at_once else Effort(5, 1, 1, 3, 4)
     return Prepared(fitter, floor, weigh, effort, horizon)
@@ -97,7 +99,8 @@ def smooth_fitter(
 ) -> tuple[SmoothFitter, noise.Floor]:
     """A fitter for a system without impacts, weighed by what the nominal simulator leaves."""
     stride = stride_for(trajectories, horizon)
-    samples = Samples.join(trajectories, substeps_for(simulator, trajectories, stride), stride)
+    finest = own_substeps(simulator, trajectories, stride)
+    samples = Samples.join(trajectories, finest, stride)
     if not len(samples.measured):
         raise ValueError("no state channel was measured: every value in the trajectories is NaN")
     model = Model(simulator)
@@ -106,14 +109,16 @@ def smooth_fitter(
     floor = noise.estimate(model, samples, nodes, np.zeros(0), noise.local_noise(samples), scale)
     least = FINEST * scale[samples.measured]
     floor = dataclasses.replace(floor, sigma=np.maximum(floor.sigma, least))
-    length = max(6, round(horizon / (1 - LEAD) / samples.step) + 1)
-    windows = cut(samples, floor.slope.by_state, _foreseen(simulator, samples, scale), length)
+    seconds = horizon / (1 - LEAD)
+    windows = cut(samples, floor.slope.by_state, _foreseen(simulator, samples, scale), seconds)
     moving = np.array(noise.driven_states(model))
     most = AT_ONCE if simulator.advances_rows_at_once else BY_ROW
     grouped = blocks(samples, windows, drive(samples, nodes, moving), most)
     start = SmoothFitter(samples, grouped, nodes, floor.slope.by_state, floor.sigma, scale)
     nominal = start.fit(model, np.zeros(0))
-    return weighted(start, nominal, floor.sigma), floor
+    fitter = weighted(start, nominal, floor.sigma)
+    few = enough_substeps(simulator, samples, nodes, fitter.sigma, finest)
+    return fitter.with_substeps(few), floor
 
 
 def _foreseen(simulator: HostSimulator, samples: Samples, scale: Array) -> Array:

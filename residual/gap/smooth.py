@@ -58,10 +58,13 @@ class SmoothFitter:
     cap: float = np.inf
     turns: int = 8
 
+    def with_substeps(self, count: int) -> SmoothFitter:
+        """The same with so many integration steps between rows."""
+        return dataclasses.replace(self, samples=dataclasses.replace(self.samples, substeps=count))
+
     def halved(self) -> SmoothFitter:
         """See ``Fitter.halved``."""
-        samples = dataclasses.replace(self.samples, substeps=2 * self.samples.substeps)
-        return dataclasses.replace(self, samples=samples)
+        return self.with_substeps(2 * self.samples.substeps)
 
     def weighed_like(self, other: Fitter) -> SmoothFitter:
         """See ``Fitter.weighed_like``."""

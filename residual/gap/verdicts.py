@@ -93,7 +93,7 @@ def doubts(claim: Claim) -> tuple[Doubt, ...]:
         "unsteady": not claim.steady,
         "numerics": not claim.sound,
         "at_bound": claim.bounded,
-        "rivals": bool(claim.rivals),
+        "rivals": bool(claim.rivals or claim.alike),
     }
     return tuple(doubt for doubt, there in why.items() if there)
 

@@ -63,7 +63,7 @@ def cut(
     samples: Samples,
     jacobians: Array,
     scale: Array,
-    length: int,
+    seconds: float,
     shortest: int = 6,
     growth: float = 40.0,
 ) -> Windows:
@@ -77,7 +77,7 @@ def cut(
         samples: The table.
         jacobians: Derivative of every next state by its state, shape (n, n_s, n_s).
         scale: Typical variation of each state, to make states of different units comparable.
-        length: Wanted samples in a window.
+        seconds: Wanted length of a window.
         shortest: Fewest samples in a window.
         growth: Largest allowed norm of the product of the scaled Jacobians.
 
@@ -89,7 +89,8 @@ def cut(
     for run, (start, stop) in enumerate(samples.runs):
         if stop - start < shortest:
             continue
-        count = max(1, round((stop - start) / length))
+        spans = samples.times[stop - 1] - samples.times[start]
+        count = max(1, min(round(float(spans) / seconds), (stop - start) // shortest))
         edges = np.linspace(start, stop, count + 1).round().astype(int)
         for first, last in itertools.pairwise(edges.tolist()):
             a = first

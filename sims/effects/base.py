@@ -107,6 +107,8 @@ class Effect(abc.ABC):
         family: What effects that differ in form more than in kind have in common, such as
             ``"dissipation"``; empty if it stands alone. ``family_in`` asks for it.
         subfamily: What a part of the family has in common beside that, ``"dry friction"``.
+        special_cases: Names of effects that it is equal to at some of its values, as Stribeck's
+            friction with equal levels is Coulomb's: data that show one of these fit it as well.
         upstream_of_sensor: True if it acts before an input that was measured at the actuator's
             output, so that such a record holds its consequence already.
     """
@@ -117,6 +119,7 @@ class Effect(abc.ABC):
     needs: ClassVar[str]
     family: ClassVar[str] = ""
     subfamily: ClassVar[str] = ""
+    special_cases: ClassVar[tuple[str, ...]] = ()
     upstream_of_sensor: ClassVar[bool] = False
 
     @property

@@ -65,6 +65,7 @@ class StribeckFriction(DryFriction):
     name: ClassVar[str] = "stribeck_friction"
     sentence: ClassVar[str] = "Dry friction that holds harder at rest than it brakes in motion."
     needs: ClassVar[str] = "slow reversals and stops, and fast motion"
+    special_cases: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
 
     def limit(self, v: Value) -> Value:
         """Size of the friction at rate ``v``."""
@@ -88,6 +89,7 @@ class DirectionalFriction(DryFriction):
     name: ClassVar[str] = "directional_friction"
     sentence: ClassVar[str] = "Dry friction that is larger in one direction than in the other."
     needs: ClassVar[str] = "motion and stops in both directions"
+    special_cases: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
 
     def parts(self) -> tuple[JointEffect, ...]:
         """Coulomb friction and a constant load."""

@@ -138,7 +138,7 @@ def _reference(excitation: Excitation, noise: str) -> _Reference:
     scale = np.array([1.0, 10.0])
     model, none = Model(simulator), np.zeros(0)
     slope = slopes(model, samples, nodes, none, none, scale)
-    windows = cut(samples, slope.by_state, scale, 25)
+    windows = cut(samples, slope.by_state, scale, 25 * DT)
     grouped = blocks(samples, windows, np.zeros(len(samples)), len(windows))
     fitter = SmoothFitter(samples, grouped, nodes, slope.by_state, sigma, scale, turns=2)
     freedom = int(windows.inside.sum()) * len(sigma) - 2 * len(windows)

@@ -102,9 +102,10 @@ class Judge:
             parser.parse_object({**self.settings, "output": "unused", "jobs": 1})
         )
         asked: HostSimulator = made["simulator"]
-        self.simulator = asked.with_hold(
-            {channel.name: made["hold"] for channel in asked.action_channels}
-        )
+        hold = made["hold"]
+        self.simulator = asked
+        if hold != "auto":
+            self.simulator = asked.with_hold({c.name: hold for c in asked.action_channels})
         self._format: LogFormat = made["columns"]
         self._fit = self._read(rig.fit, logs)
         self._runs = self._read(rig.judge, files_of(rig, rig.judge, data, scratch))

@@ -434,6 +434,13 @@ def test_every_effect_says_which_family_it_belongs_to():
     assert families["mass"] == families["actuator_gain@voltage"] == ""
     dry = {effect.name for effect in library(pendulum) if effect.subfamily == "dry friction"}
     assert dry == {"coulomb_friction", "stribeck_friction", "directional_friction"}
+    (general,) = [e for e in library(pendulum) if e.name == "directional_friction"]
+    states, actions = rows(6)
+    for name in general.special_cases:
+        (special,) = [typical(e, pendulum) for e in library(pendulum) if e.name == name]
+        equal = general.with_values(forward=special.level, backward=special.level)
+        one, other = (pendulum.with_effects([e]).step(states, actions) for e in (special, equal))
+        assert np.array_equal(one, other)
     before_the_sensor = {e.name for e in library(pendulum) if e.upstream_of_sensor}
     assert before_the_sensor == {"dead_zone", "saturation", "actuator_lag"}
 

@@ -42,8 +42,13 @@ def test_one_step_agrees_with_an_independent_integrator(system):
     assert rms[0] < 1e-6 and rms[1] < 2e-5
 
 
-def test_rows_with_effects_follow_the_scheme_of_pymunk():
+def test_what_is_compiled_follows_the_scheme_of_pymunk():
     states, actions = random_rows(200)
+    pendulum = Pendulum.true()
+    held = np.repeat(actions[:, None], pendulum.substeps, axis=1)
+    inputs = np.stack([held, 0 * held], axis=-1)
+    found = pendulum.integrate(states, inputs, np.full(200, pendulum.dt))
+    assert np.abs(found - pendulum.step(states, actions)).max() < 1e-12
     for change in (0.0, 0.02):
         pymunk = Pendulum(0.055 + change, substeps=5)
         compiled = Pendulum(substeps=5, effects=[ParameterChange("mass", change or 1e-300)])
