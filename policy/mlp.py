@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from safetensors.numpy import save
 
-from policy.files import read_arrays, write_whole
+from policy.files import read_arrays, write_arrays
 
 FORMAT = "simgap.policy.1"
 
@@ -89,8 +87,7 @@ class MlpPolicy:
     def save(self, path: str | Path) -> None:
         """Write a safetensors file; it appears whole or not at all."""
         tensors = {**self.weights, "low": self.low, "high": self.high}
-        contiguous = {name: np.ascontiguousarray(value) for name, value in tensors.items()}
-        write_whole(path, save(contiguous, {"format": json.dumps(FORMAT)}))
+        write_arrays(path, FORMAT, tensors, {})
 
     @classmethod
     def load(cls, path: str | Path) -> MlpPolicy:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from safetensors.numpy import save as to_bytes
 from residual.difference import DifferenceModel
 from residual.estimator import Estimator
 from residual.named_effects import NamedEffects
+from simgap_files import atomic_write_bytes
 from sims.simulator import Channel, Simulator
 
 VERSION = 1
@@ -78,8 +78,8 @@ def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
     names = getattr(estimator, "feature_names_in_", None)
     header["feature_names"] = None if names is None else [str(name) for name in names]
     arrays = {key: np.array(value, order="C") for key, value in estimator.state_arrays().items()}
-    content = to_bytes(arrays, metadata={_KEY: json.dumps(header)})
-    _write(Path(path), content)
+    content = to_bytes(arrays, metadata={_KEY: json.dumps(header, sort_keys=True)})
+    atomic_write_bytes(path, content)
 
 
 def load(path: str | Path, simulator: Simulator | None = None) -> Any:
@@ -194,13 +194,3 @@ def _plain(name: str, value: Any) -> Any:
 
 def _tuples(value: Any) -> Any:
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
-
-
-def _write(path: Path, content: bytes) -> None:
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(content)
-        os.replace(part, path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise

@@ -17,17 +17,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from studies import reporting
-from studies.reporting import figures
-from studies.reporting.media import encode_gif, load_media
-from studies.reporting.render import inline, number, paragraphs
-from studies.running.files import (
+from simgap_files import (
     atomic_path,
     atomic_write_bytes,
     atomic_write_json,
     atomic_write_text,
     remove_partial_files,
 )
+from studies import reporting
+from studies.reporting import figures
+from studies.reporting.media import encode_gif, load_media
+from studies.reporting.render import inline, number, paragraphs
 
 VOID = {"meta", "link", "img", "source", "br", "hr"}
 
