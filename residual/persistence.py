@@ -20,7 +20,6 @@ from safetensors.numpy import save as to_bytes
 
 from residual.difference import DifferenceModel
 from residual.estimator import Estimator
-from residual.named_effects import NamedEffects
 from simgap_files import atomic_write_bytes
 from sims.simulator import Channel, Simulator
 
@@ -31,6 +30,8 @@ _CLASSES = {
     "Linear": "residual.linear",
     "NamedEffects": "residual.named_effects",
 }
+# Steps the simulator itself; not imported here, since it brings the whole search for effects.
+_OF_SIMULATOR = "NamedEffects"
 _KEY = "simgap"
 
 
@@ -73,7 +74,7 @@ def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
         for key, value in estimator.get_params(deep=False).items()
         if key != "simulator"
     }
-    if isinstance(estimator, NamedEffects):
+    if name == _OF_SIMULATOR:
         header["values"] = estimator.state_values()
     names = getattr(estimator, "feature_names_in_", None)
     header["feature_names"] = None if names is None else [str(name) for name in names]
@@ -151,7 +152,7 @@ def _restore(
     params = {key: _tuples(value) for key, value in header["params"].items()}
     kind: type[Estimator] = getattr(importlib.import_module(_CLASSES[name]), name)
     estimator = kind.from_state(params, arrays)
-    if isinstance(estimator, NamedEffects):
+    if name == _OF_SIMULATOR:
         if simulator is None:
             raise _Unusable("holds NamedEffects, which step the simulator: load(path, simulator)")
         estimator.restore(header["values"], simulator)

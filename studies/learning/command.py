@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 
 from simgap_files import atomic_write_json, atomic_write_text, read_json, remove_partial_files
-from studies.learning.settings import build_parser, instantiate, resolve, trial_label
+from studies.learning.settings import ALIASES, build_parser, instantiate, resolve, trial_label
 from studies.learning.study import Config, Study
 from studies.learning.trial import code_of_trial, run_trial
 from studies.learnt.films import write_films
@@ -94,7 +94,8 @@ def run_grid(
 ) -> None:
     """Many trials, a table over all of them and a report."""
     try:
-        configs = [resolve(study, config) for config in expand_grid(settings, grid)]
+        blocks = [{ALIASES.get(name, name): block[name] for name in block} for block in grid]
+        configs = [resolve(study, config) for config in expand_grid(settings, blocks)]
         made_by = {}
         for config in configs:
             folder = trial_folder(output, trial_label(config), config)

@@ -114,14 +114,15 @@ def _inside(package: str, name: str) -> str:
     return home if isinstance(home, str) and _source(home) else package
 
 
-def _statements(tree: ast.AST) -> Iterator[ast.AST]:
-    """All nodes but those that only type checkers see."""
-    for node in ast.iter_child_nodes(tree):
-        test = getattr(node, "test", None)
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(test or node):
-            continue
-        yield node
-        yield from _statements(node)
+def _statements(tree: ast.AST) -> Iterator[ast.stmt]:
+    """All statements but those that only type checkers see."""
+    for field in ("body", "orelse", "handlers", "finalbody"):
+        for node in getattr(tree, field, ()):
+            if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+                continue
+            if isinstance(node, ast.stmt):
+                yield node
+            yield from _statements(node)
 
 
 @functools.cache

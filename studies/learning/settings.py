@@ -13,6 +13,9 @@ from studies.learning.study import Config, Study, Trial
 from studies.running.command import HelpFormatter, Parser
 from studies.running.workers import Backend
 
+#: Settings under their earlier names.
+ALIASES = {"caution": "uncertainty_penalty"}
+
 
 def build_parser(study: Study) -> Parser:
     """The command line of a study."""
