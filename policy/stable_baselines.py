@@ -6,6 +6,7 @@ in every training.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -67,8 +68,11 @@ class StableBaselines:
         env: gymnasium.Env[Any, Any],
         seed: int = 0,
     ) -> None:
-        chosen: dict[str, Any] = {"policy": "MlpPolicy", "device": "cpu"} | dict(options)
-        self.model: Any = kind(env=env, seed=seed % 2**32, **chosen)
+        # Copied, since the library adds to what it is given.
+        given = copy.deepcopy(dict(options))
+        chosen: dict[str, Any] = {"policy": "MlpPolicy", "device": "cpu"} | given
+        self._seed = seed % 2**32
+        self.model: Any = kind(env=env, seed=self._seed, **chosen)
         self._remembered = 0
 
     @property
@@ -106,6 +110,9 @@ class StableBaselines:
             self.model.learning_starts = 0
         if steps:
             self.model.set_env(env)
+            # What happened to the global generators since the start shall not matter.
+            self._seed = (self._seed + 1) % 2**32
+            self.model.set_random_seed(self._seed)
             self.model.learn(steps, Watch(), reset_num_timesteps=True)
 
     def remember(

@@ -43,7 +43,7 @@ def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
     kept = (Path(output) if output else home) / "stages"
     # A wrong value is reported before anything is written.
     try:
-        study.system_of(instantiate(study, settings))
+        study.system_of(instantiate(study, settings)).check()
     except ValueError as error:
         fail(str(error))
     if grid:

@@ -98,7 +98,6 @@ class Study:
         system = self.system(trial)
         if trial.simulator is not None:
             system = system.with_nominal(trial.simulator)
-        system.check()
         trial.budget.check(trial.algorithm, trial.replay == "all", trial.corrected is not None)
         if trial.corrected is not None:
             _check_corrected(system.nominal, trial.corrected)
