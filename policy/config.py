@@ -48,6 +48,12 @@ class DDPGConfig:
     warm_up: int = 1000
     updates_per_step: int = 1
 
+    def __repr__(self) -> str:
+        # What is as by default tells nothing.
+        values = ((f.name, getattr(self, f.name), f.default) for f in dataclasses.fields(self))
+        changed = ", ".join(f"{name}={now!r}" for name, now, usual in values if now != usual)
+        return f"{type(self).__name__}({changed})"
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "hidden", tuple(self.hidden))
         if len(self.hidden) != 2:

@@ -91,6 +91,9 @@ class DDPG:
         """An agent for the spaces of ``env``; errors as for the class."""
         return cls(env.observation_space, env.action_space, config, seed)
 
+    def __repr__(self) -> str:
+        return f"DDPG({self.policy!r}, {self.updates} updates, {len(self.replay)} transitions)"
+
     def act(self, observation: ArrayLike, noise: bool = False) -> NDArray[np.float32]:
         """The policy's action, within the bounds.
 

@@ -76,6 +76,10 @@ class Rollout:
     states: Array | None
     terminated: bool
 
+    def __repr__(self) -> str:
+        end = "terminated" if self.terminated else "cut by time"
+        return f"Rollout({len(self.rewards)} steps, return {self.total:.5g}, {end})"
+
     @property
     def total(self) -> float:
         """Undiscounted return."""

@@ -35,6 +35,10 @@ class MlpPolicy:
                 value
             )
 
+    def __repr__(self) -> str:
+        sizes = [self.observation_size, *(len(self.weights[f"bias{k}"]) for k in (1, 2, 3))]
+        return f"MlpPolicy({' -> '.join(map(str, sizes))})"
+
     @property
     def observation_size(self) -> int:
         """Number of observations n_o."""

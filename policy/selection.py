@@ -56,6 +56,9 @@ class Selection:
     curve: tuple[Point, ...]
     final: float | None = None
 
+    def __repr__(self) -> str:
+        return f"Selection({self.best}, of {len(self.curve)} evaluations)"
+
 
 def score(
     policy: Policy,

@@ -51,6 +51,12 @@ class EvaluationProtocol:
     visited_rollouts: int = 5
     visited_stride: int = 1
 
+    def __repr__(self) -> str:
+        # What is as by default tells nothing.
+        values = ((f.name, getattr(self, f.name), f.default) for f in dataclasses.fields(self))
+        changed = ", ".join(f"{name}={now!r}" for name, now, usual in values if now != usual)
+        return f"{type(self).__name__}({changed})"
+
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class System:

@@ -5,9 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import simgap
+from policy import rollout
 
 ROOT = Path(__file__).parents[1]
 
@@ -37,6 +39,31 @@ def test_the_import_alone_is_light(tmp_path):
 def test_every_command_tells_its_options(command, tmp_path):
     done = run(["-m", "simgap", command, "--help"], tmp_path)
     assert done.returncode == 0 and "usage:" in done.stdout
+
+
+def test_what_a_notebook_shows_is_short():
+    rng = np.random.default_rng(0)
+    states, actions = rng.uniform(-3, 3, (300, 2)), rng.uniform(-3, 3, (300, 1))
+    pendulum, leo = simgap.Pendulum(), simgap.Leo()
+    after = simgap.Pendulum.true().step(states, actions)
+    rows = simgap.Transitions(states, actions, after, np.zeros(300, int))
+    difference = simgap.DifferenceModel(simgap.Linear(), pendulum).fit(rows)
+    corrected = simgap.CorrectedSimulator(pendulum, difference)
+    env = simgap.SimulatorEnv(pendulum, simgap.SwingUp(horizon=20))
+    agent = simgap.DDPG.for_env(env)
+    run = rollout(agent.policy, env, 0)
+    trajectory = simgap.Trajectory("run 1", np.arange(4.0), np.zeros((4, 2)), np.zeros((3, 1)))
+    system = simgap.System("pendulum", pendulum, simgap.Pendulum.true(), simgap.SwingUp())
+    accuracy = simgap.accuracy_along(corrected, run.states[None], run.actions[None])
+    shown = [
+        pendulum, leo, rows, difference, corrected, agent, agent.policy, run, trajectory, system,
+        accuracy, simgap.Algorithm(), simgap.Budget(), simgap.EvaluationProtocol(),
+        simgap.Linear(), simgap.SwingUp(),
+    ]  # fmt: skip
+    for thing in shown:
+        text = repr(thing)
+        assert text.startswith(type(thing).__name__)
+        assert "\n" not in text and len(text) <= 200, text
 
 
 def test_an_unknown_command_is_one_line(capsys):

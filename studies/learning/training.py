@@ -52,6 +52,10 @@ class Training:
     simulated: Simulated | None = None
     key: str = ""
 
+    def __repr__(self) -> str:
+        told = {k: round(v, 3) for k, v in self.summary.items() if isinstance(v, int | float)}
+        return f"Training({told})"[:180]
+
     @property
     def policy(self) -> Policy:
         """The policy kept."""
