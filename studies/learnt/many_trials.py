@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from studies.learnt.many_figures import budgets_figure, updates_figure
+from studies.learnt.samples_needed import samples_section
 from studies.learnt.statistics import Mean, mean
 from studies.learnt.tables import write_tables
 from studies.learnt.words import (
@@ -80,7 +81,10 @@ def write_grid_report(
     for name, (figure, numbers), heading, alt, caption in drawings:
         save_figure(figure, figures / f"{name}.png", numbers)
         sections.append(Figure(figure, alt, caption, heading=heading))
-    sections += [*accuracy_section(errors, about), *samples_section(rows, results, about)]
+    sections += [
+        *accuracy_section(errors, about),
+        *samples_section(policies_once(rows), results, about),
+    ]
     sections.append(KeyValues(dict(results[0]["versions"]), heading="Versions"))
     title = f"{about['name'].replace('_', ' ').capitalize()}: many trials"
     subtitle = f"{len(results)} trials, {len(set(rows['seed']))} seeds"
@@ -157,9 +161,8 @@ def above(learnt: pd.DataFrame, control: pd.DataFrame) -> list[float]:
 
 
 def _finite(values: pd.Series) -> Mean:
-    """The mean over episodes that have a value."""
-    finite = values[np.isfinite(values.astype(float))].tolist()
-    return mean(finite or [np.nan])
+    """The mean over what has a value."""
+    return mean(values.astype(float).replace(np.inf, np.nan).dropna().tolist() or [np.nan])
 
 
 def _errors(errors: pd.DataFrame, about: Mapping[str, Any]) -> pd.DataFrame:
@@ -251,55 +254,3 @@ def accuracy_section(errors: pd.DataFrame, about: Mapping[str, Any]) -> list[Sec
             heading="Accuracy where the policies go",
         )
     ]
-
-
-def samples_section(
-    rows: pd.DataFrame, results: Sequence[Results], about: Mapping[str, Any]
-) -> list[Section]:
-    """True samples until the target, and until most of what the true policy gains."""
-    once = policies_once(rows).groupby("name")["return_true"].mean()
-    targets = {f"{about['target']:g}": about["target"]} if about["target"] is not None else {}
-    if "true" in once:
-        near = float(once["idealised"] + NEAR * (once["true"] - once["idealised"]))
-        targets[f"{near:.4g} ({NEAR:.0%} of what learning on the true system gains)"] = near
-    table = []
-    for words, target in targets.items():
-        for method, reached in samples_to(target, results).items():
-            values = [value for value in reached.values() if value is not None]
-            table.append([
-                words, POLICY_WORDS.get(method, method), str(mean(values)) if values else None,
-                f"{len(values)} of {len(reached)}",
-            ])  # fmt: skip
-    if not table:
-        return []
-    return [
-        Table(
-            ["return", "method", "true samples", "seeds that reached it"],
-            table,
-            caption="Cold and warm start are tested as they learn without being charged for it; "
-            "the first test at or above the return counts. For a difference model the fewest "
-            "samples count after which it got there. Zero: the idealised policy is there already.",
-            heading="Samples to a return",
-        )
-    ]
-
-
-def samples_to(target: float, results: Sequence[Results]) -> dict[str, dict[int, int | None]]:
-    """By method and seed, the true samples after which ``target`` was first reached."""
-    reached: dict[str, dict[int, int | None]] = {}
-
-    def note(method: str, seed: int, values: Sequence[int]) -> None:
-        by_seed = reached.setdefault(method, {})
-        known = by_seed.get(seed)
-        every = [*values, *([known] if known is not None else [])]
-        by_seed[seed] = min(every) if every else None
-
-    for trial in results:
-        loop = [p for p in trial["policies"] if p["name"] in ("idealised", "difference")]
-        at = [p["true_samples"] for p in loop if p["return_true"] >= target]
-        note(f"difference model, {trial['label']}", trial["seed"], at)
-        for record in trial["policies"]:
-            if record["name"] in ("cold", "warm"):
-                steps = [step for step, value in record["curve"] if value >= target]
-                note(record["name"], trial["seed"], steps)
-    return reached
