@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from studies.learnt.words import Results, by_name, grouped, policy_name
 from studies.reporting.figures import draw_lines, draw_over_time, new_figure, styled
@@ -38,9 +39,17 @@ def scale_of_returns(axis: Axes, returns: list[float]) -> float:
     """
     if max(returns) < 0:
         axis.set(ylabel="minus the return", yscale="log")
+        if min(returns) > 10 * max(returns):
+            plain_ticks(axis.yaxis)
         return -1.0
     axis.set_ylabel("return")
     return 1.0
+
+
+def plain_ticks(axis: Axis) -> None:
+    """Numbers in place of powers of ten, where a logarithmic axis covers few of them."""
+    axis.set_major_formatter(ScalarFormatter())
+    axis.set_minor_formatter(ScalarFormatter())
 
 
 @styled()
@@ -92,15 +101,15 @@ def accuracy_figure(results: Results) -> Drawn:
     ]
     table = pd.DataFrame(rows, columns=["true_samples", "where", "channels", "error"])
     names = list(dict.fromkeys(table["channels"])) or ["error"]
-    figure, axes = new_figure(1, len(names), share_y=True, height=3.4)
-    for axis, name in zip(axes[0], names, strict=True):
+    figure, axes = new_figure(len(names), 1, share_x=True, height=1.0 + 1.4 * len(names))
+    for axis, name in zip(axes[:, 0], names, strict=True):
         for where, part in table[table["channels"] == name].groupby("where", sort=False):
             axis.plot(part["true_samples"], part["error"], marker="o", label=where)
-        axis.set(title=name, xlabel="true samples")
+        axis.set_ylabel(name)
         if (table["error"] > 0).any():
             axis.set_yscale("log")
         axis.set_xticks(sorted(set(table["true_samples"])))
-    axes[0, 0].set_ylabel("one-step error / gap")
+    axes[-1, 0].set_xlabel("true samples")
     handles = axes[0, 0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside upper left", ncols=2, handlelength=1.4)
     return figure, table

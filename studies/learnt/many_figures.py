@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axis import Axis
-from matplotlib.ticker import MaxNLocator, ScalarFormatter
+from matplotlib.ticker import MaxNLocator
 
-from studies.learnt.figures import Drawn, reference_line, scale_of_returns
+from studies.learnt.figures import Drawn, plain_ticks, reference_line, scale_of_returns
 from studies.learnt.statistics import mean
 from studies.reporting.figures import PALETTE, new_figure, styled
 
@@ -86,7 +85,6 @@ def budgets_figure(
     if best is not None:
         reference_line(axes[0, 0], factor * best, "the best possible")
     axes[0, 0].set_xscale("log")
-    plain_ticks(axes[0, 0].yaxis)
     axes[1, 0].set(
         ylabel=f"one-step error / gap\n(at least {LEAST_SHOWN:g})",
         yscale="log", xlabel="true samples",
@@ -96,9 +94,3 @@ def budgets_figure(
     plain_ticks(axes[1, 0].xaxis)
     figure.legend(loc="outside upper left", ncols=3, handlelength=1.4)
     return figure, pd.DataFrame(numbers)
-
-
-def plain_ticks(axis: Axis) -> None:
-    """Numbers in place of powers of ten, where a logarithmic axis covers few of them."""
-    axis.set_major_formatter(ScalarFormatter())
-    axis.set_minor_formatter(ScalarFormatter())

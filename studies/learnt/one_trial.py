@@ -226,7 +226,7 @@ def tiles(results: Results) -> KeyValues:
         one_step = results["accuracy"][-1]["visited"]["one_step"]
         errors = grouped(one_step, results["about"]["groups"])
         if errors:
-            items["one-step error, share of gap"] = f"{max(errors.values()):.3f}"
+            items["one-step error, share of gap"] = f"{max(errors.values()):.2g}"
     return KeyValues(items, style="tiles")
 
 
@@ -268,12 +268,12 @@ def accuracy_section(results: Results) -> Table | Prose:
             measured = record[where]
             errors = grouped(measured["one_step"], groups)
             rows.append([
-                record["iteration"], words, *(errors.get(name) for name in groups),
+                f"{record['iteration']}, {words}", *(errors.get(name) for name in groups),
                 *(overall(measured["multi_step"].get(h, {}), groups) for h in horizons),
                 measured["coverage90"], record["fit_seconds"],
             ])  # fmt: skip
     return Table(
-        ["update", "states", *(f"{name}, 1 step" for name in groups),
+        ["update, states", *(f"{name}, 1 step" for name in groups),
          *(f"all, {horizon}" for horizon in horizons), "90 % coverage", "fit s"],
         rows,
         caption="Errors as shares of the gap without the model, along the first seconds of fresh "

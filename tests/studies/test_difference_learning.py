@@ -133,7 +133,7 @@ def test_no_two_steps_share_a_random_stream(monkeypatch):
     assert {("difference", 1), ("difference", 2), ("control", 1), ("cold", 0)} <= trainings
 
 
-def test_the_python_call_is_the_loop():
+def test_the_python_call_is_the_loop(tmp_path):
     arguments = dict(
         estimator=Linear(), samples=40, updates=1, steps=120, ddpg=DDPG, progress=Silent()
     )
@@ -144,6 +144,9 @@ def test_the_python_call_is_the_loop():
     assert found.model.predict(np.zeros((1, 2)), np.zeros((1, 1))).shape == (1, 2)
     assert len(repr(found)) < 200 and "<table" in found._repr_html_()
     assert list(found.to_dataframe()["name"]) == ["idealised", "difference"]
+    assert found.plot().axes
+    page = found.report(tmp_path / "page.html")
+    assert page == tmp_path / "page.html" and "closing the simulation gap" in page.read_text()
 
 
 def test_a_budget_that_teaches_nothing_is_refused():
