@@ -50,7 +50,7 @@ def read_arrays(path: str | Path, form: str) -> tuple[dict[str, Any], dict[str, 
         raise FileNotFoundError(f"{path} is not a file")
     try:
         with safe_open(path, "np") as file:
-            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+            arrays = {name: file.get_tensor(name) for name in list(file.keys())}
             texts = file.metadata() or {}
         metadata = {key: json.loads(text) for key, text in texts.items()}
         # Before version 0.2 every value had a key of its own.

@@ -131,7 +131,7 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray]]:
             raise _Unusable(
                 "a safetensors file, but not of this project: give one of residual.save"
             )
-        arrays = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+        arrays = {key: file.get_tensor(key) for key in list(file.keys())}
     header = json.loads(metadata[_KEY])
     if header["version"] != VERSION:
         raise _Unusable(
