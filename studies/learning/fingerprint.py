@@ -34,7 +34,7 @@ def code_of(*things: Any) -> dict[str, str]:
     """Hashes of the modules behind classes, functions and objects, and versions of libraries.
 
     Args:
-        things: Classes and functions, or instances of classes.
+        things: Classes and functions, instances of classes, or names of modules.
 
     Returns:
         By module the hash of its source; by library its version.
@@ -55,7 +55,20 @@ def code_of(*things: Any) -> dict[str, str]:
     return dict(sorted(found.items()))
 
 
+def modules_in(settings: Any) -> set[str]:
+    """The modules of all classes that ``settings_of`` has met, such as those of effects."""
+    if isinstance(settings, Mapping):
+        kind = settings.get("class")
+        found = {kind.partition(":")[0]} if isinstance(kind, str) else set()
+        return found.union(*(modules_in(value) for value in settings.values()))
+    inside = settings if isinstance(settings, list) else []
+    return set[str]().union(*(modules_in(one) for one in inside))
+
+
 def _modules_of(thing: Any) -> Iterator[str]:
+    if isinstance(thing, str):
+        yield thing
+        return
     kind = thing if isinstance(thing, type | types.FunctionType) else type(thing)
     if isinstance(kind, type):
         yield from (base.__module__ for base in kind.__mro__[:-1])
@@ -171,7 +184,7 @@ def settings_of(value: Any, seen: tuple[int, ...] = ()) -> Any:
         return _function(value, seen)
     if isinstance(value, types.MethodType):
         return [settings_of(value.__self__, seen), value.__func__.__qualname__]
-    kind = f"{type(value).__module__}.{type(value).__qualname__}"
+    kind = f"{type(value).__module__}:{type(value).__qualname__}"
     if isinstance(value, BaseEstimator):
         return {"class": kind, **settings_of(value.get_params(deep=False), seen)}
     spec = getattr(value, "spec", None)

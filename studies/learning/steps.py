@@ -23,7 +23,7 @@ from residual.uncertainty_penalty import PenalisedTask
 from simgap_files import jsonable
 from sims.simulator import Simulator
 from sims.system import System
-from studies.learning.fingerprint import settings_of
+from studies.learning.fingerprint import modules_in, settings_of
 from studies.learning.results import Measured, Model, Samples
 from studies.learning.streams import seeded, stream
 from studies.learning.training import Training, exploration, train, transitions, visited
@@ -272,6 +272,6 @@ class Steps:
         return parts + [part for part in given if part is not None]
 
     def _kept(self, name: str, settings: Any, compute: Any, load: Any, *code: Any) -> Any:
-        return self.keeper.run(
-            name, {**self._common, **settings}, [*self._code, *code], compute, load
-        )
+        everything = {**self._common, **settings}
+        roots = [*self._code, *code, *sorted(modules_in(everything))]
+        return self.keeper.run(name, everything, roots, compute, load)

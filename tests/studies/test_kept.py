@@ -127,3 +127,24 @@ def test_a_killed_step_is_computed_again_and_cleaned_up(tmp_path):
     assert made.text == "whole"
     assert [path.name for path in root.iterdir() if path.is_dir()] == [made.key]
     assert json.loads((root / made.key / "step.json").read_text())["files"]
+
+
+def test_settings_tell_values_arrays_and_classes_of_parts():
+    import numpy as np
+
+    from sims.effects import ViscousFriction
+    from sims.pendulum import Pendulum
+    from studies.learning.fingerprint import modules_in, settings_of
+
+    rubbing, free = Pendulum().with_effects([ViscousFriction("pivot", 1e-4)]), Pendulum()
+    assert settings_of(rubbing) != settings_of(free)
+    assert ViscousFriction.__module__ in modules_in(settings_of(rubbing))
+    before = settings_of(free)
+    free.step(np.ones((5, 2)), np.ones((5, 1)))
+    assert settings_of(free) == before
+    one, other = np.arange(2000.0), np.arange(2000.0)
+    other[1000] += 1e-9
+    assert settings_of({"a": one}) != settings_of({"a": other})
+    gain = 2.0
+    assert settings_of(lambda x: gain * x) != settings_of(lambda x: gain * x + 1)
+    json.dumps(settings_of([rubbing, one, {1, 2}, Path("a"), Text, None, lambda x: one]))
