@@ -5,9 +5,9 @@ import pytest
 from sklearn.ensemble import ExtraTreesRegressor
 
 from residual import GaussianProcess
-from residual.caution import CautiousTask
 from residual.difference import DifferenceModel
 from residual.trajectories import Transitions
+from residual.uncertainty_penalty import PenalisedTask
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
 
@@ -24,7 +24,7 @@ def near_hanging():
 
 def test_pays_less_away_from_the_data(near_hanging):
     model = DifferenceModel(GaussianProcess(), PendulumEquation()).fit(near_hanging)
-    cautious = CautiousTask.around(SwingUp(), model, near_hanging, 2.0)
+    cautious = PenalisedTask.around(SwingUp(), model, near_hanging, 2.0)
     known = near_hanging.states[:5], near_hanging.actions[:5]
     far = np.array([[0.0, 6.0]]), np.zeros((1, 1))
 
@@ -41,4 +41,4 @@ def test_pays_less_away_from_the_data(near_hanging):
 def test_needs_a_standard_deviation(near_hanging):
     model = DifferenceModel(ExtraTreesRegressor(2), PendulumEquation()).fit(near_hanging)
     with pytest.raises(ValueError, match="predicts no standard deviation"):
-        CautiousTask.around(SwingUp(), model, near_hanging, 1.0)
+        PenalisedTask.around(SwingUp(), model, near_hanging, 1.0)

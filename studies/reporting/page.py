@@ -6,9 +6,9 @@ import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
+from simgap_files import atomic_write_text
 from studies.reporting.render import render
 from studies.reporting.sections import Section
-from studies.running.files import atomic_write_text
 
 
 @dataclasses.dataclass(frozen=True)

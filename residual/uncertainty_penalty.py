@@ -19,7 +19,7 @@ from sims.tasks import Task
 
 
 @dataclasses.dataclass(frozen=True)
-class CautiousTask(Task):
+class PenalisedTask(Task):
     """A task whose reward falls as the difference model becomes less sure than on its data.
 
     r - weight * max(0, u - 1), where u is the standard deviation of the predicted difference
@@ -41,7 +41,7 @@ class CautiousTask(Task):
     def around(
         cls, task: Task, difference: DifferenceModel, data: Transitions, weight: float
     ) -> Self:
-        """A cautious task that knows the typical spread from the rows fitted to.
+        """A penalised task that knows the typical spread from the rows fitted to.
 
         Raises:
             ValueError: The estimator predicts no standard deviation.
@@ -50,7 +50,7 @@ class CautiousTask(Task):
         if std is None:
             raise ValueError(
                 f"{type(difference.estimator).__name__} predicts no standard deviation, which "
-                "caution needs: use an estimator with predict(X, return_std=True), or caution 0"
+                "uncertainty_penalty needs: use an estimator with predict(X, return_std=True), or 0"
             )
         typical = np.median(std, axis=0)
         return cls(task, difference, np.where(typical > 0, typical, np.inf), weight)

@@ -1,5 +1,7 @@
 """What was simulated is learnt from again as the newest difference model would have it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from residual.trajectories import Transitions
 from sims.environment import SimulatorEnv
 from sims.pendulum import Pendulum
 from sims.tasks import SwingUp
-from studies.learning.simulated import FILE, Recorder, recorded, remember
+from studies.learning.warm_start import Recorder, WarmStart
 
 SMALL = DDPGConfig(hidden=(8, 8), batch=8, warm_up=10_000, replay=20_000)
 
@@ -25,12 +27,19 @@ def correction(seed):
     return CorrectedSimulator(Pendulum(), DifferenceModel(Linear(), Pendulum()).fit(data))
 
 
-def learnt_in(simulator, folder, steps=300):
+def learnt_in(simulator, steps=300):
+    """An agent, and its training with what the simulator below said."""
     env = SimulatorEnv(simulator, SwingUp())
-    recorded = Recorder(env)
+    recorder = Recorder(env)
     agent = DDPG.for_env(env, SMALL)
-    agent.learn(recorded, steps)
-    recorded.save(folder / FILE, getattr(simulator, "difference", None))
+    agent.learn(recorder, steps)
+    simulated = recorder.taken(getattr(simulator, "difference", None))
+    return agent, SimpleNamespace(learner=agent, simulated=simulated)
+
+
+def filled(env, *trainings, **options):
+    agent = DDPG.for_env(env, SMALL)
+    WarmStart(trainings[-1], "all", trainings).fill(agent, env, **options)
     return agent
 
 
@@ -39,32 +48,37 @@ def rows(agent):
 
 
 @pytest.mark.parametrize("simulator", [Pendulum(), correction(0)], ids=["plain", "corrected"])
-def test_the_same_simulator_gives_back_the_replay(simulator, tmp_path):
-    agent = learnt_in(simulator, tmp_path)
-    again = DDPG.for_env(SimulatorEnv(simulator, SwingUp()), SMALL)
-    remember(again, SimulatorEnv(simulator, SwingUp()), [tmp_path])
+def test_the_same_simulator_gives_back_the_replay(simulator):
+    agent, training = learnt_in(simulator)
+    again = filled(SimulatorEnv(simulator, SwingUp()), training)
     np.testing.assert_allclose(rows(again), rows(agent), atol=2e-5)
 
 
-def test_another_simulator_says_what_it_would_have_done(tmp_path):
-    for k, simulator in enumerate([Pendulum(), correction(0)]):
-        (tmp_path / str(k)).mkdir()
-        learnt_in(simulator, tmp_path / str(k))
-    newest = correction(1)
-    env = SimulatorEnv(newest, SwingUp())
-    agent = DDPG.for_env(env, SMALL)
-    remember(agent, env, [tmp_path / "0", tmp_path / "1"])
-    assert len(agent.replay) == recorded([tmp_path / "0", tmp_path / "1"]) == 600
+def test_another_simulator_says_what_it_would_have_done():
+    trainings = [learnt_in(simulator)[1] for simulator in (Pendulum(), correction(0))]
+    env = SimulatorEnv(correction(1), SwingUp())
+    agent = filled(env, *trainings)
+    assert len(agent.replay) == WarmStart(trainings[-1], "all", tuple(trainings)).rows == 600
     check_rows(rows(agent), env)
 
 
-def test_a_simulator_that_is_no_sum_simulates_it_again(tmp_path):
-    learnt_in(Pendulum(), tmp_path)
-    env = SimulatorEnv(Pendulum.true(), SwingUp())
-    agent, done = DDPG.for_env(env, SMALL), []
-    remember(agent, env, [tmp_path], again=True, tell=done.append)
+def test_a_simulator_that_is_no_sum_simulates_it_again():
+    env, done = SimulatorEnv(Pendulum.true(), SwingUp()), []
+    agent = filled(env, learnt_in(Pendulum())[1], again=True, tell=done.append)
     assert done == [300]
     check_rows(rows(agent), env)
+
+
+def test_the_papers_rule_repeats_the_first_update_as_it_was():
+    first = correction(0)
+    env = SimulatorEnv(first, SwingUp())
+    agent, recorder = DDPG.for_env(env, SMALL), Recorder(env)
+    agent.learn(recorder, 300)
+    training = SimpleNamespace(learner=agent, simulated=recorder.taken())
+    again = DDPG.for_env(env, SMALL)
+    newest = SimulatorEnv(correction(1), SwingUp())
+    WarmStart(training, "first").then(training).fill(again, newest)
+    np.testing.assert_allclose(rows(again), rows(agent), atol=2e-5)
 
 
 def check_rows(stored, env):

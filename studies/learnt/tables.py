@@ -1,4 +1,4 @@
-"""The tidy tables of a gap study: one row per policy, and one per measurement of accuracy."""
+"""Tidy tables: one row per policy, and one per measurement of accuracy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any
 
 import pandas as pd
 
-from studies.running.files import atomic_path, atomic_write_json, atomic_write_text
+from simgap_files import atomic_path, atomic_write_json, atomic_write_text
+from studies.learnt.words import measures_of
 
 # Policies of trials that differ in these only are the same, or stand in rows of their own.
 _IN_COLUMNS = {
@@ -85,11 +86,15 @@ def policy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     )
 
 
+def policy_frame(policies: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """One row per policy of one trial."""
+    return pd.DataFrame([_policy(policy) for policy in policies])
+
+
 def _policy(record: Mapping[str, Any]) -> dict[str, Any]:
     """A policy's record without its curve, and with the means of its tests by measure."""
     flat = {name: value for name, value in record.items() if name not in ("curve", "tests")}
-    tests = pd.DataFrame(record.get("tests", [])).drop(columns="return", errors="ignore")
-    return flat | {str(name): value for name, value in tests.mean().items()}
+    return flat | measures_of(record)
 
 
 def accuracy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
@@ -112,6 +117,7 @@ def accuracy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
             for trial in results
             for record in trial["accuracy"]
             for where in ("visited", "uniform")
+            if where in record
         ]
     )
 
@@ -121,5 +127,6 @@ def _trial(trial: Mapping[str, Any]) -> dict[str, Any]:
         "estimator": trial["label"],
         "seed": trial["seed"],
         "samples_per_update": trial["config"]["budget"]["true_samples"],
+        "made_by": trial.get("versions", {}).get("simgap", ""),
         **({"settings": trial["settings"]} if "settings" in trial else {}),
     }

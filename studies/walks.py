@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from jsonargparse.typing import NonNegativeFloat, PositiveInt
 
-from policy.ddpg import DDPG
 from policy.evaluate import collect
+from policy.learner import load_policy
 from policy.noise import OrnsteinUhlenbeck
 from sims.environment import SimulatorEnv
 from sims.leo import Leo, Walking
@@ -24,7 +24,7 @@ SHORTEST = 14
 
 def write_walks(
     folder: Path,
-    policy: Path,
+    policy: str | Path,
     torso_mass: float = 1.25,
     friction: NonNegativeFloat = 0.03,
     transitions: PositiveInt = 1000,
@@ -36,7 +36,8 @@ def write_walks(
 
     Args:
         folder: Where to.
-        policy: An agent that walks: ``policies/idealised.safetensors`` of studies.leo_gap.
+        policy: Of ``policies/`` that studies.leo_gap leaves, or the import path of one of your own,
+            with ``act`` or ``predict``.
         torso_mass: kg; 0.94226 is the idealised Leo.
         friction: Viscous friction of all joints, N m s/rad.
         transitions: Control steps of 0.03 s in all; those of episodes shorter than 14 steps are
@@ -51,7 +52,7 @@ def write_walks(
     leo = Leo(torso_mass, friction, substeps=SUBSTEPS)
     env = SimulatorEnv(leo, Walking(start_at="around"))
     rng = np.random.default_rng(seed)
-    walker = DDPG.load(policy).policy
+    walker = load_policy(policy)
     noise = OrnsteinUhlenbeck(6, exploration, 0.15, rng)
     names = [channel.name for channel in leo.state_channels]
     spread = np.repeat([PLACE, ANGLE, RATE], [2, 7, 9])
