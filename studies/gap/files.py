@@ -54,6 +54,8 @@ def write_gap(
         about = "# The simulator with what find_gap added; loadable as --simulator corrected.yaml\n"
         text = yaml.safe_dump(corrected, sort_keys=False)
         atomic_write_text(stage / CORRECTED, about + text)
+        for name, content in result.corrected.own_files().items():
+            (stage / name).write_bytes(content)
         write_report(result, record, stage)
         atomic_write_json(stage / JSON, record)
     return Path(folder)
