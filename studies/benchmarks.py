@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from simgap_files import atomic_write_json, atomic_write_text, read_json
 from studies.running.command import Parser, fail
-from studies.running.files import atomic_write_json, atomic_write_text, read_json
 from studies.timing.fit_scaling import write_figure
 from studies.timing.tables import SCALING, records, tables
 

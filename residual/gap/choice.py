@@ -9,17 +9,18 @@ on logs that the rule had not been made with; see docs/find-gap.md.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 from residual.gap.search import Key, Search
 
 #: Part of the remaining error that an effect must take off: over all joints, or at one of several.
 MATERIAL, AT_ONE = 0.2, 1 / 3
 #: And of the nominal error.
-TRIFLE = 0.02
+TRIFLE = 0.005
 #: Forecasts so many times as bad are not as good, whatever the chance is.
 NEAR = 1.5
-#: Differences of relative errors below this are none.
-SAME = 0.01
+#: Differences of relative errors below this are none, nor such below a part of the best error.
+SAME, ALIKE = 0.01, 0.1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,11 +38,12 @@ class Choice:
     minor: dict[int, Key]
 
 
-def choose(search: Search) -> Choice:
+def choose(search: Search, enough: Callable[[Key], bool] = lambda _: False) -> Choice:
     """The set with the fewest numbers among those that forecast best, each effect material.
 
     Args:
         search: Fitted and cross-validated sets.
+        enough: Whether a set leaves so little more than noise that no larger one is asked for.
     """
     open_ = search.usable()
     best = min(open_, key=search.error)
@@ -50,7 +52,7 @@ def choose(search: Search) -> Choice:
     minor: dict[int, Key] = {}
     while key:
         smaller = _smaller(search, key, open_)
-        short = next((k for k in smaller if not material(search, k, key)), None)
+        short = next((k for k in smaller if enough(k) or not material(search, k, key)), None)
         if short is None:
             break
         for number in set(key) - set(short):
@@ -81,10 +83,10 @@ def _smaller(search: Search, key: Key, among: list[Key]) -> list[Key]:
 
 
 def as_good(search: Search, key: Key, best: Key) -> bool:
-    """Whether a set forecasts as well as the best: within a standard error, or a hundredth."""
+    """Whether a set forecasts as well as the best: within a standard error, or next to it."""
     squares = search.validated
     more, error = search.currency.difference(squares[key].squares, squares[best].squares)
-    return more <= max(error, SAME)
+    return more <= max(error, min(SAME, ALIKE * search.error(best)))
 
 
 def material(search: Search, smaller: Key, larger: Key) -> bool:

@@ -116,6 +116,8 @@ def near(
         if len(rival) != len(key) or not rest < set(rival) or fresh == {number}:
             continue
         (other,) = fresh
+        if search.contains(other, number):
+            continue  # the same law with more freedom
         family = search.family(number)
         alike = bool(family) and search.family(other) == family
         label = search.candidates[other].label

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.beam import run
 from residual.gap.candidates import Candidate
 from residual.gap.choice import Choice, choose, reasons
 from residual.gap.fitting import Fit, Fitter, Left
@@ -18,6 +19,8 @@ from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
+#: Residual over noise below which a remainder is a footnote.
+FOOTNOTE = 1.1
 #: Times that channels are weighed anew by what the best set leaves of them.
 ROUNDS = 3
 #: Change of a weight that is worth another search.
@@ -90,11 +93,11 @@ def explain(
     key: Key = ()
     for _ in range(ROUNDS):
         search = Search(simulator, pool, fitter, effort, tell, until)
-        search.run(seeds)
+        run(search, seeds)
         key = _best_explained(search)
         fresh, floor = weigh(fitter, search.tried[key])
         ratio = fresh.sigma / fitter.sigma
-        if (ratio > 1 / WORTH).all() and (ratio < WORTH).all():
+        if search.late or ((ratio > 1 / WORTH).all() and (ratio < WORTH).all()):
             break
         best = sorted(search.usable(), key=search.error)[:SEEDS]
         seeds = {k: search.tried[k].theta for k in {*best, key} if k}
@@ -112,7 +115,11 @@ def settle(search: Search, floor: Noise, key: Key) -> Explanation:
     fitter = search.fitter
     nominal_left = fitter.left(search.tried[()], floor)
     needed = np.inf
-    choice = choose(search)
+
+    def enough(key: Key) -> bool:
+        return fitter.left(search.tried[key], floor).ratio < FOOTNOTE
+
+    choice = choose(search, enough)
     for _ in range(EXCHANGES):
         quiet = [k for k in {(), choice.key, search.best()} if _quiet(search, k, floor)]
         if quiet:
@@ -121,13 +128,13 @@ def settle(search: Search, floor: Noise, key: Key) -> Explanation:
             choice = Choice(key, reasons(search, key), {})
         else:
             needed = np.inf
-            choice = choose(search)
+            choice = choose(search, enough)
             key = choice.key
         before = len(search.tried)
         search.add_exchanged(key, RIVALS)
         if len(search.tried) == before or search.late:
             break
-        if not quiet and choose(search).key == key:
+        if not quiet and choose(search, enough).key == key:
             break
     left = fitter.left(search.tried[choice.key], floor)
     return Explanation(search, choice, left, nominal_left, floor, needed)

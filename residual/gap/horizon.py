@@ -10,6 +10,8 @@ from residual.gap.smooth import LEAD
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
+#: Spread of an angle that turns and turns.
+TURNING = np.pi / np.sqrt(3)
 #: Part of the usual period of the motion.
 PART = 1 / 3
 #: Windows that the records should at least be good for.
@@ -43,7 +45,7 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
             if other.name == channel.rate_of
         ):
             continue
-        period = _period(trajectories, column)
+        period = _period(trajectories, column, channel.angle)
         if np.isfinite(period):
             periods.append(period)
     wanted = PART * float(np.median(periods)) if periods else 20 * simulator.dt
@@ -51,9 +53,10 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
     return float(max(min(wanted, most), (1 - LEAD) * SAMPLES * step))
 
 
-def _period(trajectories: Sequence[Trajectory], column: int) -> float:
+def _period(trajectories: Sequence[Trajectory], column: int, angle: bool) -> float:
     """Of a sine that moves as far and as fast as a channel, NaN if it stands still."""
     spread, speed, count = 0.0, 0.0, 0
+    most = TURNING if angle else np.inf
     for run in trajectories:
         values, times = run.states[:, column], run.times
         known = np.isfinite(values)
@@ -63,7 +66,7 @@ def _period(trajectories: Sequence[Trajectory], column: int) -> float:
         # Differences over several samples: noise must not pass for speed.
         lag = max(1, len(values) // 60)
         rates = (values[lag:] - values[:-lag]) / (times[lag:] - times[:-lag])
-        spread += float(((values - values.mean()) ** 2).sum())
+        spread += len(values) * min(float(values.std()), most) ** 2
         speed += float((rates**2).mean()) * len(values)
         count += len(values)
     if not count or speed <= 0 or spread <= 0:

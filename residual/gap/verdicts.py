@@ -11,8 +11,6 @@ from residual.gap.search import Search
 
 #: Families that an effect may be mistaken for and still be worth a name.
 MOST_FAMILIES = 3
-#: Residual over noise beyond which a remainder is told as such; below it is a footnote.
-FOOTNOTE = 1.1
 
 
 def nameable(search: Search, claim: Claim, blocks: int) -> bool:
@@ -27,7 +25,9 @@ def families(search: Search, claim: Claim) -> set[str]:
     """
     numbers = {candidate.label: i for i, candidate in enumerate(search.candidates)}
     own = search.family(claim.number) or search.candidates[claim.number].label
-    return {own} | {search.family(numbers[label]) or label for label in claim.rivals}
+    # A rival that was not offered has a label only.
+    known = [search.family(numbers[label]) if label in numbers else "" for label in claim.rivals]
+    return {own} | {family or label for family, label in zip(known, claim.rivals, strict=True)}
 
 
 def effect_verdict(

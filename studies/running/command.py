@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import copy
+import functools
 import importlib
 import inspect
 import itertools
 import json
 import platform
 import re
+import subprocess
 import sys
 from argparse import RawDescriptionHelpFormatter
 from collections.abc import Mapping, Sequence
@@ -141,5 +143,19 @@ def class_label(chosen: Mapping[str, Any]) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of Python, of this package and of what the numbers depend on."""
-    found = {"python": platform.python_version(), "simgap": metadata.version("simgap")}
+    found = {"python": platform.python_version(), "simgap": own_version()}
     return found | {package: metadata.version(package) for package in _PACKAGES}
+
+
+@functools.cache
+def own_version() -> str:
+    """The version of this package, and in a checkout the commit, with a plus if files differ."""
+    version, root = metadata.version("simgap"), Path(__file__).parents[2]
+    if not (root / ".git").exists():
+        return version
+    command = ["git", "-C", str(root), "describe", "--always", "--dirty=+", "--exclude=*"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return version
+    return f"{version} ({done.stdout.strip()})"
