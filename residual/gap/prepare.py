@@ -31,6 +31,8 @@ ROBUST = 4.0
 FINEST = 1e-5
 #: Windows that are fitted: where all rows advance at once, and row by row.
 AT_ONCE, BY_ROW = 120, 40
+#: States in all windows of a row together: every state costs a simulation more.
+STATES = 400
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,7 +114,7 @@ def smooth_fitter(
     seconds = horizon / (1 - LEAD)
     windows = cut(samples, floor.slope.by_state, _foreseen(simulator, samples, scale), seconds)
     moving = np.array(noise.driven_states(model))
-    most = AT_ONCE if simulator.advances_rows_at_once else BY_ROW
+    most = min(AT_ONCE, STATES // len(scale)) if simulator.advances_rows_at_once else BY_ROW
     grouped = blocks(samples, windows, drive(samples, nodes, moving), most)
     start = SmoothFitter(samples, grouped, nodes, floor.slope.by_state, floor.sigma, scale)
     nominal = start.fit(model, np.zeros(0))
