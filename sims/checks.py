@@ -127,6 +127,12 @@ def _contract(
         "rows in another order differ",
     )
     yield from _turns(simulator, states, actions, following)
+    if simulator.action_channels:
+        yield _bounds(simulator, states, actions)
+
+
+def _bounds(simulator: Simulator, states: Array, actions: Array) -> Finding:
+    """Actions beyond their bounds must act like their bounds."""
     beyond = [
         channel.high + 1.0 if np.isfinite(channel.high) else column
         for channel, column in zip(simulator.action_channels, actions[0], strict=True)
@@ -143,7 +149,7 @@ def _contract(
         if clipped
         else (f"the action {beyond} does not act like its bound {edge}; use check_rows in step")
     )
-    yield Finding("bounds", clipped, says)
+    return Finding("bounds", clipped, says)
 
 
 def _turns(
@@ -234,7 +240,9 @@ def _row(
 def _draw(simulator: Simulator, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
     """Random rows within the scales of the channels; memory as it would be after rest."""
 
-    actions = np.stack([random_values(c, n, rng) for c in simulator.action_channels], axis=1)
+    actions = np.empty((n, len(simulator.action_channels)))  # a system may have none
+    for column, action in enumerate(simulator.action_channels):
+        actions[:, column] = random_values(action, n, rng)
     states = [
         np.zeros(n) if channel.kind == "memory" else random_values(channel, n, rng)
         for channel in simulator.state_channels

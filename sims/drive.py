@@ -9,14 +9,12 @@ it, every jump inside a sub-step would leave a lasting error of the position.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal
 
 import numpy as np
 
+from sims.compiled import compiled
 from sims.effects.actuator import ActuatorEffect, ActuatorLag, Delay, StaticActuatorEffect
-from sims.simulator import Array
-
-Hold = Literal["zero", "linear"]
+from sims.simulator import Array, Hold
 
 
 def column(value: float | Array) -> float | Array:
@@ -136,16 +134,13 @@ def lagged(
     behind = rises / ratio[..., None]
     first, last = means - 0.5 * rises - behind, means + 0.5 * rises - behind
     gained = last - first * stays[..., None]
-    # Only from interval to interval is it a recursion in Python; inside, all rows at once.
+    # Only from interval to interval is it a recursion; inside, all rows at once.
     added = np.zeros_like(ratio)
     for i in range(substeps):
         added = added * stays + gained[:, :, i]
-    kept = stays**substeps
-    begins = np.empty_like(ratio)
-    y = np.array(np.broadcast_to(start, len(means)), float)
-    for k in range(ratio.shape[1]):
-        begins[:, k] = y
-        y = kept[:, k] * y + added[:, k]
+    begins, y = _carried(
+        stays**substeps, added, np.array(np.broadcast_to(start, len(means)), float)
+    )
     share, tilt = -np.expm1(-ratio) / ratio, _tilt(ratio)
     filtered, tilted = np.empty_like(means), np.empty_like(means)
     now = begins
@@ -155,6 +150,17 @@ def lagged(
         tilted[:, :, i] = rises[:, :, i] + lack * tilt
         now = stays * now + gained[:, :, i]
     return filtered, tilted, y
+
+
+@compiled
+def _carried(kept: Array, added: Array, start: Array) -> tuple[Array, Array]:
+    """Values before each interval of ``y = kept y + added``, and those after the last."""
+    before, y = np.empty_like(kept), start.copy()
+    for i in range(len(kept)):
+        for k in range(kept.shape[1]):
+            before[i, k] = y[i]
+            y[i] = kept[i, k] * y[i] + added[i, k]
+    return before, y
 
 
 def _tilt(ratio: Array) -> Array:

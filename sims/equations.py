@@ -12,11 +12,13 @@ import numpy as np
 from sims.effects.base import Effect
 from sims.effects.friction import DryFriction
 from sims.host import HostSimulator, Joint
+from sims.motion import Motion, advance_smoothly
+from sims.rows import State
 from sims.simulator import Array, Channel, Parameter
-from sims.sliding import Motion, State, advance, advance_smoothly
+from sims.sliding import advance
 
 # Rows advanced together: many enough to hide Python, few enough to stay in the cache.
-BLOCK = 2048
+BLOCK = 4096
 
 
 class EquationOfMotion(HostSimulator):
@@ -38,6 +40,7 @@ class EquationOfMotion(HostSimulator):
     dt = 0.02
     substeps = 10
     parameters: Mapping[str, Parameter] = {}
+    advances_rows_at_once = True
 
     def __init__(
         self,
@@ -125,9 +128,12 @@ class EquationOfMotion(HostSimulator):
             edge = 0.5 * np.asarray(play.width)
             state.x[i] = np.clip(state.x[i], -edge, edge)
         h = np.asarray(durations, float) / inputs.shape[1]
-        move = advance if motion.dry or motion.plays else advance_smoothly
-        for u in substep_ends(inputs):
-            state = move(motion, state, u, h)
+        ends = substep_ends(inputs)
+        if motion.dry or motion.plays:
+            state = advance(motion, state, ends, h)
+        else:
+            for u in ends:
+                state = advance_smoothly(motion, state, u, h)
         after = np.empty_like(states)
         after[:, self._positions] = state.q.T
         after[:, self._rates] = state.v.T
@@ -139,18 +145,18 @@ class EquationOfMotion(HostSimulator):
         forces = [(names.index(e.joint), e) for e in self.joint_effects()]
 
         # The system's author sees rows first.
-        def acceleration(q: Array, v: Array, u: Array, f: Array, p: dict[str, Any]) -> Array:
-            found = self.acceleration(q.T, v.T, u.T, f.T, SimpleNamespace(**p))
+        def acceleration(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
+            found = self.acceleration(q.T, v.T, u.T, f.T, p)
             return _by_joint(found, q.shape, "acceleration")
 
-        def drive_force(q: Array, v: Array, u: Array, p: dict[str, Any]) -> Array:
-            found = self.drive_force(q.T, v.T, u.T, SimpleNamespace(**p))
+        def drive_force(q: Array, v: Array, u: Array, p: SimpleNamespace) -> Array:
+            found = self.drive_force(q.T, v.T, u.T, p)
             return _by_joint(found, q.shape, "drive_force")
 
         return Motion(
             acceleration,
             drive_force,
-            self.parameter_values(),
+            SimpleNamespace(**self.parameter_values()),
             smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
             dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
             plays=tuple((names.index(e.joint), e) for e in self.plays()),
@@ -171,6 +177,7 @@ class FirstOrderSystem(HostSimulator):
     dt = 1.0
     substeps = 5
     parameters: Mapping[str, Parameter] = {}
+    advances_rows_at_once = True
 
     def __init__(
         self,
@@ -233,14 +240,15 @@ def substep_ends(inputs: Array) -> Array:
 
 def _by_joint(found: Any, shape: tuple[int, ...], what: str) -> Array:
     """What the system's author returned, rows last; checked, since broadcasting hides errors."""
-    found = np.array(found, dtype=float)
+    found = np.asarray(found, dtype=float)
     if found.shape != shape[::-1]:
         raise ValueError(
             f"{what} returned shape {found.shape}, expected {shape[::-1]}: one row for each "
             "state. Compute with columns such as q[:, 0], since parameters are scalars or "
             "shape (n,), and stack the results on axis 1"
         )
-    return np.ascontiguousarray(found.T)
+    # A copy, since it may be one of the arrays that the author was given.
+    return np.array(found.T, order="C")
 
 
 def _joint(rate: Channel, channels: Sequence[Channel]) -> Joint:

@@ -10,42 +10,22 @@ from __future__ import annotations
 import abc
 import copy
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sims import drive as path
+from sims.actuation import memory_channels, next_inputs, recorded_inputs, with_memory
+from sims.drive import lagged
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
-from sims.effects.base import Effect
+from sims.effects.base import Effect, place
 from sims.effects.joint import JointEffect
 from sims.effects.parameter import ParameterChange
-from sims.effects.sensor import SensorEffect
-from sims.simulator import Array, Channel, Simulator, random_values
-
-
-@dataclasses.dataclass(frozen=True)
-class Joint:
-    """A generalized coordinate that a force can act on.
-
-    Args:
-        name: Its name in effects and reports.
-        position: State channel of its position.
-        rate: State channel of its rate; None for a state of a first-order system, where a
-            "force" is a rate of change.
-        unit: Unit of the force, ``"N m"`` or ``"N"``.
-        scale: A typical force, or None to leave it to the simulator.
-        driven: False if no actuator acts on it, so that it cannot have backlash.
-    """
-
-    name: str
-    position: str
-    rate: str | None
-    unit: str
-    scale: float | None = None
-    driven: bool = True
+from sims.effects.sensor import through_sensors
+from sims.simulator import Array, Channel, Hold, Simulator, random_values
+from sims.simulator import Joint as Joint
 
 
 class HostSimulator(Simulator):
@@ -62,6 +42,9 @@ class HostSimulator(Simulator):
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
         has_contacts: True if motion jumps at impacts, so that it can be compared with logs over
             short windows only (``residual.gap.contact``).
+        advances_rows_at_once: True if ``integrate`` advances all rows together, each with its own
+            values of effects and parameters, so that a batch costs little more than a row.
+        lagged: How an input with a lag acts in sub-steps, see ``sims.drive.lagged``.
     """
 
     effects: tuple[Effect, ...] = ()
@@ -69,6 +52,8 @@ class HostSimulator(Simulator):
     substeps: int
     has_drive_force: bool = False
     has_contacts: bool = False
+    advances_rows_at_once: bool = False
+    lagged = staticmethod(lagged)
 
     @abc.abstractmethod
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
@@ -103,6 +88,18 @@ class HostSimulator(Simulator):
         """
         return np.stack([random_values(c, n, rng) for c in self.physical_channels], axis=1)
 
+    def offered_effects(self) -> tuple[Effect, ...] | None:
+        """What may be missing by default (``sims.effects.library``); None for all it can host."""
+        return None
+
+    def own_files(self) -> dict[str, bytes]:
+        """It as files of the format that it came from, by name, for tools that read that format."""
+        return {}
+
+    def not_in_own_files(self) -> tuple[str, ...]:
+        """What those files cannot hold, or hold a little differently, one line each."""
+        return ()
+
     # -- what it is made of ---------------------------------------------------------------
 
     @property
@@ -126,7 +123,7 @@ class HostSimulator(Simulator):
         changed.state_channels = self.physical_channels
         for effect in changed.effects:
             effect.measures(changed)
-        changed.state_channels += tuple(changed._memory_channels())
+        changed.state_channels += tuple(memory_channels(changed))
         return changed
 
     def with_parameters(self, **values: float | Array) -> Self:
@@ -139,6 +136,22 @@ class HostSimulator(Simulator):
             name: dataclasses.replace(parameter, value=values.get(name, parameter.value))
             for name, parameter in self.parameters.items()
         }
+        return changed
+
+    def with_hold(self, hold: Mapping[str, Hold]) -> Self:
+        """A copy in which some inputs run otherwise between samples, ``{"torque": "linear"}``.
+
+        Raises:
+            ValueError: There is no such input, or no such hold.
+        """
+        inputs = {channel.name: channel for channel in self.action_channels}
+        for name, kind in hold.items():
+            channel = place("actuator", name, inputs)
+            if kind not in ("zero", "linear"):
+                raise ValueError(f"hold of {name!r} is {kind!r}, expected 'zero' or 'linear'")
+            inputs[name] = dataclasses.replace(channel, hold=kind)
+        changed = copy.copy(self)
+        changed.action_channels = tuple(inputs.values())
         return changed
 
     def take(self, index: Any) -> Self:
@@ -162,8 +175,9 @@ class HostSimulator(Simulator):
         return values
 
     def joint_effects(self) -> list[JointEffect]:
-        """The forces among the effects that are not at zero strength."""
-        return [e for e in self.effects if isinstance(e, JointEffect) and not e.absent]
+        """The forces among the effects that are not at zero strength, in their simplest parts."""
+        effects = [e for e in self.effects if isinstance(e, JointEffect) and not e.absent]
+        return [part for effect in effects for part in effect.parts()]
 
     def plays(self) -> list[Backlash]:
         """The backlashes that are not at zero strength."""
@@ -181,24 +195,51 @@ class HostSimulator(Simulator):
 
     def step(self, states: ArrayLike, actions: ArrayLike) -> Array:
         """Advance every row by one control period; see ``Simulator.step``."""
-        states, actions = self.check_rows(states, actions)
-        if not self.effects:
+        return self._step(*self.check_rows(states, actions))
+
+    def rollout(self, start: ArrayLike, actions: ArrayLike) -> Array:
+        """Step through a sequence of actions; see ``Simulator.rollout``.
+
+        An input whose channel says ``hold="linear"`` runs straight from every action to the next
+        and holds the last; ``step``, which knows no next action, holds it.
+        """
+        if all(channel.hold == "zero" for channel in self.action_channels):
+            return super().rollout(start, actions)
+        start, actions = np.asarray(start, float), np.asarray(actions, float)
+        single = start.ndim == 1
+        if single:
+            start, actions = start[None], actions[None]
+        states = np.empty((len(start), actions.shape[1] + 1, start.shape[1]))
+        states[:, 0] = start
+        last = actions.shape[1] - 1
+        for k in range(last + 1):
+            now = self.check_rows(states[:, k], actions[:, k])
+            upcoming = self._clip(actions[:, min(k + 1, last)])
+            states[:, k + 1] = self._step(*now, upcoming)
+        return states[0] if single else states
+
+    def _step(self, states: Array, actions: Array, upcoming: Array | None = None) -> Array:
+        if not self.effects and upcoming is None:
             inputs = np.repeat(actions[:, None, :], self.substeps, axis=1)
-            return self.integrate(states, inputs, np.full(len(states), self.dt))
+            return self._move(states, inputs, np.full(len(states), self.dt))
         own = len(self.integrated_channels)
         following = np.empty_like(states)
-        inputs, following[:, own:] = self._inputs(states[:, own:], actions)
+        inputs, following[:, own:] = next_inputs(self, states[:, own:], actions, upcoming)
         durations = np.full(len(states), self.dt)
-        true = self.integrate(self.unsense(states[:, :own]), inputs, durations)
+        true = self._move(self.unsense(states[:, :own]), inputs, durations)
         following[:, :own] = self.sense(true)
         return following
+
+    def _move(self, states: Array, inputs: Array, durations: Array) -> Array:
+        """What ``step`` integrates with; a subclass may have something slower of record."""
+        return self.integrate(states, inputs, durations)
 
     def drive(
         self,
         actions: ArrayLike,
         durations: ArrayLike,
         substeps: int | None = None,
-        hold: path.Hold = "zero",
+        hold: Hold | Sequence[Hold] | None = None,
         before: ArrayLike | None = None,
         rises: bool = False,
     ) -> Array:
@@ -209,7 +250,8 @@ class HostSimulator(Simulator):
             durations: shape (T,), lengths of the intervals in seconds.
             substeps: Sub-steps per interval; by default the simulator's own.
             hold: Whether a command is held over its interval (``"zero"``) or runs straight to
-                the next (``"linear"``).
+                the next (``"linear"``): one for all inputs or one for each; by default what
+                every channel says.
             before: shape (k, n_a), earlier commands, as far apart as the first interval is
                 long; without them the input is taken to have had its first value.
             rises: Whether to tell how the input runs within sub-steps too. ``integrate`` is
@@ -231,41 +273,26 @@ class HostSimulator(Simulator):
                 f"actions have shape {actions.shape}, expected {expected}: a row for each of "
                 "the durations, which must be positive, and a column for each input"
             )
-        substeps = substeps or self.substeps
+        if hold is None or isinstance(hold, str):
+            hold = [hold or channel.hold for channel in self.action_channels]
+        if len(hold) != len(self.action_channels):
+            raise ValueError(f"hold has {len(hold)} entries for {len(self.action_channels)} inputs")
         earlier = np.empty((0, actions.shape[1])) if before is None else np.asarray(before, float)
         k = len(earlier)
         durations = np.concatenate([np.full(k, durations[:1]), durations])
         commands = self._clip(np.concatenate([earlier, actions]))
-        columns = []
-        for j, channel in enumerate(self.action_channels):
-            effects = self.actuator_effects(channel.name)
-            samples = path.shaped(commands[None, :, j], effects)
-            late = path.total_delay(effects)
-            if np.ndim(late):
-                samples = np.broadcast_to(samples, (len(np.asarray(late)), samples.shape[1]))
-            means, rise = path.substep_inputs(samples, durations, substeps, late, hold)
-            for lag in path.lags(effects):
-                shape = (lag.rows or len(means), *means.shape[1:])
-                means, rise = np.broadcast_to(means, shape), np.broadcast_to(rise, shape)
-                start = np.broadcast_to(samples[:, 0], len(means))
-                means, rise, _ = path.lagged(means, rise, durations, lag.time_constant, start)
-            columns.append((np.stack([means, rise], axis=-1) if rises else means)[:, k:])
+        inputs = recorded_inputs(self, commands, durations, substeps or self.substeps, hold)
+        inputs = inputs[:, k:] if rises else inputs[:, k:, ..., 0]
         rows = {e.rows for e in self.effects if isinstance(e, ActuatorEffect)} - {None}
-        if not columns:
-            shape = (len(actions), substeps, 0)
-            return np.empty((*shape, 2) if rises else shape)
-        inputs = np.stack(np.broadcast_arrays(*columns), axis=3)
-        if not rows:
-            return inputs[0]
-        return np.broadcast_to(inputs, (rows.pop() or 1, *inputs.shape[1:]))
+        return np.broadcast_to(inputs, (rows.pop() or 1, *inputs.shape[1:])) if rows else inputs[0]
 
     def sense(self, states: Array) -> Array:
         """What the sensors read of true states, (n, n_i) -> (n, n_i)."""
-        return self._sensors(states, forward=True)
+        return through_sensors(self, states, forward=True)
 
     def unsense(self, states: Array) -> Array:
         """True states from what the sensors read: the inverse of ``sense``."""
-        return self._sensors(states, forward=False)
+        return through_sensors(self, states, forward=False)
 
     def augment(self, states: ArrayLike, actions: ArrayLike | None = None) -> Array:
         """Physical states with a sensible memory of the effects appended.
@@ -279,94 +306,10 @@ class HostSimulator(Simulator):
             closed on the side that the drive pushes to.
         """
         states = np.asarray(states, float)
-        n, physical = states.shape
-        actions = np.zeros((n, len(self.action_channels))) if actions is None else actions
-        actions = self._clip(np.asarray(actions, float))
-        full = np.zeros((n, len(self.state_channels)))
-        full[:, :physical] = states
-        received = np.empty_like(actions)
-        at = physical + len(self.plays())
-        for j, channel in enumerate(self.action_channels):
-            effects = self.actuator_effects(channel.name)
-            received[:, j] = path.shaped(actions[:, j : j + 1], effects)[:, 0]
-            kept = self._history(channel.name)
-            full[:, at : at + kept] = actions[:, j : j + 1]
-            at += kept
-            count = len(path.lags(effects))
-            full[:, at : at + count] = received[:, j : j + 1]
-            at += count
-        if self.plays():
-            names = [joint.name for joint in self.joints]
-            sides = np.sign(self.drive_forces(states, received))
-            for i, play in enumerate(self.plays()):
-                full[:, physical + i] = 0.5 * play.width * sides[:, names.index(play.joint)]
-        return full
-
-    # -- details --------------------------------------------------------------------------
+        if actions is None:
+            actions = np.zeros((len(states), len(self.action_channels)))
+        return with_memory(self, states, self._clip(np.asarray(actions, float)))
 
     def _clip(self, actions: Array) -> Array:
         low = [channel.low for channel in self.action_channels]
         return np.clip(actions, low, [channel.high for channel in self.action_channels])
-
-    def _history(self, actuator: str) -> int:
-        """Past commands that the delays of an input reach back to."""
-        late = path.total_delay(self.actuator_effects(actuator))
-        return int(np.ceil(np.max(late) / self.dt - 1e-9))
-
-    def _memory_channels(self) -> Iterable[Channel]:
-        channels = {channel.name: channel for channel in self.state_channels}
-        joints = {joint.name: joint for joint in self.joints}
-        for play in self.plays():
-            position = channels[joints[play.joint].position]
-            yield Channel(f"{play.joint} play", position.unit, "memory", scale=position.scale)
-        for channel in self.action_channels:
-            for k in range(self._history(channel.name), 0, -1):
-                past = f"{channel.name} {k} ago"
-                yield Channel(past, channel.unit, "memory", scale=channel.scale)
-            for i, _ in enumerate(path.lags(self.actuator_effects(channel.name))):
-                name = f"{channel.name} lagged" + (f" {i + 1}" if i else "")
-                yield Channel(name, channel.unit, "memory", scale=channel.scale)
-
-    def _inputs(self, memory: Array, actions: Array) -> tuple[Array, Array]:
-        """Effective inputs of one control period and the memory after it."""
-        inputs = np.repeat(actions[:, None, :], self.substeps, axis=1)
-        if not any(isinstance(effect, ActuatorEffect) for effect in self.effects):
-            return inputs, memory
-        inputs = np.stack([inputs, np.zeros_like(inputs)], axis=-1)
-        after = np.empty_like(memory)
-        at = 0
-        for j, channel in enumerate(self.action_channels):
-            effects = self.actuator_effects(channel.name)
-            if not effects:
-                continue
-            kept = self._history(channel.name)
-            commands = np.concatenate([memory[:, at : at + kept], actions[:, j : j + 1]], axis=1)
-            after[:, at : at + kept] = commands[:, 1:]
-            at += kept
-            means, rises = path.substep_inputs(
-                path.shaped(commands, effects),
-                np.full(kept + 1, self.dt),
-                self.substeps,
-                path.total_delay(effects),
-                "zero",
-            )
-            means, rises = means[:, -1:], rises[:, -1:]
-            for lag in path.lags(effects):
-                means, rises, after[:, at] = path.lagged(
-                    means, rises, np.array([self.dt]), lag.time_constant, memory[:, at]
-                )
-                at += 1
-            inputs[:, :, j] = np.stack([means[:, 0], rises[:, 0]], axis=-1)
-        return inputs, after
-
-    def _sensors(self, states: Array, forward: bool) -> Array:
-        effects = [e for e in self.effects if isinstance(e, SensorEffect) and not e.absent]
-        if not effects:
-            return states
-        states = np.array(states, float)
-        names = [channel.name for channel in self.physical_channels]
-        for effect in sorted(effects, key=lambda effect: effect.stage, reverse=not forward):
-            column = names.index(effect.channel)
-            change = effect.read if forward else effect.undo
-            states[:, column] = change(states[:, column])
-        return states

@@ -1,63 +1,163 @@
-"""The rate of one driven joint while its position stands still: half of a leapfrog.
+"""A driven joint of fixed inertia, row by row, compiled: leapfrog with exact stops.
 
-Dry friction and play make the rate's equation non-smooth. Here it is solved for one sub-step
-from event to event: Runge-Kutta 4 between them, and each located by false position.
+The angle moves at a constant rate and the rate is kicked in between, which is how Pymunk steps a
+body. Dry friction and play make the rate's equation non-smooth: each kick is solved from event
+to event, Runge-Kutta 4 between them, and each located by false position.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Sequence
+import math
+from typing import NamedTuple
 
-from sims.effects.friction import DryFriction
-from sims.effects.joint import JointEffect
+import numpy as np
+
+from sims.compiled import call_at, compiled
+from sims.driven import DrivenJoint, Field
+from sims.simulator import Array
 
 MOST_EVENTS = 6
 
+# How a mode of motion can end.
+LETS_GO, LOWER, STOPS, UPPER = range(4)
 
-@dataclasses.dataclass(frozen=True)
-class DrivenJoint:
-    """A joint of fixed inertia with a motor; scalars, SI units.
+
+class Mode(NamedTuple):
+    """What holds between two events: a constant load and input, sliding or stuck, play or none."""
+
+    angle: float
+    load: float
+    u: float
+    slip: int
+    side: int
+    opened: bool
+    stuck: bool
+
+
+@compiled
+def swing_rows(
+    states: Array, inputs: Array, durations: Array, numbers: Array, springs: Array, waves: Array,
+    own: tuple[int, int, int],
+) -> Array:  # fmt: skip
+    """Every row after its duration.
 
     Args:
-        inertia: About the joint.
-        damping: Torque of the bearing per rate.
-        drive: Motor torque per input at rest.
-        back: Loss of motor torque per rate.
-        smooth: Effects that depend on the rate.
-        dry: Dry friction.
-        width: Play between motor and joint.
+        states: (n, 3): angle, rate, place in the play.
+        inputs: (n, 2 m): mean input in each half of m sub-steps.
+        durations: (n,) seconds.
+        numbers: (n, 12): ``DrivenJoint`` without addresses, then ``weight`` and ``constant``.
+        springs, waves: (n, k, 3), see ``Field``.
+        own: Addresses of ``DrivenJoint`` and ``Field``, the same for all rows.
+
+    Returns:
+        States at the end. Leapfrog errs in even powers of the sub-step; a second pass with twice
+        the sub-step removes the second.
     """
-
-    inertia: float
-    damping: float
-    drive: float
-    back: float
-    smooth: Sequence[JointEffect] = ()
-    dry: Sequence[DryFriction] = ()
-    width: float = 0.0
-
-    def limit(self, rate: float) -> float:
-        """Size of the dry friction."""
-        size = 0.0
-        for effect in self.dry:
-            size += float(effect.limit(abs(rate)))
-        return size
-
-    def push(self, rate: float, u: float) -> float:
-        """Torque of the motor."""
-        return self.drive * u - self.back * rate
-
-    def torque(self, angle: float, rate: float, load: float, u: float, opened: bool) -> float:
-        """Torque on the joint but for its dry friction."""
-        total = load - self.damping * rate
-        if not opened:
-            total += self.push(rate, u)
-        for effect in self.smooth:
-            total += float(effect.force(angle, rate))
-        return total
+    after = np.empty_like(states)
+    whole = np.empty(inputs.shape[1] // 2)
+    for i in range(len(states)):
+        for k in range(len(whole)):
+            whole[k] = 0.5 * (inputs[i, 2 * k] + inputs[i, 2 * k + 1])
+        a = numbers[i]
+        joint = DrivenJoint(
+            a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], own[0], own[1]
+        )  # fmt: skip
+        field = Field(a[10], a[11], springs[i], waves[i], own[2])
+        angle, rate, x = states[i]
+        fine = swing(joint, field, angle, rate, x, inputs[i], durations[i])
+        coarse = swing(joint, field, angle, rate, x, whole, durations[i])
+        for c in range(3):
+            after[i, c] = fine[c] + (fine[c] - coarse[c]) / 3
+        if joint.width > 0:
+            after[i, 2] = max(-0.5 * joint.width, min(0.5 * joint.width, after[i, 2]))
+    return after
 
 
+@compiled
+def swing(
+    joint: DrivenJoint,
+    field: Field,
+    angle: float,
+    rate: float,
+    x: float,
+    inputs: Array,
+    duration: float,
+) -> tuple[float, float, float]:
+    """Angle, rate and place in the play after a duration.
+
+    An angle that starts half a sub-step back is at the middle of the sub-step when the torque
+    acts; ``middle`` is that angle.
+    """
+    h = duration / len(inputs)
+    inverse = 1.0 / joint.inertia
+    behind = angle - 0.5 * h * rate
+    middle = angle + 0.5 * h * rate
+    kicked = joint.own_torque != 0 or joint.drag != 0 or joint.width > 0 or limit(joint, 0.0) > 0
+    # The torque that, held for h, has the effect of damping that follows the rate.
+    friction = joint.damping + joint.back
+    pull = joint.inertia * math.expm1(-friction / joint.inertia * h) / h
+    push = -pull / friction if friction > 0 else 1.0
+    for u in inputs:
+        load = field.weight * math.sin(middle) + standing(field, middle)
+        behind += h * rate
+        if not kicked:
+            rate += (pull * rate + push * (load + joint.drive * u)) * inverse * h
+        else:
+            wanted, x, moved = kick(joint, middle, rate, x, load, u, h)
+            # Held is held: no rate is left by rounding.
+            rate += joint.inertia * (wanted - rate) / h * inverse * h if wanted != 0 else -rate
+            behind += moved
+            middle += moved
+        middle += h * rate
+    return behind + 0.5 * h * rate, rate, x
+
+
+@compiled
+def standing(field: Field, angle: float) -> float:
+    """Torque of the effects that depend on the angle alone."""
+    total = field.constant
+    for k in range(len(field.springs)):
+        away = angle - field.springs[k, 1]
+        total -= field.springs[k, 0] * (away if field.springs[k, 2] == 1 else away * away * away)
+    for k in range(len(field.waves)):
+        turns = field.waves[k, 2] * angle
+        total += field.waves[k, 0] * math.sin(turns) + field.waves[k, 1] * math.cos(turns)
+    if field.own != 0:
+        total += call_at(field.own, angle, 0.0)
+    return total
+
+
+@compiled
+def limit(joint: DrivenJoint, rate: float) -> float:
+    """Size of the dry friction."""
+    size = joint.coulomb
+    if joint.sliding != 0 or joint.breakaway != 0:
+        ratio = rate / joint.speed
+        excess = max(joint.breakaway - joint.sliding, 0.0)
+        size += joint.sliding + excess * math.exp(-ratio * ratio)
+    if joint.own_limit != 0:
+        size += call_at(joint.own_limit, abs(rate), 0.0)
+    return size
+
+
+@compiled
+def pushing(joint: DrivenJoint, rate: float, u: float) -> float:
+    """Torque of the motor."""
+    return joint.drive * u - joint.back * rate
+
+
+@compiled
+def torque(joint: DrivenJoint, angle: float, rate: float, load: float) -> float:
+    """Torque on the joint but for its motor and its dry friction."""
+    total = load - joint.damping * rate
+    if joint.drag != 0:
+        total -= joint.drag * rate * abs(rate)
+    if joint.own_torque != 0:
+        total += call_at(joint.own_torque, angle, rate)
+    return total
+
+
+@compiled
 def kick(
     joint: DrivenJoint, angle: float, rate: float, x: float, load: float, u: float, h: float
 ) -> tuple[float, float, float]:
@@ -67,113 +167,109 @@ def kick(
     rate less ``h`` times the mean of its ends. Without events it is zero.
     """
     edge = 0.5 * joint.width
-    holds = joint.limit(0.0)
-    left = h
-    first, moved = rate, 0.0
+    holds = limit(joint, 0.0)
+    left, first, moved = h, rate, 0.0
+    slip, later, place = 0, rate, x
     for events in range(MOST_EVENTS, -1, -1):
-        pushing = joint.push(rate, u)
+        push = pushing(joint, rate, u)
         side = 0
         if joint.width > 0:
-            side = 1 if x >= edge and pushing >= 0 else -1 if x <= -edge and pushing <= 0 else 0
+            side = 1 if x >= edge and push >= 0 else -1 if x <= -edge and push <= 0 else 0
         opened = joint.width > 0 and side == 0
         slip = int(rate > 0) - int(rate < 0) if holds > 0 else 0
         if holds > 0 and rate == 0:
-            pull = joint.torque(angle, 0.0, load, u, opened)
+            pull = torque(joint, angle, 0.0, load) + (0.0 if opened else push)
             slip = int(pull > holds) - int(pull < -holds)
-        mode = _Mode(joint, angle, load, u, slip, side, opened, stuck=holds > 0 and slip == 0)
-        after = mode.after(rate, x, left)
-        over = [end for end in mode.ends() if mode.margin(end, *after) < 0]
-        if not over or events == 0:
+        mode = Mode(angle, load, u, slip, side, opened, holds > 0 and slip == 0)
+        later, place = after(joint, mode, rate, x, left)
+        share, end = left, -1
+        if events > 0:
+            # The first of the ends; what it makes zero is then made exactly zero.
+            for kind in range(4):
+                if margin(joint, mode, kind, later, place) < 0:
+                    time = time_of(joint, mode, kind, rate, x, left)
+                    if end < 0 or time < share:
+                        share, end = time, kind
+        if end < 0:
             break
         began = rate
-        # The first of the ends; what it makes zero is then made exactly zero.
-        share, end = min((mode.time_of(end, rate, x, left), end) for end in over)
-        rate, x = mode.after(rate, x, share)
-        if end == "stops":
+        rate, x = after(joint, mode, rate, x, share)
+        if end == STOPS:
             rate = 0.0
-        elif end == "lets go":
+        elif end == LETS_GO:
             # Just off the edge, or a push left by rounding would close the play again.
             x = side * edge * (1 - 1e-12)
         else:
-            x = edge if end == "upper" else -edge
+            x = edge if end == UPPER else -edge
         moved += 0.5 * share * (began + rate)
         left -= share
-    began, (rate, x) = rate, after
-    rate = 0.0 if slip * rate < 0 else rate
+    began = rate
+    rate = 0.0 if slip * later < 0 else later
     if left < h:
         moved += 0.5 * left * (began + rate) - 0.5 * h * (first + rate)
-    return rate, max(-edge, min(edge, x)), moved
+    return rate, max(-edge, min(edge, place)), moved
 
 
-@dataclasses.dataclass(frozen=True)
-class _Mode:
-    """What holds between two events: sliding or stuck, play closed on a side or open."""
-
-    joint: DrivenJoint
-    angle: float
-    load: float
-    u: float
-    slip: int
-    side: int
-    opened: bool
-    stuck: bool
-
-    def slope(self, rate: float) -> tuple[float, float]:
-        joint = self.joint
-        running = joint.push(rate, self.u) / joint.back if self.opened else 0.0
-        if self.stuck:
-            return 0.0, running
-        torque = joint.torque(self.angle, rate, self.load, self.u, self.opened)
-        if self.slip:
-            torque -= self.slip * joint.limit(rate)
-        return torque / joint.inertia, running
-
-    def after(self, rate: float, x: float, h: float) -> tuple[float, float]:
-        a1, b1 = self.slope(rate)
-        a2, b2 = self.slope(rate + 0.5 * h * a1)
-        a3, b3 = self.slope(rate + 0.5 * h * a2)
-        a4, b4 = self.slope(rate + h * a3)
-        return rate + h / 6 * (a1 + 2 * (a2 + a3) + a4), x + h / 6 * (b1 + 2 * (b2 + b3) + b4)
-
-    def ends(self) -> list[str]:
-        """The ways in which it can end."""
-        found = ["stops"] if self.slip else []
-        if self.side:
-            found.append("lets go")
-        return [*found, "upper", "lower"] if self.opened else found
-
-    def margin(self, end: str, rate: float, x: float) -> float:
-        """Positive while the mode lasts, negative beyond its end."""
-        if end == "stops":
-            return self.slip * rate
-        if end == "lets go":
-            return self.side * self.joint.push(rate, self.u)
-        edge = 0.5 * self.joint.width
-        return edge - x if end == "upper" else edge + x
-
-    def time_of(self, end: str, rate: float, x: float, h: float) -> float:
-        """When the mode ends, within ``h``."""
-        return _first_zero(lambda t: self.margin(end, *self.after(rate, x, t)), h)
+@compiled
+def slope(joint: DrivenJoint, mode: Mode, rate: float) -> tuple[float, float]:
+    """Acceleration, and speed in the play."""
+    push = pushing(joint, rate, mode.u)
+    running = push / joint.back if mode.opened else 0.0
+    if mode.stuck:
+        return 0.0, running
+    total = torque(joint, mode.angle, rate, mode.load)
+    if not mode.opened:
+        total += push
+    if mode.slip != 0:
+        total -= mode.slip * limit(joint, rate)
+    return total / joint.inertia, running
 
 
-def _first_zero(function: Callable[[float], float], end: float) -> float:
-    """Where a function that is positive just after 0 and negative at ``end`` is zero.
+@compiled
+def after(joint: DrivenJoint, mode: Mode, rate: float, x: float, h: float) -> tuple[float, float]:
+    """Rate and place in the play while the mode lasts, ``h`` seconds on."""
+    a1, b1 = slope(joint, mode, rate)
+    a2, b2 = slope(joint, mode, rate + 0.5 * h * a1)
+    a3, b3 = slope(joint, mode, rate + 0.5 * h * a2)
+    a4, b4 = slope(joint, mode, rate + h * a3)
+    return rate + h / 6 * (a1 + 2 * (a2 + a3) + a4), x + h / 6 * (b1 + 2 * (b2 + b3) + b4)
+
+
+@compiled
+def margin(joint: DrivenJoint, mode: Mode, end: int, rate: float, x: float) -> float:
+    """Positive while the mode lasts, negative beyond its end; 1 for an end that it cannot have."""
+    if end == STOPS:
+        return mode.slip * rate if mode.slip != 0 else 1.0
+    if end == LETS_GO:
+        return mode.side * pushing(joint, rate, mode.u) if mode.side != 0 else 1.0
+    if not mode.opened:
+        return 1.0
+    edge = 0.5 * joint.width
+    return edge - x if end == UPPER else edge + x
+
+
+@compiled
+def time_of(
+    joint: DrivenJoint, mode: Mode, end: int, rate: float, x: float, within: float
+) -> float:
+    """When a mode ends that has ended ``within`` seconds.
 
     False position with the Illinois rule; a start at zero is left behind first.
     """
-    low, high = 0.0, end
-    at_low, at_high = function(low), function(high)
+    low, high = 0.0, within
+    at_low = margin(joint, mode, end, rate, x)
+    at_high = margin(joint, mode, end, *after(joint, mode, rate, x, high))
     tiny = 1e-14 * abs(at_high)
     if at_low <= 0:
-        low = 1e-3 * end
-        at_low = function(low)
+        low = 1e-3 * within
+        at_low = margin(joint, mode, end, *after(joint, mode, rate, x, low))
         if at_low <= 0:
             return low
-    kept = 0
+    kept, middle = 0, high
     for _ in range(40):
         middle = (low * at_high - high * at_low) / (at_high - at_low)
-        found = function(middle)
-        if abs(found) <= tiny or high - low < 1e-14 * end:
+        found = margin(joint, mode, end, *after(joint, mode, rate, x, middle))
+        if abs(found) <= tiny or high - low < 1e-14 * within:
             return middle
         if found < 0:
             high, at_high = middle, found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import importlib
+import importlib.util
 import inspect
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,18 +16,21 @@ import yaml
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.host import HostSimulator
-from sims.simulator import Simulator
+from sims.simulator import Hold, Simulator
 
 #: In a list of effects: all that the simulator can host.
 LIBRARY = "library"
+
+#: Files that are a simulator by themselves, and the class that reads them.
+MODEL_FILES = {".xml": "sims.mujoco.MujocoSimulator", ".urdf": "sims.mujoco.MujocoSimulator"}
 
 
 def load_simulator(source: str | Path | Mapping[str, Any]) -> Simulator:
     """A simulator by its import path, its YAML file, or its ``class_path`` and ``init_args``.
 
     Args:
-        source: ``"sims.pendulum.Pendulum"``, a file such as ``"corrected.yaml"``, or what such a
-            file holds.
+        source: ``"sims.pendulum.Pendulum"``, a file such as ``"corrected.yaml"``, what such a
+            file holds, or a robot's ``.xml`` (MJCF) or ``.urdf``.
 
     Raises:
         ValueError: There is no such class or file, it is no simulator, or the settings are wrong.
@@ -40,30 +44,69 @@ def simulator_settings(source: str | Path | Mapping[str, Any]) -> dict[str, Any]
     return yaml.safe_load(text)["simulator"]
 
 
-def with_effects(simulator: HostSimulator, effects: list[Effect]) -> HostSimulator:
-    """A copy with these effects beside its own; for YAML, if a class takes no ``effects``."""
-    return simulator.with_effects([*simulator.effects, *effects])
+def model_settings(path: str | Path) -> dict[str, Any] | None:
+    """``class_path`` and ``init_args`` for a robot's model file; None for any other.
+
+    The path is made absolute, so that what is saved loads from any folder.
+    """
+    kind = MODEL_FILES.get(Path(path).suffix.lower())
+    if kind is None:
+        return None
+    return {"class_path": kind, "init_args": {"model": str(Path(path).expanduser().resolve())}}
 
 
-def corrected_settings(settings: Mapping[str, Any], effects: Sequence[Effect]) -> dict[str, Any]:
+def with_effects(
+    simulator: HostSimulator,
+    effects: list[Effect] | None = None,
+    hold: dict[str, Hold] | None = None,
+    substeps: int | None = None,
+) -> HostSimulator:
+    """A copy with these effects beside its own; for YAML, whatever arguments its class takes.
+
+    Args:
+        simulator: What is changed.
+        effects: What acts beside its own effects.
+        hold: How inputs run between samples, by channel; see ``HostSimulator.with_hold``.
+        substeps: Sub-steps per control period, if not the simulator's own.
+    """
+    changed = simulator.with_effects([*simulator.effects, *(effects or ())]).with_hold(hold or {})
+    changed.substeps = substeps or changed.substeps
+    return changed
+
+
+def corrected_settings(
+    settings: Mapping[str, Any],
+    effects: Sequence[Effect],
+    hold: Mapping[str, Hold] | None = None,
+    substeps: int | None = None,
+) -> dict[str, Any]:
     """Settings of a simulator with effects beside its own, for ``load_simulator``.
 
     Args:
         settings: Of the simulator without them, see ``simulator_settings``.
         effects: With scalar values; they come back bit for bit.
+        hold, substeps: As for ``with_effects``.
     """
     added = [effect_settings(effect) for effect in effects]
     arguments = dict(settings.get("init_args") or {})
+    changed: dict[str, Any] = {}
+    if hold:
+        changed["hold"] = dict(hold)
+    if substeps:
+        changed["substeps"] = substeps
+    own = f"{__name__}.{with_effects.__name__}"
     # A function that makes the simulator, such as with_effects, may have effects of its own.
-    if isinstance(arguments.get("effects"), list):
+    if isinstance(arguments.get("effects"), list) and (
+        settings["class_path"] == own or not changed
+    ):
         arguments["effects"] = [*arguments["effects"], *added]
-        return {"class_path": settings["class_path"], "init_args": arguments}
-    if not added:
+        if hold:
+            changed["hold"] = {**(arguments.get("hold") or {}), **hold}
+        return {"class_path": settings["class_path"], "init_args": {**arguments, **changed}}
+    if not added and not changed:
         return dict(settings)
-    return {
-        "class_path": f"{__name__}.{with_effects.__name__}",
-        "init_args": {"simulator": dict(settings), "effects": added},
-    }
+    changed = {"effects": added, **changed}
+    return {"class_path": own, "init_args": {"simulator": dict(settings), **changed}}
 
 
 def effect_settings(effect: Effect) -> dict[str, Any]:
@@ -166,11 +209,46 @@ def _parser() -> jsonargparse.ArgumentParser:
 
 def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
     # A copy, since the parser changes nested lists of what it is given.
-    value = copy.deepcopy(dict(source)) if isinstance(source, Mapping) else str(source)
+    value: Any = copy.deepcopy(dict(source)) if isinstance(source, Mapping) else str(source)
+    if isinstance(value, str):
+        value = model_settings(value) or value
     try:
         return _parser().parse_object({"simulator": value})
     except (jsonargparse.ArgumentError, TypeError) as error:
-        raise ValueError(f"simulator {source}: {_one_line(error)}") from None
+        lacking = _not_found(value)
+        raise ValueError(f"simulator {source}: {lacking or _one_line(error)}") from None
+
+
+def _not_found(source: str | Mapping[str, Any]) -> str:
+    """Which module of a class path, or of a YAML file of them, Python cannot find; or nothing."""
+    settings: Any = source
+    if isinstance(source, str) and Path(source).suffix in (".yaml", ".yml"):
+        if not Path(source).is_file():
+            return "there is no such file"
+        settings = yaml.safe_load(Path(source).read_text(encoding="utf-8"))
+    for path in _class_paths(settings):
+        module = path.partition(".")[0]
+        if module and importlib.util.find_spec(module) is None:
+            return (
+                f"there is no module {module!r} for {path}; start Python in the folder that "
+                "holds it, or name that folder in PYTHONPATH"
+            )
+    return ""
+
+
+def _class_paths(settings: Any) -> list[str]:
+    """Every import path of a class in settings, from the outside in."""
+    if isinstance(settings, str):
+        return [settings]
+    if isinstance(settings, list):
+        return [
+            path for entry in settings if not isinstance(entry, str) for path in _class_paths(entry)
+        ]
+    if not isinstance(settings, Mapping):
+        return []
+    found = [str(settings["class_path"])] if "class_path" in settings else []
+    nested = [v for v in settings.values() if isinstance(v, Mapping | list)]
+    return found + [path for entry in nested for path in _class_paths(entry)]
 
 
 def _one_line(error: Exception) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+Hold = Literal["zero", "linear"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,6 +32,10 @@ class Channel:
         low, high: Bounds; only inputs are clipped to them.
         invariant: True if the motion is the same wherever the channel is (how far a walker
             has come): policies and difference models need not see it.
+        hold: How an input runs between two samples of a record: held (``"zero"``), as commands
+            are, or straight to the next (``"linear"``), as most measured inputs are.
+        integrates: Name of the measured channel that this one is the integral of, as a heading
+            may be summed up from a yaw rate: its noise is then a random walk.
     """
 
     name: str
@@ -42,6 +47,30 @@ class Channel:
     low: float = -math.inf
     high: float = math.inf
     invariant: bool = False
+    hold: Hold = "zero"
+    integrates: str | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Joint:
+    """A generalized coordinate that a force can act on.
+
+    Args:
+        name: Its name in effects and reports.
+        position: State channel of its position.
+        rate: State channel of its rate; None for a state of a first-order system, where a
+            "force" is a rate of change.
+        unit: Unit of the force, ``"N m"`` or ``"N"``.
+        scale: A typical force, or None to leave it to the simulator.
+        driven: False if no actuator acts on it, so that it cannot have backlash.
+    """
+
+    name: str
+    position: str
+    rate: str | None
+    unit: str
+    scale: float | None = None
+    driven: bool = True
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +78,8 @@ class Parameter:
     """A physical parameter that a simulator declares: value, unit, meaning and bounds.
 
     ``value`` may be an array with one entry per row of a batch. ``scale`` is a typical size, for
-    a parameter whose value is zero; otherwise the value tells.
+    a parameter whose value is zero; otherwise the value tells. ``family`` is that of the effects
+    which a change of it resembles, ``"dissipation"`` for a damping (``sims.effects.Effect``).
     """
 
     value: float | Array
@@ -58,6 +88,7 @@ class Parameter:
     low: float = -math.inf
     high: float = math.inf
     scale: float = 1.0
+    family: str = ""
 
 
 class Simulator(abc.ABC):

@@ -1,12 +1,13 @@
 """Find where a simulator and measured logs disagree, and name the effect that is missing.
 
 The command reads the logs, asks whether there is a gap above the noise, looks for the named
-physical effect that explains it, adds it, and confirms it on held-out data. The answer is
-printed; gap.json, report.html and corrected.yaml go into the output folder.
+physical effects that explain it, and confirms them by forecasts of data that did not fit their
+numbers. The answer is printed; gap.json, report.html and corrected.yaml go into the output folder.
 
   python -m studies.find_gap --simulator sims.pendulum.Pendulum --logs run.csv --output results/gap
   python -m studies.find_gap --simulator my_file.MyArm --logs a.csv b.parquet --output results/gap
-  python -m studies.find_gap --simulator my_arm.yaml --columns columns.yaml --logs a.csv --output g
+  python -m studies.find_gap ... --held-out fast.csv --minutes 5
+  python -m studies.find_gap ... --columns columns.yaml --hold "{torque: linear}"
   python -m studies.find_gap ... --effects library my_file.FanTorque --tolerance 0.01
 
 No log at hand? `python -m studies.make_log --output logs` measures a pendulum whose mass the
@@ -17,7 +18,6 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -28,11 +28,14 @@ from jsonargparse.typing import PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
 from residual.logs import LogData, LogFormat, read_logs
+from residual.step_check import advice
+from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
-from sims.simulator import Simulator
-from studies.gap.files import CORRECTED, REPORT, write_gap
-from studies.gap.words import summary
+from sims.simulator import Hold, Simulator
+from studies.gap.files import CORRECTED, REPORT, check_folder, write_gap
+from studies.gap.progress import Heartbeat
+from studies.gap.summary import found_in_data, summary
 from studies.running.command import HelpFormatter, Parser, fail
 
 
@@ -41,24 +44,27 @@ class GapStudy:
     """What the answer depends on.
 
     Args:
-        simulator: The nominal simulator: an import path, or a YAML file with class_path and
-            init_args.
+        simulator: The nominal simulator: an import path, a robot's model (.xml, .urdf), or a YAML
+            file with class_path and init_args.
         columns: Which column of the logs holds what: settings, or a YAML file of them. By
             default columns are named like the simulator's channels.
         tolerance: Forecast error that does not matter, in the unit of the first measured
             position.
-        hold: How inputs run between samples: held ("zero"), as commands are, or straight to
-            the next ("linear"), as most measured inputs are.
-        horizon: Forecast length in s; by default 20 control periods.
-        seed: Of everything random.
+        hold: How inputs run between samples: held ("zero"), as commands are, straight to the next
+            ("linear"), as most inputs measured at the actuator are, or whichever the nominal
+            simulator fits better ("auto"); for all inputs or by name, {torque: linear}. What
+            happens before an input said to be "linear" (dead zone, lag) is no candidate.
+        horizon: Forecast length in s that matters to you; by default a quarter of the usual
+            period of the motion.
+        minutes: Time budget; what has not been tried by then is left out.
     """
 
     simulator: Simulator
     columns: LogFormat = dataclasses.field(default_factory=LogFormat)
     tolerance: PositiveFloat | None = None
-    hold: Literal["zero", "linear"] = "zero"
+    hold: Literal["auto", "zero", "linear"] | dict[str, Literal["zero", "linear"]] = "auto"
     horizon: PositiveFloat | None = None
-    seed: int = 0
+    minutes: PositiveFloat = 2.0
 
 
 def build_parser() -> Parser:
@@ -74,7 +80,13 @@ def build_parser() -> Parser:
         type=str,
         nargs="+",
         required=True,
-        help="Log files: CSV and other text, Parquet, NPZ.",
+        help="Logs: CSV and other text, Parquet, NPZ, MCAP, HDF5, folders of LeRobot or Minari.",
+    )
+    parser.add_argument(
+        "--held-out",
+        type=str,
+        nargs="+",
+        help="Log files set aside: never used to find the answer, only for the last table.",
     )
     parser.add_argument(
         "--output", type=Path, required=True, help="Folder for the report and the numbers."
@@ -123,32 +135,61 @@ def run(
         {**copy.deepcopy(dict(settings)), "output": str(output), "jobs": jobs}
     )
     plain = yaml.safe_load(parser.dump(chosen, format="yaml", skip_unset=False))
-    config = {key: plain[key] for key in (*_FIELDS, "logs", "effects")}
+    config = {key: plain[key] for key in (*_FIELDS, "logs", "held_out", "effects")}
     made = parser.instantiate(chosen)
     study = GapStudy(**{name: made[name] for name in _FIELDS})
     simulator = hosting(study.simulator)
-    effects = chosen_effects(simulator, chosen.effects)
-    if Path(output).exists() and not Path(output).is_dir():
-        raise ValueError(f"--output {output} is a file, expected a folder")
-    data = read(simulator, chosen.logs, study.columns)
+    hold = holds(simulator, study.hold)
+    effects = not_upstream(chosen_effects(simulator, chosen.effects), hold)
+    check_folder(Path(output))
+    # In whatever order the files come, not one digit of the answer changes.
+    data = read(simulator, sorted(chosen.logs), study.columns)
+    held = apart(simulator, chosen.logs, chosen.held_out or [], study.columns)
     rows = sum(len(run.times) for run in data.trajectories)
     count = len(data.trajectories)
     tell(f"{count} {'trajectory' if count == 1 else 'trajectories'}, {rows} samples")
+    for line in found_in_data([*data.findings, *(held.findings if held else ())]):
+        tell(line)
+    for line in advice(simulator, data.trajectories):
+        tell(line)
     result = find_gap(
         simulator,
         data.trajectories,
+        held=held.trajectories if held else (),
         tolerance=study.tolerance,
         effects=effects,
-        hold=study.hold,
-        measured_input=study.hold == "linear",
+        hold=hold or None,
         horizon=study.horizon,
-        rng=study.seed,
+        minutes=study.minutes,
         n_jobs=jobs,
         progress=tell,
     )
     tell("writing the report")
-    write_gap(result, output, config, data.findings, time.perf_counter() - begin)
+    findings = [*data.findings, *(held.findings if held else ())]
+    write_gap(result, output, config, findings, time.perf_counter() - begin)
     return result
+
+
+def holds(simulator: HostSimulator, hold: str | Mapping[str, Hold]) -> dict[str, Hold]:
+    """What the user says of every input, by name; empty if the data are to decide.
+
+    Raises:
+        ValueError: There is no such input.
+    """
+    if hold == "auto":
+        return {}
+    names = [channel.name for channel in simulator.action_channels]
+    if isinstance(hold, Mapping):
+        unknown = ", ".join(name for name in hold if name not in names)
+        if unknown:
+            raise ValueError(f"--hold: no input {unknown}; there are {', '.join(names) or 'none'}")
+        return dict(hold)
+    return {name: "linear" if hold == "linear" else "zero" for name in names}
+
+
+def not_upstream(effects: Sequence[Effect], hold: Mapping[str, Hold]) -> tuple[Effect, ...]:
+    """Effects without those whose consequence a measured input ("linear") holds already."""
+    return tuple(e for e in effects if not (e.upstream_of_sensor and hold.get(e.where) == "linear"))
 
 
 def hosting(simulator: Simulator) -> HostSimulator:
@@ -170,24 +211,41 @@ def read(simulator: HostSimulator, logs: Sequence[str], columns: LogFormat) -> L
     return read_logs(logs, simulator.physical_channels, simulator.action_channels, columns)
 
 
+def apart(
+    simulator: HostSimulator, logs: Sequence[str], held_out: Sequence[str], columns: LogFormat
+) -> LogData | None:
+    """The logs that were set aside, if any.
+
+    Raises:
+        ValueError: One of them is used to find the answer, too.
+    """
+    if not held_out:
+        return None
+    used = {Path(log).resolve() for log in logs}
+    both = [log for log in held_out if Path(log).resolve() in used]
+    if both:
+        raise ValueError(f"{both[0]} is in --logs and in --held-out, expected it in one of them")
+    return read(simulator, sorted(held_out), columns)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
-    begin = time.perf_counter()
-
-    def tell(text: str) -> None:
-        print(f"{time.perf_counter() - begin:6.1f} s  {text}", file=sys.stderr, flush=True)
-
     parser = build_parser()
     given = parser.parse_args(arguments)
     settings = yaml.safe_load(parser.dump(given, format="yaml", skip_unset=False))
     output, jobs = Path(settings.pop("output")), settings.pop("jobs")
     settings.pop("config", None)
     try:
-        result = run(settings, output, jobs, tell)
+        with Heartbeat(60 * settings["minutes"]) as tell:
+            result = run(settings, output, jobs, tell)
     except (ValueError, OSError) as error:
         fail(str(error))
-    print(f"\n{summary(result)}\n\nreport:              {output / REPORT}")
+    print(f"\n{summary(result, settings['tolerance'])}\n\nreport:              {output / REPORT}")
     print(f"corrected simulator: {output / CORRECTED}")
+    for name in result.corrected.own_files():
+        print(f"corrected model:     {output / name}")
+    for line in result.corrected.not_in_own_files():
+        print(f"  only in {CORRECTED}: {line}")
 
 
 _FIELDS = tuple(field.name for field in dataclasses.fields(GapStudy))

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from residual.gap.samples import Samples
 from sims.effects.base import Effect, Quantity
+from sims.effects.joint import JointEffect
+from sims.effects.library import typical
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -98,6 +100,8 @@ def candidates(
     for effect in effects:
         if effect.enters == "sensor" and effect.where not in measured:
             continue
+        if _follows_unseen(effect, simulator, measured):
+            continue
         known = _within_reach(effect, effect.quantities(simulator), simulator, samples)
         whole = {n: q for n, q in known.items() if q.integer and q.role == "shape"}
         for values in itertools.product(*(q.starts for q in whole.values())):
@@ -107,6 +111,22 @@ def candidates(
                 reach = float(np.abs(samples.actions[:, inputs.index(effect.where)]).max())
             found.append(_candidate(fixed, known, reach))
     return found
+
+
+def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]) -> bool:
+    """Whether a force depends on a position that nobody measured.
+
+    The start state of every window is free, so that such a force has a free size in each of them,
+    and would explain anything.
+    """
+    joint = next((j for j in simulator.joints if j.name == effect.where), None)
+    if not isinstance(effect, JointEffect) or joint is None or joint.position in measured:
+        return False
+    there = typical(effect, simulator)
+    assert isinstance(there, JointEffect)
+    size = effect.measures(simulator)["position"][1] if joint.rate else 1.0
+    places = size * np.array([-0.7, 0.0, 0.4, 1.0])
+    return bool(np.ptp(there.force(places, np.zeros(4))) > 0)
 
 
 def _within_reach(

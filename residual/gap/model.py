@@ -11,7 +11,6 @@ from residual.gap.candidates import Candidate
 from residual.gap.samples import Samples
 from residual.gap.workers import integrate
 from sims.effects.backlash import Backlash
-from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -45,7 +44,7 @@ class Model:
         self.physical = len(simulator.physical_channels)
         self.width = len(simulator.integrated_channels) + plays
         self.free = list(range(self.physical))
-        self.batched = isinstance(simulator, EquationOfMotion | FirstOrderSystem)
+        self.batched = simulator.advances_rows_at_once
         enters = [c.effect.enters for c in self.chosen]
         self._actuator = np.array(
             [enters[i] == "actuator" and not isinstance(self.chosen[i].effect, Backlash)
@@ -112,15 +111,10 @@ class Model:
                 self._drives.clear()
             host = self.bind(theta)
             parts = []
-            for start, stop in samples.runs:
-                part = host.drive(
-                    samples.actions[start:stop],
-                    samples.durations[start:stop],
-                    samples.substeps,
-                    hold=samples.hold,
-                    rises=True,
-                )
-                parts.append(part if part.ndim == 5 else part[None])
+            fine = max(1, samples.substeps // samples.stride)
+            for run, recorded in enumerate(samples.recorded):
+                part = host.drive(recorded.actions, recorded.durations, fine, rises=True)
+                parts.append(samples.in_intervals(run, part if part.ndim == 5 else part[None]))
             rows = max(len(part) for part in parts)
             parts = [np.broadcast_to(p, (rows, *p.shape[1:])) for p in parts]
             self._drives[key] = (samples, np.concatenate(parts, axis=1))
@@ -196,15 +190,33 @@ class Model:
         return host.sense(np.array(states).reshape(variants * n, width)).reshape(states.shape)
 
     def roll(
-        self, samples: Samples, rows: NDArray[np.int64], states: Array, steps: int, theta: Array
-    ) -> Array:
-        """Open loop from states (k, width) at some rows, shape (k, steps + 1, width)."""
-        driven = self.inputs(samples, theta[None])[0]
-        host = self.bind(theta)
+        self, samples: Samples, rows: NDArray[np.int64], states: Array, steps: int, theta: Array,
+        which: NDArray[np.int64] | None = None,
+    ) -> Array:  # fmt: skip
+        """Open loop from states (k, width) at some rows, shape (k, steps + 1, width).
+
+        Args:
+            samples: Gives inputs and durations.
+            rows: Where each starts, (k,).
+            states: Where from.
+            steps: Intervals.
+            theta: Unknowns, (p,), or several vectors of them, (V, p).
+            which: Which of the vectors each row has, (k,).
+        """
+        thetas = np.atleast_2d(theta)
+        if which is None or len(thetas) == 1 or not len(self):
+            thetas, which = thetas[:1], np.zeros(len(rows), np.int64)
+            host = self.bind(thetas[0])
+        else:
+            host = self.bind(thetas[which])
+        driven = self.inputs(samples, thetas)
+        if len(driven) == 1:
+            which = np.zeros(len(rows), np.int64)
         path = np.repeat(states[:, None], steps + 1, axis=1)
         for k in range(steps):
+            at = np.minimum(rows + k, len(samples) - 1)
             path[:, k + 1] = self._integrate(
-                host, path[:, k], driven[rows + k], samples.durations[rows + k]
+                host, path[:, k], driven[which, at], samples.durations[at]
             )
         return path
 

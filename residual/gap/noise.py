@@ -16,20 +16,29 @@ Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True)
-class Floor:
-    """What a smooth missing force cannot explain.
+class Noise:
+    """Sensor noise.
 
     Attributes:
         sigma: Noise of every measured channel, (m,).
         error: Standard error of each sigma, (m,).
+    """
+
+    sigma: Array
+    error: Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Floor(Noise):
+    """What a smooth missing force cannot explain.
+
+    Attributes:
         nodes: Smoothed state at every sample, (n, n_s).
         slope: Derivatives at the nodes.
         force: Missing acceleration (rate of change for first-order states) at every sample,
             (n, number of driven states).
     """
 
-    sigma: Array
-    error: Array
     nodes: Array
     slope: Slope
     force: Array
@@ -52,40 +61,6 @@ def push(model: Model, samples: Samples) -> Array:
         if channels[column].kind == "rate" and channels[column].rate_of in names:
             effect[:, names.index(str(channels[column].rate_of)), j] = 0.5 * samples.durations**2
     return effect
-
-
-def first_path(model: Model, samples: Samples, theta: Array) -> Array:
-    """Nodes straight from the measurement; an unmeasured rate by central differences."""
-    channels = model.simulator.physical_channels
-    names = [c.name for c in channels]
-    nodes = np.array(samples.seen[:, : len(channels)])
-    for start, stop in samples.runs:
-        rows = slice(start, stop)
-        for i, channel in enumerate(channels):
-            column = nodes[rows, i]
-            good = np.isfinite(column)
-            if not good.any() and channel.kind == "rate" and channel.rate_of in names:
-                position = nodes[rows, names.index(channel.rate_of)]
-                column[:] = np.gradient(position, samples.times[rows])
-            elif not good.any():
-                column[:] = 0.0
-            elif not good.all():
-                at = samples.times[rows]
-                column[~good] = np.interp(at[~good], at[good], column[good])
-    if model.has_sensor:
-        nodes = model.bind(theta).unsense(nodes)
-    return model.widen(samples, nodes, theta)
-
-
-def variation(samples: Samples, nodes: Array, length: int = 25) -> Array:
-    """Typical variation of each state within ``length`` samples, to scale states."""
-    spreads = []
-    for start, stop in samples.runs:
-        for a in range(start, max(stop - length, start + 1), length):
-            spreads.append(nodes[a : min(a + length, stop)].std(axis=0))
-    spread = np.median(spreads, axis=0)
-    typical = nodes.std(axis=0)
-    return np.maximum(spread, np.maximum(1e-3 * typical, 1e-9))
 
 
 def estimate(

@@ -8,22 +8,34 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.confirm import Span
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
-Kind = Literal["confirmed", "ambiguous", "needs_data", "unexplained", "no_gap"]
+Kind = Literal["confirmed", "ambiguous", "minor", "needs_data", "unexplained", "no_gap"]
+#: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
+#: between folds or with the numerics, lies at its bound, or an effect of another kind does as well.
+Doubt = Literal["not_needed", "unsteady", "numerics", "at_bound", "rivals"]
 
 
 @dataclasses.dataclass(frozen=True)
 class Number:
-    """A fitted number with its 95 % interval and unit."""
+    """A fitted number with its 95 % interval and unit; at a bound it has none that means much."""
 
     value: float
     low: float
     high: float
     unit: str
+    at_bound: bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class Span:
+    """A value with a 95 % interval."""
+
+    value: float
+    low: float
+    high: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,9 +43,10 @@ class Verdict:
     """One answer.
 
     Attributes:
-        kind: ``confirmed``: one effect, tested on held-out data; ``ambiguous``: it or an
-            alternative; ``needs_data``: this log cannot show it; ``unexplained``: a remainder
-            without a name; ``no_gap``: nothing above noise, or nothing that matters.
+        kind: ``confirmed``: one effect (or one family of them), by forecasts of data that did not
+            fit it; ``ambiguous``: it or an alternative; ``minor``: it helps a little, and is not
+            added; ``needs_data``: this log cannot show it; ``unexplained``: a remainder without a
+            name; ``no_gap``: nothing above noise, or nothing that matters.
         effect: Name of the effect, empty if there is none.
         where: Joint, actuator, channel or parameter.
         parameters: Its numbers.
@@ -41,6 +54,14 @@ class Verdict:
             included.
         family: What all of them have in common, such as ``"dissipation"``; empty if nothing.
         says: The answer in words.
+        share: Part of the nominal simulator's cross-validated squared error that it takes off;
+            of a remainder, the part that is left.
+        provisional: True if too few blocks of data had to confirm it.
+        same_motion: Those of ``alternatives`` that no motion can tell from it.
+        together: Sets of effects that make the same motion in one exact proportion.
+        form: Those of ``alternatives`` that belong to its family and do nearly as well.
+        doubts: Why it is not certain.
+        follows: What the force that has no name looks like, empty if it follows nothing.
     """
 
     kind: Kind
@@ -50,6 +71,13 @@ class Verdict:
     alternatives: tuple[str, ...]
     family: str
     says: str
+    share: Span
+    provisional: bool = False
+    same_motion: tuple[str, ...] = ()
+    together: tuple[tuple[str, ...], ...] = ()
+    form: tuple[str, ...] = ()
+    doubts: tuple[Doubt, ...] = ()
+    follows: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,31 +90,29 @@ class Step:
 
 @dataclasses.dataclass(frozen=True)
 class ChannelGap:
-    """Forecast error of one channel on held-out data, in its unit."""
+    """Cross-validated forecast error of one channel, in its unit."""
 
     unit: str
     before: Span
     after: Span
     noise_floor: Span
-    ceiling: Span | None
 
 
 @dataclasses.dataclass(frozen=True)
 class Gap:
-    """Forecast error on held-out data.
+    """Forecast errors, each of data that did not fit the numbers it was made with.
 
     Attributes:
         channel: The channel that the main figures are about, and ``unit`` its unit.
-        horizon_s: Seconds forecast from a fitted lead-in.
+        horizon_s: Seconds that a forecast lasts, its lead-in included.
         before, after: Of the nominal and of the corrected simulator.
         noise_floor: What the corrected simulator would reach on its own data plus noise.
-        ceiling: Of the nominal simulator plus a flexible estimator; None if not asked for.
         steps: From nominal to corrected, one effect at a time.
         by_channel: The same for every measured channel.
-        windows_before, windows_after: Residual over noise on held-out windows with free start
-            states; 1 is the noise. A window counts at most 20 times the median one: where the
-            start state was not found, its residual says nothing of the model.
-        left_out: Share of forecasts that no model could make (unstable), left out.
+        windows_before, windows_after: Residual over noise in windows with free start states; 1 is
+            the noise.
+        share: Part of the nominal simulator's squared error that has a name.
+        blocks, folds: Blocks of data, and groups of them that were left out in turn.
     """
 
     channel: str
@@ -95,31 +121,30 @@ class Gap:
     before: Span
     after: Span
     noise_floor: Span
-    ceiling: Span | None
     steps: tuple[Step, ...]
     by_channel: dict[str, ChannelGap]
     windows_before: float
     windows_after: float
-    left_out: float
+    share: Span
+    blocks: int
+    folds: int
 
 
 @dataclasses.dataclass(frozen=True)
 class Rival:
-    """A set of effects that was refitted, and how it did on the training windows.
+    """A set of effects that was fitted, and how well it forecasts.
 
     Attributes:
         effects: ``name@where`` of its members; empty for the nominal simulator.
-        excess: Score above the chosen set's (cost plus price of its numbers); 0 for the chosen.
-        ratio: Residual over noise.
+        error: Cross-validated forecast error over the nominal simulator's.
         chosen: Whether it is the chosen set.
-        excluded: Whether the data exclude it.
+        reason: Why it was not chosen, in words.
     """
 
     effects: tuple[str, ...]
-    excess: float
-    ratio: float
+    error: float
     chosen: bool
-    excluded: bool
+    reason: str
 
 
 @dataclasses.dataclass(frozen=True)
@@ -162,7 +187,7 @@ class Where:
 
 @dataclasses.dataclass(frozen=True)
 class Rollout:
-    """One held-out forecast for pictures: measured, nominal, corrected; columns are channels."""
+    """One forecast for pictures: measured, nominal, corrected; columns are channels."""
 
     run: str
     times: Array
@@ -193,7 +218,8 @@ class GapResult:
 
     Attributes:
         verdicts: The answers, most important first.
-        gap: Forecast errors on held-out data.
+        gap: Cross-validated forecast errors.
+        held_out: The same on records that the user had set aside; None without such.
         where: Where the nominal simulator fails.
         evidence: Chosen set, nominal and runners-up, best first.
         rollouts: Held-out forecasts for pictures.
@@ -203,15 +229,14 @@ class GapResult:
         noise: Standard deviation of each measured channel, with its standard error.
         quality: Findings about the data, in words.
         blind: Effects that this log could hide.
-        threshold: Fall of the cost that an effect needs, and how much noise alone reached in
-            simulated no-gap data (99.9 % point).
+        adequate: True if what was found leaves no more than noise, so that chance decided;
+            otherwise shares of the error did.
         seconds: Time spent, by stage.
-        robust: True if every window had one robust vote and forecast errors are medians over
-            forecasts (systems with contacts).
     """
 
     verdicts: tuple[Verdict, ...]
     gap: Gap
+    held_out: Gap | None
     where: Where
     evidence: tuple[Rival, ...]
     rollouts: tuple[Rollout, ...]
@@ -221,6 +246,5 @@ class GapResult:
     noise: dict[str, tuple[float, float]]
     quality: tuple[str, ...]
     blind: tuple[Blind, ...]
-    threshold: tuple[float, float]
+    adequate: bool
     seconds: dict[str, float]
-    robust: bool = False

@@ -12,20 +12,11 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.adequacy import remainder
-from residual.gap.arena import Settings
-from residual.gap.candidates import Candidate, candidates
-from residual.gap.claims import aliases
-from residual.gap.contact.claims import bootstrap
-from residual.gap.contact.noise import with_noise
-from residual.gap.contact.search import Rules
-from residual.gap.contact.windows import lay_out, scales, some
-from residual.gap.contact.windows import pieces as windows_of
-from residual.gap.contact.workflow import MEASURED_ON, NAMED_ON, name, prove, simple
-from residual.gap.intervals import covariance
-from residual.gap.model import Model
-from residual.gap.samples import Samples
-from residual.gap.search import search
+from residual.gap.aliases import aliases
+from residual.gap.candidates import candidates
+from residual.gap.confirmation import deviations
+from residual.gap.explain import explain
+from residual.gap.prepare import prepare
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.effects.library import library, typical
@@ -34,11 +25,8 @@ from sims.simulator import Array, wrap
 
 #: Rows that must follow each other before anything is looked for, and the longest piece.
 SHORTEST, LONGEST = 12, 50
-#: Enough to name an effect, and little enough to be done in seconds on a simulator that steps
-#: row by row. Samples of a simulator are exact but for the difference of integrators.
-SETTINGS = Settings(
-    singles=4, pairs=1, swaps=2, nominal_turns=4, more_turns=4, runs=4, close=1, finest=1e-4
-)
+#: Control periods that forecasts last.
+HORIZON = 9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,38 +111,23 @@ def look(simulator: HostSimulator, runs: list[Trajectory]) -> Named:
     ]
     groups, _ = aliases(simulator, offered)
     kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
-    samples = Samples.join(runs, simulator.substeps)
-    pool = candidates(simulator, kept, samples)
-    if simulator.has_contacts:
-        return _look_at_walks(simulator, samples, pool)
-    found = search(simulator, pool, samples, np.random.default_rng(0), SETTINGS)
-    arena = found.arena
-    rest = remainder(found.fit, arena.samples, arena.windows, arena.sigma, found.floor, arena.scale)
-    effects, numbers = _bound(found.fit.model, found.fit.theta)
-    spread = np.zeros((0, 0))
-    if numbers:
-        spread = covariance(found.fit, arena.windows, arena.size)
-    return Named(effects, numbers, spread, float(rest.ratio.max()), rest.adequate)
-
-
-def _look_at_walks(simulator: HostSimulator, samples: Samples, pool: list[Candidate]) -> Named:
-    """The same where impacts set windows apart, see ``residual.gap.contact``."""
-    cut = windows_of(samples)
-    search, key = name(simulator, samples, some(cut, NAMED_ON), simple(pool), Rules(), _quiet)
-    whole = lay_out(simulator, samples, some(cut, MEASURED_ON))
-    whole = with_noise(whole, search.shots.sigma, scales(simulator))
-    key, full = prove(search, key, whole, _quiet)
-    spread = bootstrap(full, whole, np.random.default_rng(0))
-    effects, numbers = _bound(full.model, full.theta)
-    # The noise is estimated from the windows themselves, so that nothing is ever left of it.
-    return Named(effects, numbers, np.diag(spread**2), 1.0, True)
-
-
-def _bound(model: Model, theta: Array) -> tuple[tuple[Effect, ...], tuple[tuple[int, str], ...]]:
-    """Effects of a fit, and whose each number is."""
-    known = len(model.simulator.effects)
-    numbers = zip(model.owner, model.knobs, strict=True)
-    return model.bind(theta).effects[known:], tuple((int(i), knob.field) for i, knob in numbers)
+    prepared = prepare(simulator, runs, HORIZON * simulator.dt)
+    pool = prepared.pool(candidates(simulator, kept, prepared.fitter.samples))
+    found = explain(
+        simulator, pool, prepared.fitter, prepared.floor, prepared.weigh, prepared.effort,
+        _quiet, np.inf,
+    )  # fmt: skip
+    fit = found.search.tried[found.key]
+    known = len(simulator.effects)
+    numbers = zip(fit.model.owner, fit.model.knobs, strict=True)
+    spread = deviations(fit, found.search.fitter.blocks)
+    return Named(
+        fit.model.bind(fit.theta).effects[known:],
+        tuple((int(i), knob.field) for i, knob in numbers),
+        np.diag(spread**2),
+        found.left.ratio,
+        found.left.adequate,
+    )
 
 
 def _quiet(_: str) -> None:

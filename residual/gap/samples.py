@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import itertools
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,23 +13,38 @@ from numpy.typing import NDArray
 from residual.trajectories import Trajectory
 
 Array = NDArray[np.float64]
-Hold = Literal["zero", "linear"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Recorded:
+    """Inputs as recorded, of one run.
+
+    Attributes:
+        actions: Action held from each sample to the next, shape (n, n_a).
+        durations: Seconds to the next sample, shape (n,).
+    """
+
+    actions: Array
+    durations: Array
 
 
 @dataclasses.dataclass(frozen=True)
 class Samples:
     """Samples of all runs, one row each, runs one after the other.
 
+    A log that is sampled much faster than the system moves is thinned: every ``stride``-th sample
+    is a row, and a row's interval spans ``stride`` recorded ones. Inputs are kept as recorded.
+
     Attributes:
         seen: Measured state channels, shape (n, n_s); NaN where not measured.
-        actions: Action held from this sample to the next, shape (n, n_a); a run's last row
-            repeats the one before.
-        durations: Seconds to the next sample, shape (n,); a run's last row repeats the one before.
+        actions: Action at each row, shape (n, n_a); a run's last row repeats the one before.
+        durations: Seconds to the next row, shape (n,); a run's last row repeats the one before.
         times: Seconds since the start of the log, shape (n,).
         runs: First and one-past-last row of every run.
         names: Name of every run.
-        substeps: Sub-steps to integrate between two samples.
-        hold: How the input runs between samples, ``"zero"`` or ``"linear"``.
+        substeps: Sub-steps to integrate between two rows.
+        stride: Recorded samples in an interval.
+        recorded: Inputs of every run as recorded.
     """
 
     seen: Array
@@ -38,31 +54,44 @@ class Samples:
     runs: tuple[tuple[int, int], ...]
     names: tuple[str, ...]
     substeps: int
-    hold: Hold = "zero"
+    stride: int
+    recorded: tuple[Recorded, ...]
 
     @classmethod
-    def join(
-        cls, trajectories: Sequence[Trajectory], substeps: int, hold: Hold = "zero"
-    ) -> Samples:
-        """All trajectories below each other.
+    def join(cls, trajectories: Sequence[Trajectory], substeps: int, stride: int = 1) -> Samples:
+        """All trajectories below each other, whatever their order is.
 
         Raises:
-            ValueError: There is no trajectory.
+            ValueError: There is no trajectory with a step.
         """
-        if not trajectories:
-            raise ValueError("no trajectory to look at: give at least one")
-        ends = np.cumsum([len(t.times) for t in trajectories]).tolist()
+        # The order of files must not matter, so runs are put in an order of their own.
+        usable = sorted((t for t in trajectories if len(t) >= stride), key=_content)
+        if not usable:
+            raise ValueError("no trajectory to look at: give at least one with a step")
+        parts, ends = [], [0]
+        for run in usable:
+            rows = np.arange(0, len(run) + 1, stride)
+            actions = np.vstack([run.actions, run.actions[-1:]])[rows]
+            steps = np.diff(run.times[rows])
+            parts.append((run.states[rows], actions, np.append(steps, steps[-1]), run.times[rows]))
+            ends.append(ends[-1] + len(rows))
+        seen, actions, durations, times = (np.concatenate(c) for c in zip(*parts, strict=True))
         return cls(
-            seen=np.concatenate([t.states for t in trajectories]).astype(float),
-            actions=np.concatenate([np.vstack([t.actions, t.actions[-1:]]) for t in trajectories]),
-            durations=np.concatenate(
-                [np.append(t.durations, t.durations[-1]) for t in trajectories]
-            ),
-            times=np.concatenate([t.times for t in trajectories]),
-            runs=tuple(zip([0, *ends[:-1]], ends, strict=True)),
-            names=tuple(t.name for t in trajectories),
+            seen=seen.astype(float),
+            actions=actions.astype(float),
+            durations=durations,
+            times=times,
+            runs=tuple(itertools.pairwise(ends)),
+            names=tuple(t.name for t in usable),
             substeps=substeps,
-            hold=hold,
+            stride=stride,
+            recorded=tuple(
+                Recorded(
+                    np.vstack([t.actions, t.actions[-1:]]),
+                    np.append(t.durations, t.durations[-1]),
+                )
+                for t in usable
+            ),
         )
 
     def __len__(self) -> int:
@@ -78,17 +107,46 @@ class Samples:
         """Index of the run of every row, shape (n,)."""
         return np.repeat(np.arange(len(self.runs)), [stop - start for start, stop in self.runs])
 
-    def pick(self, which: Sequence[int]) -> tuple[Samples, NDArray[np.int64]]:
-        """Only some runs, and the rows they had in this table."""
-        rows = np.concatenate([np.arange(*self.runs[i]) for i in which])
-        ends = np.cumsum([self.runs[i][1] - self.runs[i][0] for i in which]).tolist()
-        part = dataclasses.replace(
-            self,
-            seen=self.seen[rows],
-            actions=self.actions[rows],
-            durations=self.durations[rows],
-            times=self.times[rows],
-            runs=tuple(zip([0, *ends[:-1]], ends, strict=True)),
-            names=tuple(self.names[i] for i in which),
-        )
-        return part, rows
+    @property
+    def step(self) -> float:
+        """Usual seconds between two rows."""
+        return float(np.median(self.durations))
+
+    def in_intervals(self, run: int, driven: Array) -> Array:
+        """Inputs of recorded intervals put together to those of a run's rows.
+
+        Args:
+            run: Number of the run.
+            driven: Mean and rise in every sub-step of the recorded intervals,
+                (V, T, substeps, n_a, 2).
+
+        Returns:
+            (V, rows, ``self.substeps``, n_a, 2).
+        """
+        start, stop = self.runs[run]
+        if self.stride == 1:
+            return driven
+        variants, _, fine, inputs, _ = driven.shape
+        count, total = stop - start, self.stride * fine
+        whole = driven[:, : (count - 1) * self.stride]
+        whole = whole.reshape(variants, count - 1, total, inputs, 2)
+        last = np.repeat(driven[:, -1:, -1:], total, axis=2)
+        return _merged(np.concatenate([whole, last], axis=1), total // self.substeps)
+
+
+def _merged(driven: Array, count: int) -> Array:
+    """Every ``count`` sub-steps as one, with the same integral and the same first moment."""
+    if count == 1:
+        return driven
+    variants, rows, fine, inputs, _ = driven.shape
+    parts = driven.reshape(variants, rows, fine // count, count, inputs, 2)
+    place = (np.arange(count) - 0.5 * (count - 1))[:, None]
+    mean = parts[..., 0].mean(axis=3)
+    rise = (12 * (parts[..., 0] * place).sum(axis=3) + parts[..., 1].sum(axis=3)) / count**2
+    return np.stack([mean, rise], axis=-1)
+
+
+def _content(run: Trajectory) -> bytes:
+    """Puts runs in an order that depends on what was measured alone."""
+    parts = (run.states, run.actions, run.durations)
+    return hashlib.sha256(b"".join(np.ascontiguousarray(p).tobytes() for p in parts)).digest()

@@ -1,134 +1,259 @@
-"""From samples to a chosen set of effects: noise, windows and tournament in turns.
+"""Sets of effects worth a fit: a linear screen, then a beam that grows by single effects.
 
-Noise and windows are estimated around the best model so far, because both suffer from a large
-gap; the tournament then runs again, until nothing changes.
+Every set is fitted from the numbers of the set it grew from. A larger set that ends worse than one
+that it contains has not converged; it is fitted again from there, and never counts as evidence if
+that does not help.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap import noise
-from residual.gap.adequacy import remainder
-from residual.gap.arena import Arena, Key, Settings
 from residual.gap.candidates import Candidate
+from residual.gap.currency import Currency, groups
+from residual.gap.fitting import Fit, Fitter
 from residual.gap.model import Model
-from residual.gap.samples import Samples
-from residual.gap.shooting import Fit
-from residual.gap.tournament import choose, complete, rivals
-from residual.gap.windows import by_growth
+from residual.gap.plausible import absurd
+from residual.gap.screening import Signatures, gains, signatures, trials
+from residual.gap.validation import Validated, validate
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
+Key = tuple[int, ...]
+Proposals = dict[Key, Array]
+
+
+#: Cosine of what two effects do, start states allowed for, beyond which it is one motion.
+SAME_MOTION = 0.995
 
 
 @dataclasses.dataclass(frozen=True)
-class Found:
-    """What the search ends with, on all training runs.
-
-    Attributes:
-        arena: All training runs; holds the fits of the chosen set, its rivals and the nominal.
-        trial: The runs of the tournament; holds all rivals that were tried.
-        key: The chosen candidates.
-        floor: Noise and smooth path around the chosen model.
-        nominal_floor: The same around the nominal model.
-    """
-
-    arena: Arena
-    trial: Arena
-    key: Key
-    floor: noise.Floor
-    nominal_floor: noise.Floor
-
-    @property
-    def fit(self) -> Fit:
-        """Fit of the chosen set."""
-        return self.arena.tried[self.key]
-
-    @property
-    def chosen(self) -> list[Candidate]:
-        """The chosen candidates."""
-        return [self.arena.candidates[i] for i in self.key]
-
-
-def survey(
-    model: Model, samples: Samples, theta: Array, sigma: Array | None, finest: float
-) -> tuple[noise.Floor, Array]:
-    """Noise and smooth path around a model, and the typical variation of the states."""
-    nodes = noise.first_path(model, samples, theta)
-    if sigma is None:
-        sigma = noise.local_noise(samples)
-    scale = noise.variation(samples, nodes)
-    floor = noise.estimate(model, samples, nodes, theta, sigma, scale)
-    least = finest * scale[samples.measured]
-    return dataclasses.replace(floor, sigma=np.maximum(floor.sigma, least)), scale
-
-
-def search(
-    simulator: HostSimulator,
-    candidates: Sequence[Candidate],
-    samples: Samples,
-    rng: np.random.Generator,
-    settings: Settings,
-    longest: int = 25,
-    tell: Callable[[str], None] = lambda _: None,
-) -> Found:
-    """Choose the missing effects from training runs.
+class Effort:
+    """How hard to search.
 
     Args:
-        simulator: The nominal simulator.
-        candidates: What may be missing.
-        samples: The training runs.
-        rng: Chooses the runs that the tournament sees.
-        settings: How hard to search.
-        longest: Longest window in samples.
-        tell: Progress.
+        singles: Effects of the screen that are fitted alone.
+        pairs: Pairs of the screen that are fitted.
+        beam: Sets that are grown further, beside the one that forecasts best.
+        grown: Effects that each of these is grown by, one at a time.
+        most: Largest number of effects in a set.
+        stale: Share of the error that one more effect must take off for the search to go on.
     """
-    some = sorted(rng.permutation(len(samples.runs))[: settings.runs].tolist())
-    part, rows = samples.pick(some)
-    nominal_floor, scale = survey(Model(simulator), samples, np.zeros(0), None, settings.finest)
-    physical = len(simulator.physical_channels)
-    scale = scale[:physical]
-    floor, theta = nominal_floor, np.zeros(0)
-    key: Key = ()
 
-    def arena(table: Samples, index: NDArray[np.int64]) -> Arena:
-        nodes = floor.nodes[index][:, :physical]
-        by_state = floor.slope.by_state[index][:, :physical, :physical]
-        windows = by_growth(table, by_state, scale, longest)
-        return Arena(
-            simulator, candidates, table, windows, nodes, by_state, floor.sigma, scale, settings,
-            tell,
-        )  # fmt: skip
+    singles: int = 8
+    pairs: int = 2
+    beam: int = 2
+    grown: int = 4
+    most: int = 8
+    stale: float = 0.05
 
-    for turn in range(3):
-        trial = arena(part, rows)
-        before = key
-        key = choose(trial, {key: theta})
-        theta = trial.tried[key].theta
-        if key:
-            model = Model(simulator, [candidates[i] for i in key])
-            floor, _ = survey(model, samples, theta, floor.sigma, settings.finest)
-        full = arena(samples, np.arange(len(samples)))
-        sets = {key: [theta]} if key else {}
-        sets.update({rival: [trial.tried[rival].theta] for rival in rivals(trial, key)})
-        full.refit(full.tried[()], sets, most=True)
-        full.threshold, full.noise_gain = trial.threshold, trial.noise_gain
-        # All runs may prefer a rival that came close on those of the tournament.
-        key = min(sets, key=full.score, default=key)
-        left = remainder(full.tried[key], samples, full.windows, floor.sigma, floor, scale)
-        if left.adequate or (turn and key == before) or turn == 2:
-            break
-        if not key:
-            break
-        theta = full.tried[key].theta
-    completed = complete(full, key)
-    if completed != key:
-        key = completed
-        model = Model(simulator, [candidates[i] for i in key])
-        floor, _ = survey(model, samples, full.tried[key].theta, floor.sigma, settings.finest)
-    return Found(full, trial, key, floor, nominal_floor)
+
+class Search:
+    """Rival sets of effects fitted to the windows of one fitter.
+
+    Attributes:
+        tried: Every fitted set: sorted candidate numbers -> fit.
+        unfit: Sets that did not converge.
+        refused: Sets that cannot be right whatever they take off, and why.
+        validated: Cross-validated forecasts of the sets.
+        currency: Relative errors.
+    """
+
+    def __init__(
+        self,
+        simulator: HostSimulator,
+        candidates: Sequence[Candidate],
+        fitter: Fitter,
+        effort: Effort | None = None,
+        tell: Callable[[str], None] = lambda _: None,
+        until: float = np.inf,
+    ) -> None:
+        self.simulator, self.candidates, self.fitter = simulator, list(candidates), fitter
+        self.effort, self.tell, self.until = effort or Effort(), tell, until
+        self.tried: dict[Key, Fit] = {(): fitter.fit(Model(simulator), np.zeros(0))}
+        self.unfit: set[Key] = set()
+        self.refused: dict[Key, str] = {}
+        self._signatures: dict[Key, Signatures] = {}
+        channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
+        nominal = validate(fitter, self.tried[()])
+        self.validated: dict[Key, Validated] = {(): nominal}
+        self.currency = Currency(nominal.squares, groups(channels))
+
+    # -- what is known of a set -----------------------------------------------------------
+
+    def model(self, key: Key) -> Model:
+        """The simulator with some candidates."""
+        return Model(self.simulator, [self.candidates[i] for i in key])
+
+    def labels(self, key: Key) -> tuple[str, ...]:
+        """Names and places of a set."""
+        return tuple(self.candidates[i].label for i in key)
+
+    def error(self, key: Key) -> float:
+        """Cross-validated relative error."""
+        return self.currency.error(self.validated[key].squares)
+
+    def numbers(self, key: Key) -> int:
+        """Free numbers of a set."""
+        return sum(len(self.candidates[i].knobs) for i in key)
+
+    def fits_in(self, key: Key) -> bool:
+        """Whether a set has few enough numbers for the windows there are, and each effect once.
+
+        A law beside its own special case is one law too many.
+        """
+        if any(self.contains(one, other) for one in key for other in key):
+            return False
+        windows = len(self.fitter.blocks.windows)
+        return len(key) <= self.effort.most and self.numbers(key) <= max(3, windows // 2)
+
+    def usable(self) -> list[Key]:
+        """Sets that converged and may be right."""
+        return [k for k in self.validated if k not in self.unfit and k not in self.refused]
+
+    def best(self) -> Key:
+        """The set that forecasts best."""
+        return min(self.usable(), key=self.error)
+
+    def sound(self, key: Key) -> bool:
+        """Whether a fitted set converged and may be right."""
+        return key not in self.unfit and key not in self.refused
+
+    @property
+    def late(self) -> bool:
+        """Whether the time for searching is over."""
+        return time.perf_counter() > self.until
+
+    def signatures(self, key: Key) -> Signatures:
+        """What every candidate would add to a fitted set."""
+        if key not in self._signatures:
+            fit = self.tried[key]
+            columns = self.fitter.columns(fit, self.candidates)
+            self._signatures[key] = signatures(fit, trials(self.candidates), columns)
+        return self._signatures[key]
+
+    def merged(
+        self, key: Key, additions: Iterable[tuple[int, Array]], drop: Key = ()
+    ) -> tuple[Key, Array]:
+        """Sorted key and start vector of a set with some candidates added and some dropped."""
+        values: dict[int, Array] = {}
+        at = 0
+        for number in key:
+            width = len(self.candidates[number].knobs)
+            values[number] = self.tried[key].theta[at : at + width]
+            at += width
+        for number in drop:
+            values.pop(number)
+        values.update(dict(additions))
+        fresh = tuple(sorted(values))
+        return fresh, np.concatenate([values[i] for i in fresh]) if fresh else np.zeros(0)
+
+    # -- fitting --------------------------------------------------------------------------
+
+    def add(self, proposals: Proposals) -> list[Key]:
+        """Fit and validate sets that were not tried yet."""
+        fresh = []
+        for key, theta in proposals.items():
+            if key in self.tried:
+                continue
+            name = " + ".join(self.labels(key))
+            self.tell(f"  trying {name}")
+            self.fit(key, theta)
+            fresh.append(key)
+            self.tell(f"  {name}: {100 * self.error(key):.3g} % of the error")
+        return fresh
+
+    def fit(self, key: Key, theta: Array) -> None:
+        """Fit a set from start values, and from its nested sets if it ends worse than one."""
+        nested = [k for k in self.tried if len(k) < len(key) and set(k) < set(key)]
+        near = min(nested, key=lambda k: self.tried[k].merit, default=())
+        found = self.fitter.fit(self.model(key), theta, self.tried[near])
+        if nested:
+            floor = self.tried[near].merit
+            if found.merit > floor:
+                start = self._from_nested(key, near, theta)
+                again = self.fitter.fit(self.model(key), start, self.tried[near])
+                found = again if again.merit < found.merit else found
+            if found.merit > 1.001 * floor:
+                self.unfit.add(key)
+        self.tried[key] = found
+        self.validated[key] = validate(self.fitter, found)
+        reason = absurd(found.model, found.theta, self.fitter.samples)
+        if reason:
+            self.refused[key] = reason
+
+    def _from_nested(self, key: Key, nested: Key, theta: Array) -> Array:
+        """Numbers of a nested set, what it lacks hardly there."""
+        model = self.model(key)
+        start = np.array(theta)
+        for place, number in enumerate(key):
+            own = np.flatnonzero(model.owner == place)
+            if number in nested:
+                inner = self.model(nested)
+                start[own] = self.tried[nested].theta[inner.owner == nested.index(number)]
+                continue
+            for j in own:
+                if model.knobs[j].strength:
+                    start[j] = np.clip(0.01 * model.knobs[j].step, model.low[j], model.high[j])
+        return start
+
+    def add_without_each(self, key: Key) -> None:
+        """Fit what is left of a set without each of its members."""
+        for gone in key:
+            smaller, theta = self.merged(key, (), drop=(gone,))
+            self.add({smaller: theta})
+
+    def add_exchanged(self, key: Key, most: int) -> None:
+        """Fit sets in which one member of a set has been exchanged for what may do its work.
+
+        These are the effects that gain most where the member is missing, and its whole family.
+
+        Args:
+            key: A fitted set.
+            most: Effects that are tried in place of each member, beside its family.
+        """
+        self.add_without_each(key)
+        for gone in key:
+            rest = tuple(i for i in key if i != gone)
+            if rest not in self.tried:
+                continue
+            around, family = self.signatures(rest), self.family(gone)
+            taken: list[int] = []
+            for gain in gains(around):
+                number = around.variants[gain.variants[0]].candidate
+                near = len(taken) < most or (family and self.family(number) == family)
+                if number in key or number in taken or gain.value <= 0 or not near:
+                    continue
+                taken.append(number)
+                fresh, theta = self.merged(rest, [(number, gain.values[0])])
+                self.add({fresh: theta})
+
+    def contains(self, one: int, other: int) -> bool:
+        """Whether an effect is a special case of another at the same place."""
+        law, case = self.candidates[one].effect, self.candidates[other].effect
+        return case.name in law.special_cases and law.where == case.where
+
+    def family(self, number: int) -> str:
+        """What effects that differ in form more than in kind have in common, and where."""
+        effect = self.candidates[number].effect
+        family = effect.family_in(self.simulator)
+        return f"{family}@{self.place(number)}" if family else ""
+
+    def same_motion(self, rest: Key, one: int, other: int) -> bool:
+        """Whether two effects make the same motion in these data beside some others."""
+        around = self.signatures(rest)
+        columns = {v.candidate: v.columns for v in around.variants}
+        if any(len(columns[number]) != 1 for number in (one, other)):
+            return False
+        a, b = (around.matrix[:, columns[number][0]] for number in (one, other))
+        lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
+        return lengths > 0 and abs(float(a @ b)) > SAME_MOTION * lengths
+
+    def place(self, number: int) -> str:
+        """The joint, actuator, channel or parameter of a candidate."""
+        return self.candidates[number].effect.where

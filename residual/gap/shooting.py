@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.bounded import bounded_step
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from residual.gap.slopes import Slope, defects, misfit, observe, slopes
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True)
-class Fit:
+class Shot:
     """Result of fitting a model to windows.
 
     Attributes:
@@ -37,11 +38,10 @@ class Fit:
         merit: Sum of the costs, those above ``cap`` counted as cap (1 + log(cost / cap)).
         cap: See ``merit``.
         residual: Whitened residual, (W, L, m), zero where nothing was measured.
-        by_start: Its derivative by the window's start state, (W, L m, f).
-        by_knob: Its derivative by the unknowns, start states projected out, (W, L m, p).
+            by_knob: Its derivative by the unknowns, start states projected out, (W, L m, p).
         projected: The residual with start states projected out, (W, L m).
         slope: Derivatives at the nodes.
-        iterations: How many were made.
+        converged: Whether the last iteration no longer lowered the merit.
     """
 
     theta: Array
@@ -54,8 +54,8 @@ class Fit:
     by_knob: Array
     projected: Array
     slope: Slope
-    iterations: int
     model: Model
+    converged: bool = False
 
     @property
     def weights(self) -> Array:
@@ -76,8 +76,8 @@ def fit(
     widths: float = 0.3,
     shrink: float = 0.35,
     by_state: Array | None = None,
-    tolerance: float = 1e-3,
-) -> Fit:
+    tolerance: float = 1e-4,
+) -> Shot:
     """Gauss-Newton on start states and unknowns.
 
     Args:
@@ -94,11 +94,11 @@ def fit(
             ``shrink`` in every iteration down to 0.005: large at first to see over the kinks of
             dead zones and friction, small at last to be unbiased.
         by_state: Derivatives by state to start with.
-        tolerance: Stop when the merit falls by less than this.
+        tolerance: Stop when the merit falls by less than this share of it.
     """
     count, f, p = len(windows), len(model.free), len(theta)
     problem = _Problem(model, samples, windows, sigma, scale, cap)
-    best: Fit | None = None
+    best: Shot | None = None
     moves = np.zeros((*windows.index.shape, nodes.shape[1]))
     step_theta = np.zeros_like(theta)
     damping, failed = 1e-6, np.zeros(count, int)
@@ -111,7 +111,8 @@ def fit(
         else:
             better = now.costs < best.costs if p == 0 else np.full(count, now.merit < best.merit)
             merged = _merge(best, now, better, windows)
-            finished = bool(better.any()) and best.merit - merged.merit < tolerance
+            gained = best.merit - merged.merit
+            finished = bool(better.any()) and gained < tolerance * merged.merit
             best = merged
         failed = np.where(better, 0, failed + 1)
         if (failed > 4).all():
@@ -141,7 +142,7 @@ def fit(
         nodes[windows.index[windows.inside]] += (factor[:, None, None] * moves)[windows.inside]
         theta = best.theta + (factor[0] * step_theta if p else 0.0)
     assert best is not None
-    return best
+    return dataclasses.replace(best, converged=finished or bool((failed > 4).all()))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -179,7 +180,7 @@ class _Problem:
 
     def at(
         self, nodes: Array, theta: Array, width: Array, by_state: Array | None, turn: int
-    ) -> tuple[Fit, _Tangent]:
+    ) -> tuple[Shot, _Tangent]:
         """Costs and their linearisation at nodes and unknowns."""
         model, samples, windows, sigma = self.model, self.samples, self.windows, self.sigma
         f, p, count = len(model.free), len(theta), len(windows)
@@ -207,14 +208,14 @@ class _Problem:
         inner = basis_rows.transpose(0, 2, 1)
         projected = flat - (basis_rows @ (inner @ flat[..., None]))[..., 0]
         by_knob = columns[..., f:] - basis_rows @ (inner @ columns[..., f:])
-        found = Fit(
-            theta, nodes, costs, capped(costs, self.cap), self.cap, residual, basis_rows, by_knob,
-            projected, slope, turn, model,
+        found = Shot(
+            theta, nodes, costs, float(capped(costs, self.cap).sum()), self.cap, residual,
+            basis_rows, by_knob, projected, slope, model,
         )  # fmt: skip
         return found, _Tangent(response, columns, flat, basis, triangle)
 
 
-def _merge(old: Fit, new: Fit, better: NDArray[np.bool_], windows: Windows) -> Fit:
+def _merge(old: Shot, new: Shot, better: NDArray[np.bool_], windows: Windows) -> Shot:
     """The new fit in the windows where it is better, elsewhere the old one."""
     if better.all():
         return new
@@ -238,51 +239,32 @@ def _merge(old: Fit, new: Fit, better: NDArray[np.bool_], windows: Windows) -> F
     return dataclasses.replace(
         new,
         nodes=taken(old.nodes, new.nodes, rows),
-        merit=capped(parts["costs"], new.cap),
+        merit=float(capped(parts["costs"], new.cap).sum()),
         slope=Slope(**slope),
         **parts,
     )
 
 
-def capped(costs: Array, cap: float) -> float:
-    """Sum of costs, those above the cap counted by their logarithm."""
+def capped(costs: Array, cap: float) -> Array:
+    """Costs, those above the cap counted by their logarithm; shapes broadcast."""
     if not np.isfinite(cap):
-        return float(costs.sum())
-    return float(
-        np.where(costs > cap, cap * (1 + np.log(np.maximum(costs, cap) / cap)), costs).sum()
-    )
+        return costs
+    return np.where(costs > cap, cap * (1 + np.log(np.maximum(costs, cap) / cap)), costs)
 
 
 def _step(
     by_knob: Array, projected: Array, weight: Array, theta: Array, model: Model, damping: float
 ) -> Array:
     """Gauss-Newton step of the unknowns within their bounds."""
-    p = len(theta)
-    step = np.zeros(p)
-    if p == 0:
-        return step
+    if len(theta) == 0:
+        return np.zeros(0)
     rows = by_knob * np.sqrt(weight)[:, None, None]
     aims = projected * np.sqrt(weight)[:, None]
-    matrix = np.einsum("wri,wrj->ij", rows, rows)
-    right = np.einsum("wri,wr->i", rows, aims)
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    matrix = matrix / np.outer(size, size) + damping * np.eye(p)
-    right = right / size
     limit = 10 * model.step + np.abs(theta)
-    low = np.maximum(model.low - theta, -limit)
-    high = np.minimum(model.high - theta, limit)
-    active = np.zeros(p, bool)
-    for _ in range(p + 1):
-        loose = ~active
-        if not loose.any():
-            break
-        shift = right[loose] - matrix[np.ix_(loose, active)] @ (step[active] * size[active])
-        step[loose] = (
-            np.linalg.lstsq(matrix[np.ix_(loose, loose)], shift, rcond=None)[0] / size[loose]
-        )
-        out = loose & ((step < low) | (step > high))
-        if not out.any():
-            break
-        step[out] = np.clip(step[out], low[out], high[out])
-        active |= out
-    return np.clip(step, low, high)
+    return bounded_step(
+        np.einsum("wri,wrj->ij", rows, rows),
+        np.einsum("wri,wr->i", rows, aims),
+        np.maximum(model.low - theta, -limit),
+        np.minimum(model.high - theta, limit),
+        damping,
+    )

@@ -1,130 +1,136 @@
-"""The answer in words."""
+"""The answer: which effects are certain, which of several, what is minor, what is left."""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 
-from residual.gap.adequacy import Remainder
-from residual.gap.result import Blind, Gap, Kind, Number, Verdict
+from residual.gap.confirmation import FEW, TOO_FEW, Claim
+from residual.gap.fitting import Left
+from residual.gap.result import Blind, Doubt, Gap, Kind, Span, Verdict
+from residual.gap.search import Search
 
-#: Effects that differ in form more than in kind.
-FAMILIES: dict[str, frozenset[str]] = {
-    "delay or lag": frozenset({"delay", "actuator_lag"}),
-    "dry friction": frozenset({"coulomb_friction", "stribeck_friction"}),
-    "dissipation": frozenset(
-        {"viscous_friction", "coulomb_friction", "stribeck_friction", "quadratic_drag", "damping"}
-    ),
-    "constant push": frozenset({"constant_load", "actuator_bias", "sensor_offset"}),
-    "spring": frozenset({"linear_spring", "cubic_spring"}),
-}
+#: Families that an effect may be mistaken for and still be worth a name.
+MOST_FAMILIES = 3
 
 
-@dataclasses.dataclass(frozen=True)
-class Claim:
-    """One chosen effect with everything that bears on its verdict.
+def nameable(search: Search, claim: Claim, blocks: int) -> bool:
+    """Whether an effect has few enough rivals, and data enough, to be named at all."""
+    return len(families(search, claim)) <= MOST_FAMILIES and blocks >= TOO_FEW
 
-    Attributes:
-        name, where, label: What and where.
-        numbers: Fitted numbers.
-        ties: Effects that these data cannot exclude in its place.
-        twins: Exact aliases, beside whatever else is claimed: no data could.
-        instead: Sets of effects that these data cannot exclude in place of this one and
-            another claimed one; single effects among them were not offered.
-        gain: What leaving it out would cost.
-        artefact: True if another step size or input hold explains it.
-        sentence: What the effect is.
-        silent: True if held-out data do not go where it shows.
+
+def families(search: Search, claim: Claim) -> set[str]:
+    """Families that an effect cannot be told from, its own included; a loner is its own.
+
+    What makes the same motion counts as one.
     """
-
-    name: str
-    where: str
-    label: str
-    numbers: dict[str, Number]
-    ties: tuple[str, ...]
-    twins: tuple[str, ...]
-    instead: tuple[str, ...]
-    gain: float
-    artefact: bool
-    sentence: str
-    silent: bool = False
+    numbers = {candidate.label: i for i, candidate in enumerate(search.candidates)}
+    own = search.family(claim.number) or search.candidates[claim.number].label
+    # A rival that was not offered has a label only.
+    known = [search.family(numbers[label]) if label in numbers else "" for label in claim.rivals]
+    return {own} | {family or label for family, label in zip(known, claim.rivals, strict=True)}
 
 
-def family(labels: Sequence[str]) -> str:
-    """The family that all effects belong to, or an empty string."""
-    names = {label.split("@")[0] for label in labels}
-    for title, members in FAMILIES.items():
-        if names <= members:
-            return title
-    return ""
-
-
-def verdicts(
-    claims: Sequence[Claim],
-    left: Remainder,
-    gap: Gap,
-    sets: Sequence[tuple[str, ...]],
-    tolerance: float | None,
-    blind: Sequence[Blind],
-    provisional: bool = False,
-) -> tuple[Verdict, ...]:
-    """All verdicts, most important first.
+def effect_verdict(
+    search: Search,
+    claim: Claim,
+    blocks: int,
+    stand_ins: Sequence[str] = (),
+    together: Sequence[tuple[str, ...]] = (),
+) -> Verdict:
+    """One chosen effect.
 
     Args:
-        claims: The chosen effects.
-        left: What they leave.
-        gap: Forecast errors on held-out data.
-        sets: Exactly dependent sets of effects, see ``residual.gap.claims.aliases``.
-        tolerance: Forecast error that does not matter.
-        blind: Effects that the log could hide.
-        provisional: True if there is one record only, so that its end had to confirm it.
+        search: With the candidates.
+        claim: What bears on it.
+        blocks: Blocks of data.
+        stand_ins: Effects that could stand in its place beside the other chosen ones, exactly.
+        together: Sets of effects that make the same motion in one exact proportion.
     """
-    found: list[Verdict] = []
-    small = tolerance is not None and gap.before.value <= tolerance
-    real = [claim for claim in claims if not claim.artefact]
-    # Three free effects imitate nearly anything, so they name nothing.
-    sound = left.adequate and len(claims) <= 2
-    removed = gap.windows_before / max(gap.windows_after, 1e-9)
-    labels = [claim.label for claim in real]
-    for claim in real:
-        stand_ins, together = dependent(claim.label, labels, sets)
-        claim = dataclasses.replace(claim, twins=(*claim.twins, *stand_ins))
-        found.append(_effect(claim, sound, removed, gap, together))
-    for claim in claims:
-        if claim.artefact:
-            found.append(
-                Verdict("unexplained", "", "", {}, (claim.label,), "",
-                        f"numerics: what looks like {claim.label} changes with the integration "
-                        "step or the input hold, so it is not given a physical name")
-            )  # fmt: skip
-    if not claims and sound:
-        found.insert(0, Verdict("no_gap", "", "", {}, (), "", "no gap above noise"))
-    elif small:
-        found.insert(
-            0,
-            Verdict("no_gap", "", "", {}, (), "",
-                    f"nothing that matters: the {gap.horizon_s:.3g} s error is "
-                    f"{gap.before.value:.3g} {gap.unit}, within the tolerance of {tolerance:.3g}"),
-        )  # fmt: skip
-    instead = tuple(dict.fromkeys(name for claim in real for name in claim.instead))
-    if not sound:
-        found.append(_unexplained(left, gap, len(claims)))
-    elif instead:
-        says = (
-            f"unexplained: no single effect on offer does it, and in place of "
-            f"{' with '.join(labels)} these data cannot exclude {' or '.join(instead)}"
-        )
-        found.append(Verdict("unexplained", "", "", {}, instead, "", says))
-    if blind:
-        names = ", ".join(f"{b.effect} (needs {b.needs})" for b in blind)
-        found.append(
-            Verdict("needs_data", "", "", {}, tuple(b.effect for b in blind), "",
-                    f"this log could not show: {names}")
-        )  # fmt: skip
-    if provisional:
-        word = "; provisional: one record only"
-        found = [dataclasses.replace(v, says=v.says + word) if v.effect else v for v in found]
-    return tuple(found)
+    effect = search.candidates[claim.number].effect
+    sure = (
+        claim.needed and claim.steady and claim.sound and not claim.bounded
+        and not claim.rivals and not claim.alike and blocks >= TOO_FEW
+    )  # fmt: skip
+    kind: Kind = "confirmed" if sure else "ambiguous"
+    family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""
+    numbers = ", ".join(
+        f"{name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}"
+        for name, n in claim.numbers.items()
+    )
+    says = [f"{effect}: {numbers}"]
+    if claim.form:
+        says.append(f"{family}, form undecided: {', '.join(claim.form)} would do as well")
+    if claim.alike:
+        says.append(f"the same motion in these data: {', '.join(claim.alike)}")
+    if claim.rivals:
+        says.append(f"these data cannot exclude {', '.join(claim.rivals)}")
+    twins = tuple(dict.fromkeys((*claim.twins, *stand_ins)))
+    if twins:
+        says.append(f"the same motion as {', '.join(twins)}")
+    if together:
+        sets = " or ".join(" with ".join(names) for names in together[:2])
+        says.append(f"{sets}, in one exact proportion, would move alike")
+    if not claim.needed:
+        says.append("forecasts are not clearly worse without it")
+    if not claim.steady:
+        says.append("its size differs between parts of the data")
+    if not claim.sound:
+        says.append("its size changes with the integration step or the input's hold")
+    if claim.bounded:
+        says.append("its size is at its bound")
+    return Verdict(
+        kind, effect.name, effect.where, claim.numbers,
+        tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
+        "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
+        doubts(claim),
+    )  # fmt: skip
+
+
+def doubts(claim: Claim) -> tuple[Doubt, ...]:
+    """Why an effect is not certain."""
+    why: dict[Doubt, bool] = {
+        "not_needed": not claim.needed,
+        "unsteady": not claim.steady,
+        "numerics": not claim.sound,
+        "at_bound": claim.bounded,
+        "rivals": bool(claim.rivals or claim.alike),
+    }
+    return tuple(doubt for doubt, there in why.items() if there)
+
+
+def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdict:
+    """What has no name."""
+    share = Span(1 - gap.share.value, 1 - gap.share.high, 1 - gap.share.low)
+    says = f"{100 * share.value:.2g} % of the gap has no name: {left.ratio:.3g} times the noise"
+    if left.force:
+        says += f"; it looks like a force that follows {left.force}"
+    if leads:
+        says += f"; {', '.join(leads)} would take some of it, and so would many others"
+    return Verdict("unexplained", "", "", {}, tuple(leads), "", says, share, follows=left.force)
+
+
+def minor_verdict(search: Search, number: int, share: tuple[float, float, float]) -> Verdict:
+    """An effect that helps too little to be added."""
+    effect = search.candidates[number].effect
+    return Verdict(
+        "minor", effect.name, effect.where, {}, (), effect.family_in(search.simulator),
+        f"{effect}: takes off less than a fifth of what remains without it, so it is not added",
+        Span(*share),
+    )  # fmt: skip
+
+
+def no_gap_verdict(says: str) -> Verdict:
+    """Nothing above noise, or nothing that matters."""
+    return Verdict("no_gap", "", "", {}, (), "", says, Span(0.0, 0.0, 0.0))
+
+
+def blind_verdict(blind: Sequence[Blind]) -> Verdict:
+    """What this log could not show."""
+    names = ", ".join(f"{b.effect} (needs {b.needs})" for b in blind)
+    return Verdict(
+        "needs_data", "", "", {}, tuple(b.effect for b in blind), "",
+        f"this log could not show: {names}", Span(0.0, 0.0, 0.0),
+    )  # fmt: skip
 
 
 def dependent(
@@ -148,52 +154,3 @@ def dependent(
         elif len(free) == len(others):
             together.append(free)
     return tuple(stand_ins), tuple(together)
-
-
-def _effect(
-    claim: Claim, sound: bool, removed: float, gap: Gap, together: Sequence[tuple[str, ...]]
-) -> Verdict:
-    numbers = ", ".join(
-        f"{name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}"
-        for name, n in claim.numbers.items()
-    )
-    title = family((claim.label, *claim.ties)) if claim.ties else ""
-    says = f"{claim.label}: {numbers}"
-    sure = not claim.instead and not claim.silent and (not claim.ties or bool(title))
-    confirmed = (sound or removed >= 10) and sure
-    if claim.ties:
-        says += f"; these data cannot exclude {', '.join(claim.ties)}"
-        if title:
-            says += f" ({title}, form undecided)"
-    if claim.instead:
-        says += f"; together they could be {' or '.join(claim.instead)}"
-    if claim.twins:
-        says += f"; the same motion as {', '.join(claim.twins)}"
-    if together:
-        sets = " or ".join(" with ".join(names) for names in together[:2])
-        more = f" (and {len(together) - 2} more such sets)" if len(together) > 2 else ""
-        says += f"; {sets}, in one exact proportion, would move alike{more}"
-    if claim.silent:
-        says += "; held-out data do not go where it shows, so nothing confirms it"
-    if not sound:
-        says += "; a remainder is unexplained"
-    kind: Kind = "confirmed" if confirmed else "ambiguous"
-    return Verdict(
-        kind,
-        claim.name,
-        claim.where,
-        claim.numbers,
-        (*claim.twins, *claim.ties, *claim.instead),
-        title,
-        says,
-    )
-
-
-def _unexplained(left: Remainder, gap: Gap, count: int) -> Verdict:
-    size = float(left.ratio.max())
-    says = f"unexplained: the residual is {size:.3g} times the noise"
-    if left.force:
-        says += f"; it looks like a force that follows {left.force}"
-    if count > 2:
-        says += f"; {count} effects at once can imitate others, so take them as a lead only"
-    return Verdict("unexplained", "", "", {}, (), "", says)

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.fitting import Fit
 from residual.gap.model import Model
 from residual.gap.noise import Floor, driven_states
 from residual.gap.result import Profile, Where
 from residual.gap.samples import Samples
-from residual.gap.shooting import Fit
 from residual.gap.windows import Windows
 
 Array = NDArray[np.float64]
 
 
 def locate(
-    model: Model, samples: Samples, windows: Windows, nominal: Fit, ratio: Array, floor: Floor
-) -> Where:
+    model: Model, samples: Samples, windows: Windows, nominal: Fit, sigma: Array,
+    ratio: Sequence[float], floor: Floor,
+) -> Where:  # fmt: skip
     """Tables and profiles of the missing acceleration around the nominal model."""
     channels = model.simulator.physical_channels
     inputs = model.simulator.action_channels
@@ -42,11 +45,13 @@ def locate(
     lags, correlation = _lags(samples, floor, [c.name for c in inputs])
     count = len(windows)
     freedom = max(1e-9, 1 - nominal.basis.shape[2] * count / max(int(windows.inside.sum()), 1))
+    left = nominal.projected.reshape(count, windows.index.shape[1], -1) * sigma / floor.sigma
+    cost = (left**2).sum(axis=(1, 2))
     per_run = {}
     for run in np.unique(windows.run):
         own = windows.run == run
         rows = windows.inside[own].sum() * len(samples.measured)
-        per_run[samples.names[run]] = float(np.sqrt(nominal.costs[own].sum() / (rows * freedom)))
+        per_run[samples.names[run]] = float(np.sqrt(cost[own].sum() / (rows * freedom)))
     return Where(
         by_channel={
             channels[c].name: float(r) for c, r in zip(samples.measured, ratio, strict=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,41 +59,56 @@ def fixed(samples: Samples, length: int, shortest: int = 4) -> Windows:
     return Windows.cut(pieces)
 
 
-def by_growth(
+def cut(
     samples: Samples,
     jacobians: Array,
     scale: Array,
-    longest: int,
-    shortest: int = 5,
+    seconds: float,
+    shortest: int = 6,
     growth: float = 40.0,
 ) -> Windows:
-    """Windows that end where an error of the start state would have grown ``growth``-fold.
+    """Windows of about one length that share no sample, runs divided evenly.
 
-    Near an unstable equilibrium a long window outlives what its start state can tell, and its
-    residual measures chaos instead of the model.
+    A window ends earlier where an error of the start state would have grown ``growth``-fold: near
+    an unstable equilibrium a long one outlives what its start state can tell, and its residual
+    measures chaos instead of the model.
 
     Args:
         samples: The table.
         jacobians: Derivative of every next state by its state, shape (n, n_s, n_s).
         scale: Typical variation of each state, to make states of different units comparable.
-        longest, shortest: Bounds of the length in samples.
+        seconds: Wanted length of a window.
+        shortest: Fewest samples in a window.
         growth: Largest allowed norm of the product of the scaled Jacobians.
+
+    Raises:
+        ValueError: No run has samples enough for a window.
     """
     scaled = jacobians * scale[None, None, :] / scale[None, :, None]
     pieces = []
     for run, (start, stop) in enumerate(samples.runs):
-        a = start
-        while stop - a >= shortest:
-            product, length = np.eye(len(scale)), 1
-            while a + length < stop and length < longest:
-                product = scaled[a + length - 1] @ product
-                if length >= shortest and np.linalg.norm(product, 2) > growth:
-                    break
-                length += 1
-            if 0 < stop - a - length < shortest:
-                length = stop - a if stop - a <= longest else length
-            pieces.append((run, a, a + length))
-            a += length
+        if stop - start < shortest:
+            continue
+        spans = samples.times[stop - 1] - samples.times[start]
+        count = max(1, min(round(float(spans) / seconds), (stop - start) // shortest))
+        edges = np.linspace(start, stop, count + 1).round().astype(int)
+        for first, last in itertools.pairwise(edges.tolist()):
+            a = first
+            while last - a >= shortest:
+                product, size = np.eye(len(scale)), 1
+                while a + size < last:
+                    product = scaled[a + size - 1] @ product
+                    if size >= shortest and np.linalg.norm(product, 2) > growth:
+                        break
+                    size += 1
+                if 0 < last - a - size < shortest:
+                    size = last - a
+                pieces.append((run, a, a + size))
+                a += size
+    if not pieces:
+        raise ValueError(
+            f"every record is shorter than {shortest} samples, the least for a window: log longer"
+        )
     return Windows.cut(pieces)
 
 

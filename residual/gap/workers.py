@@ -68,7 +68,7 @@ def integrate_rows(host: HostSimulator, states: Array, inputs: Array, durations:
     try:
         with np.errstate(all="ignore"):
             after = host.integrate(states, inputs, durations)
-    except ArithmeticError:
+    except (ArithmeticError, np.linalg.LinAlgError):
         after = _survivors(host, states, inputs, durations)
     except ValueError as error:
         # What the math module says of the sine of infinity, before and from Python 3.14.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,19 +25,24 @@ _SPANS = (1, 2, 4, 8, 16, 32)
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """Something to know about the data that does not stop the work.
+    """Something to know about the data.
 
     Attributes:
         kind: What it is about, in one word: ``"gap"``, ``"sampling"``, ``"missing"``, ...
         where: File, run or channel it concerns.
         says: One plain sentence.
         numbers: The figures behind it, by name and unit.
+        severity: ``"note"``, ``"warning"`` (an answer may suffer), or ``"refuse"`` (no answer
+            could mean anything).
+        rows: Run and time in s of every sample concerned, where there are single ones.
     """
 
     kind: str
     where: str
     says: str
     numbers: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    severity: Literal["note", "warning", "refuse"] = "note"
+    rows: tuple[tuple[str, float], ...] = ()
 
 
 class Signal(NamedTuple):

@@ -13,6 +13,7 @@ from sims.effects.base import Effect as Effect
 from sims.effects.base import Quantity as Quantity
 from sims.effects.base import number as number
 from sims.effects.friction import CoulombFriction as CoulombFriction
+from sims.effects.friction import DirectionalFriction as DirectionalFriction
 from sims.effects.friction import DryFriction as DryFriction
 from sims.effects.friction import StribeckFriction as StribeckFriction
 from sims.effects.joint import Cogging as Cogging

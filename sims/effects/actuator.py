@@ -73,6 +73,7 @@ class ActuatorBias(StaticActuatorEffect):
     name: ClassVar[str] = "actuator_bias"
     sentence: ClassVar[str] = "The actuator adds a constant to every command."
     needs: ClassVar[str] = "motion in both directions"
+    family: ClassVar[str] = "constant push"
     stage: ClassVar[int] = 1
 
     def shape(self, u: Value) -> Value:
@@ -89,6 +90,7 @@ class DeadZone(StaticActuatorEffect):
     name: ClassVar[str] = "dead_zone"
     sentence: ClassVar[str] = "Small commands do nothing, larger ones lose the same amount."
     needs: ClassVar[str] = "small and large inputs"
+    upstream_of_sensor: ClassVar[bool] = True
     stage: ClassVar[int] = 2
 
     def shape(self, u: Value) -> Value:
@@ -107,6 +109,7 @@ class Saturation(StaticActuatorEffect):
     name: ClassVar[str] = "saturation"
     sentence: ClassVar[str] = "Commands beyond a level have no further effect."
     needs: ClassVar[str] = "inputs beyond the level"
+    upstream_of_sensor: ClassVar[bool] = True
     stage: ClassVar[int] = 3
 
     def shape(self, u: Value) -> Value:
@@ -123,6 +126,7 @@ class Delay(ActuatorEffect):
     name: ClassVar[str] = "delay"
     sentence: ClassVar[str] = "Commands arrive late by a fixed time."
     needs: ClassVar[str] = "sudden changes of the input"
+    family: ClassVar[str] = "delay or lag"
     stage: ClassVar[int] = 4
 
 
@@ -135,4 +139,6 @@ class ActuatorLag(ActuatorEffect):
     name: ClassVar[str] = "actuator_lag"
     sentence: ClassVar[str] = "The actuator follows its command gradually, not at once."
     needs: ClassVar[str] = "sudden changes of the input, then rest"
+    family: ClassVar[str] = "delay or lag"
+    upstream_of_sensor: ClassVar[bool] = True
     stage: ClassVar[int] = 5

@@ -104,12 +104,23 @@ class Effect(abc.ABC):
         sentence: What it is, in one plain sentence.
         enters: ``"joint"``, ``"actuator"``, ``"sensor"`` or ``"parameter"``.
         needs: What data must contain to show it.
+        family: What effects that differ in form more than in kind have in common, such as
+            ``"dissipation"``; empty if it stands alone. ``family_in`` asks for it.
+        subfamily: What a part of the family has in common beside that, ``"dry friction"``.
+        special_cases: Names of effects that it is equal to at some of its values, as Stribeck's
+            friction with equal levels is Coulomb's: data that show one of these fit it as well.
+        upstream_of_sensor: True if it acts before an input that was measured at the actuator's
+            output, so that such a record holds its consequence already.
     """
 
     name: ClassVar[str]
     sentence: ClassVar[str]
     enters: ClassVar[Literal["joint", "actuator", "sensor", "parameter"]]
     needs: ClassVar[str]
+    family: ClassVar[str] = ""
+    subfamily: ClassVar[str] = ""
+    special_cases: ClassVar[tuple[str, ...]] = ()
+    upstream_of_sensor: ClassVar[bool] = False
 
     @property
     def where(self) -> str:
@@ -193,6 +204,10 @@ class Effect(abc.ABC):
         Raises:
             ValueError: The simulator has no such place; the message lists those it has.
         """
+
+    def family_in(self, simulator: HostSimulator) -> str:
+        """Its family where it acts, an empty string if it stands alone."""
+        return self.family
 
     def __str__(self) -> str:
         return f"{self.name}@{self.where}"

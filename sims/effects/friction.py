@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from sims.effects.base import number
-from sims.effects.joint import JointEffect, Value
+from sims.effects.joint import ConstantLoad, JointEffect, Value
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,6 +19,9 @@ class DryFriction(JointEffect):
     Hosts apply it as it is defined: at rest it is whatever force holds the joint, up to
     ``limit(0)``; no smoothing of the sign, hence no creep.
     """
+
+    family: ClassVar[str] = "dissipation"
+    subfamily: ClassVar[str] = "dry friction"
 
     @abc.abstractmethod
     def limit(self, v: Value) -> Value:
@@ -62,9 +65,40 @@ class StribeckFriction(DryFriction):
     name: ClassVar[str] = "stribeck_friction"
     sentence: ClassVar[str] = "Dry friction that holds harder at rest than it brakes in motion."
     needs: ClassVar[str] = "slow reversals and stops, and fast motion"
+    special_cases: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
 
     def limit(self, v: Value) -> Value:
         """Size of the friction at rate ``v``."""
         ratio = v / self.speed
         excess = np.maximum(self.breakaway - self.sliding, 0.0)
         return self.sliding + excess * np.exp(-ratio * ratio)
+
+
+@dataclasses.dataclass(frozen=True)
+class DirectionalFriction(DryFriction):
+    """Dry friction of size ``forward`` against positive rates and ``backward`` against negative.
+
+    At rest it holds against a pull forward up to ``forward``, and ``backward`` likewise. The same
+    motion comes from Coulomb friction of the mean size and a constant load of half the difference,
+    so no data can tell it from those two together.
+    """
+
+    forward: Value = number(low=0.0, force=1, share=0.1)
+    backward: Value = number(low=0.0, force=1, share=0.1)
+
+    name: ClassVar[str] = "directional_friction"
+    sentence: ClassVar[str] = "Dry friction that is larger in one direction than in the other."
+    needs: ClassVar[str] = "motion and stops in both directions"
+    special_cases: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
+
+    def parts(self) -> tuple[JointEffect, ...]:
+        """Coulomb friction and a constant load."""
+        return (
+            CoulombFriction(self.joint, 0.5 * (self.forward + self.backward)),
+            ConstantLoad(self.joint, 0.5 * (self.backward - self.forward)),
+        )
+
+    def limit(self, v: Value) -> Value:
+        """The level of the direction; at rest the larger one."""
+        most = np.maximum(self.forward, self.backward)
+        return np.where(v > 0, self.forward, np.where(v < 0, self.backward, most))

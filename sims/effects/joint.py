@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 Value = Any  # float, or an array with one entry per row
 
+# Where a spring may rest, as shares of the position's scale; the middle one is usual.
+RESTS = (-0.5, 0.0, 0.5)
+
 
 @dataclasses.dataclass(frozen=True)
 class JointEffect(Effect):
@@ -32,6 +35,10 @@ class JointEffect(Effect):
     enters: ClassVar = "joint"
     mechanical: ClassVar[bool] = True
     follows_rate: ClassVar[bool] = True
+
+    def parts(self) -> tuple[JointEffect, ...]:
+        """The simpler effects that it is the sum of, or itself alone."""
+        return (self,)
 
     @abc.abstractmethod
     def force(self, q: Value, v: Value) -> Value:
@@ -62,6 +69,7 @@ class ViscousFriction(JointEffect):
     name: ClassVar[str] = "viscous_friction"
     sentence: ClassVar[str] = "Friction that grows in proportion to speed."
     needs: ClassVar[str] = "motion at several speeds"
+    family: ClassVar[str] = "dissipation"
 
     def force(self, q: Value, v: Value) -> Value:
         """Force opposing the rate."""
@@ -77,6 +85,7 @@ class QuadraticDrag(JointEffect):
     name: ClassVar[str] = "quadratic_drag"
     sentence: ClassVar[str] = "Drag that grows with the square of speed, as in air or water."
     needs: ClassVar[str] = "fast motion and slow motion"
+    family: ClassVar[str] = "dissipation"
 
     def force(self, q: Value, v: Value) -> Value:
         """Force opposing the rate."""
@@ -88,11 +97,12 @@ class LinearSpring(JointEffect):
     """A spring: ``-stiffness (q - rest)``; an angle is not wrapped."""
 
     stiffness: Value = number(low=0.0, force=1, position=-1)
-    rest: Value = number(role="fixed", position=1)
+    rest: Value = number(role="shape", position=1, starts=RESTS)
 
     name: ClassVar[str] = "linear_spring"
     sentence: ClassVar[str] = "A spring that pulls back in proportion to the distance."
     needs: ClassVar[str] = "a wide range of positions"
+    family: ClassVar[str] = "spring"
     follows_rate: ClassVar[bool] = False
 
     def force(self, q: Value, v: Value) -> Value:
@@ -105,11 +115,12 @@ class CubicSpring(JointEffect):
     """A spring that stiffens: ``-stiffness (q - rest)^3``; an angle is not wrapped."""
 
     stiffness: Value = number(low=0.0, force=1, position=-3)
-    rest: Value = number(role="fixed", position=1)
+    rest: Value = number(role="shape", position=1, starts=RESTS)
 
     name: ClassVar[str] = "cubic_spring"
     sentence: ClassVar[str] = "A spring that is soft near its rest and stiffens far from it."
     needs: ClassVar[str] = "small and large displacements"
+    family: ClassVar[str] = "spring"
     follows_rate: ClassVar[bool] = False
 
     def force(self, q: Value, v: Value) -> Value:
@@ -127,6 +138,7 @@ class ConstantLoad(JointEffect):
     name: ClassVar[str] = "constant_load"
     sentence: ClassVar[str] = "A force that pulls with constant strength in one direction."
     needs: ClassVar[str] = "motion in both directions"
+    family: ClassVar[str] = "constant push"
     mechanical: ClassVar[bool] = False
     follows_rate: ClassVar[bool] = False
 

@@ -19,7 +19,12 @@ from sims.effects.actuator import (
 )
 from sims.effects.backlash import Backlash
 from sims.effects.base import Effect
-from sims.effects.friction import CoulombFriction, DryFriction, StribeckFriction
+from sims.effects.friction import (
+    CoulombFriction,
+    DirectionalFriction,
+    DryFriction,
+    StribeckFriction,
+)
 from sims.effects.joint import (
     Cogging,
     ConstantLoad,
@@ -40,6 +45,7 @@ JOINT_EFFECTS: tuple[type[Effect], ...] = (
     ViscousFriction,
     CoulombFriction,
     StribeckFriction,
+    DirectionalFriction,
     QuadraticDrag,
     LinearSpring,
     CubicSpring,
@@ -52,7 +58,10 @@ SENSOR_EFFECTS = (SensorOffset, SensorScale)
 
 
 def library(simulator: HostSimulator) -> tuple[Effect, ...]:
-    """Every effect that the simulator can host, at zero strength and with typical shapes."""
+    """Every effect that the simulator offers, at zero strength and with typical shapes."""
+    own = simulator.offered_effects()
+    if own is not None:
+        return own
     places: list[tuple[type[Effect], str]] = []
     for joint in simulator.joints:
         places += [(effect, joint.name) for effect in JOINT_EFFECTS]
@@ -98,10 +107,12 @@ class Alias:
         effects: Two that have the same consequence, or three or four of which any one
             equals a combination of the rest; written ``name@where``.
         says: The same in words.
+        combination: True if one equals a combination of the rest, False if each equals any other.
     """
 
     effects: tuple[str, ...]
     says: str
+    combination: bool = False
 
 
 def exact_aliases(
@@ -137,7 +148,7 @@ def exact_aliases(
             if _dependent(names, columns, blurs):
                 sets.append(set(names))
                 rest = ", ".join(names)
-                found.append(Alias(names, f"{rest}: any one is a combination of the others"))
+                found.append(Alias(names, f"{rest}: any one is a combination of the others", True))
     return tuple(found)
 
 
@@ -241,7 +252,7 @@ def _response(
     for value in (change, -change):
         changed = simulator.with_effects([effect.with_values(**{name: value})])
         # The actuator path is applied to the input here, where it has no memory.
-        commands = changed.drive(inputs, np.ones(len(inputs)), 2, "zero")
+        commands = changed.drive(inputs, np.ones(len(inputs)), 2, hold="zero")
         durations = np.full(len(states), 0.1 * simulator.dt)
         ends.append(changed.integrate(states, commands, durations))
     scale = np.array([channel.scale for channel in simulator.physical_channels])

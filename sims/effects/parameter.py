@@ -48,5 +48,9 @@ class ParameterChange(Effect):
         high = parameter.high - float(np.max(parameter.value))
         return {"change": dataclasses.replace(found["change"], low=low, high=high)}
 
+    def family_in(self, simulator: HostSimulator) -> str:
+        """The family that the parameter was declared with."""
+        return place("parameter", self.parameter, simulator.parameters).family
+
     def __str__(self) -> str:
         return self.parameter

@@ -7,8 +7,11 @@ import dataclasses
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
+
 from sims.effects.base import Effect, number, place
 from sims.effects.joint import Value
+from sims.simulator import Array
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
@@ -53,6 +56,7 @@ class SensorOffset(SensorEffect):
     name: ClassVar[str] = "sensor_offset"
     sentence: ClassVar[str] = "The sensor's zero is wrong: it reads too much by a constant."
     needs: ClassVar[str] = "a force that depends on the true position, such as gravity"
+    family: ClassVar[str] = "constant push"
     stage: ClassVar[int] = 1
 
     def read(self, x: Value) -> Value:
@@ -88,3 +92,17 @@ class SensorScale(SensorEffect):
     def undo(self, x: Value) -> Value:
         """Truth."""
         return x / (1.0 + self.scale)
+
+
+def through_sensors(simulator: HostSimulator, states: Array, forward: bool) -> Array:
+    """What the sensors read of true states, (n, n_i), or backward what is true where they do."""
+    effects = [e for e in simulator.effects if isinstance(e, SensorEffect) and not e.absent]
+    if not effects:
+        return states
+    states = np.array(states, float)
+    names = [channel.name for channel in simulator.physical_channels]
+    for effect in sorted(effects, key=lambda effect: effect.stage, reverse=not forward):
+        column = names.index(effect.channel)
+        change = effect.read if forward else effect.undo
+        states[:, column] = change(states[:, column])
+    return states

@@ -75,7 +75,12 @@ def leo_parameters(
         "resistance": Parameter(RESISTANCE, "ohm", "resistance of each winding", low=1e-2),
         "supply": Parameter(1.0, "1", "share of the commanded voltage that arrives", low=0.0),
         "friction": Parameter(
-            friction, "N m s/rad", "viscous friction of all joints", low=0.0, scale=0.3
+            friction,
+            "N m s/rad",
+            "viscous friction of all joints",
+            low=0.0,
+            scale=0.3,
+            family="dissipation",
         ),
     }
 

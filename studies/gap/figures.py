@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 
 from residual.gap import GapResult
 from residual.gap.result import Profile, Rollout
-from studies.gap.words import CEILING, FLOOR, gap_rows, quantity_text
+from studies.gap.words import FLOOR, gap_rows, quantity_text
 from studies.reporting.figures import (
     AMBER,
     BLUE,
@@ -29,19 +29,17 @@ NARROW = 4.0
 
 @styled()
 def shrinking(result: GapResult, path: Path) -> Drawing:
-    """One bar per step from the nominal simulator on, one for the ceiling, a line for the noise."""
+    """One bar per step from the nominal simulator on, and a line for the noise."""
     gap = result.gap
-    rows = [row for row in gap_rows(result) if row[0] != FLOOR]
+    rows = [row for row in gap_rows(gap) if row[0] != FLOOR]
     figure, axes = new_figure(height=1.15 + 0.42 * len(rows))
     axis: Axes = axes[0, 0]
     top = max(span.high for _, span in rows)
-    for place, (name, span) in enumerate(rows):
-        nominal, ceiling = place == 0, name == CEILING
-        colour = ORANGE if nominal else MUTED if ceiling else BLUE
-        axis.barh(place, span.value, height=0.6, color=colour, alpha=0.55 if ceiling else 1.0)
+    for place, (_, span) in enumerate(rows):
+        axis.barh(place, span.value, height=0.6, color=ORANGE if place == 0 else BLUE)
         axis.hlines(place, span.low, span.high, color=INK, linewidth=1.3)
         times = span.value / max(gap.noise_floor.value, 1e-300)
-        text = f"{quantity_text(span.value, gap.unit)}, {times:.3g} × noise"
+        text = f"{quantity_text(span.value, gap.unit)}, {float(f'{times:.3g}'):g} × noise"
         inside = span.low > 0.5 * top
         axis.annotate(
             text, (0 if inside else span.high, place), xytext=(7, 0), textcoords="offset points",
@@ -56,7 +54,7 @@ def shrinking(result: GapResult, path: Path) -> Drawing:
     figure.legend(loc="outside upper left", handlelength=1.8)
     data = pd.DataFrame(
         [{"step": name, "value": s.value, "low": s.low, "high": s.high}
-         for name, s in gap_rows(result)]
+         for name, s in gap_rows(gap)]
     )  # fmt: skip
     save_figure(figure, path, data)
     return figure
@@ -64,7 +62,7 @@ def shrinking(result: GapResult, path: Path) -> Drawing:
 
 @styled()
 def rollout(result: GapResult, shown: Rollout, path: Path) -> Drawing:
-    """One held-out forecast: measured dots, nominal and corrected, noise band around the latter."""
+    """One forecast: measured dots, nominal and corrected, noise band around the latter."""
     count = len(result.channels)
     figure, axes = new_figure(count, 1, width=NARROW, height=0.7 + 1.55 * count, share_x=True)
     time = shown.times - shown.times[0]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import os
 import secrets
 import shutil
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ import yaml
 from residual.gap import GapResult
 from residual.logs import Finding
 from sims.loading import corrected_settings
+from studies.gap.answer import lead
 from studies.gap.report import write_report
 from studies.running.command import versions
 from studies.running.files import atomic_write_json, atomic_write_text
@@ -47,10 +50,12 @@ def write_gap(
     """
     record = gap_record(result, config, findings, seconds)
     with staged(Path(folder)) as stage:
-        corrected = corrected_settings(config["simulator"], result.effects)
+        corrected = corrected_settings(config["simulator"], result.effects, record["hold"])
         about = "# The simulator with what find_gap added; loadable as --simulator corrected.yaml\n"
         text = yaml.safe_dump(corrected, sort_keys=False)
         atomic_write_text(stage / CORRECTED, about + text)
+        for name, content in result.corrected.own_files().items():
+            (stage / name).write_bytes(content)
         write_report(result, record, stage)
         atomic_write_json(stage / JSON, record)
     return Path(folder)
@@ -63,31 +68,14 @@ def gap_record(
     seconds: float | None = None,
 ) -> dict[str, Any]:
     """What ``gap.json`` holds (docs/find-gap.md)."""
-    gap = result.gap
     total = sum(result.seconds.values()) if seconds is None else seconds
     return {
-        "verdicts": [
-            {
-                "kind": verdict.kind,
-                "effect": verdict.effect,
-                "where": verdict.where,
-                "parameters": verdict.parameters,
-                "alternatives": verdict.alternatives,
-                "says": verdict.says,
-            }
-            for verdict in result.verdicts
-        ],
-        "gap": {
-            "channel": gap.channel,
-            "unit": gap.unit,
-            "horizon_s": gap.horizon_s,
-            "before": gap.before,
-            "after": gap.after,
-            "noise_floor": gap.noise_floor,
-            "ceiling": gap.ceiling,
-            "steps": gap.steps,
-            "by_channel": gap.by_channel,
-        },
+        "says": lead(result, config.get("tolerance")),
+        "verdicts": [dataclasses.asdict(verdict) for verdict in result.verdicts],
+        "gap": dataclasses.asdict(result.gap),
+        "held_out": dataclasses.asdict(result.held_out) if result.held_out else None,
+        "hold": {channel.name: channel.hold for channel in result.corrected.action_channels},
+        "evidence": [dataclasses.asdict(rival) for rival in result.evidence],
         "noise": {
             name: {"value": sigma, "error": error} for name, (sigma, error) in result.noise.items()
         },
@@ -99,6 +87,23 @@ def gap_record(
         "versions": versions(),
         "config": config,
     }
+
+
+def check_folder(folder: Path) -> None:
+    """Find out before the work whether its results can be written.
+
+    Raises:
+        ValueError: They cannot.
+    """
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise ValueError(f"--output {folder}: {there} is a file, expected a folder")
+    try:
+        with tempfile.TemporaryDirectory(prefix=".partial-", dir=there):
+            pass
+    except OSError as error:
+        reason = error.strerror or error
+        raise ValueError(f"--output {folder} cannot be written: {reason}") from None
 
 
 @contextlib.contextmanager

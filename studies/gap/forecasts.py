@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from residual.gap import GapResult
-from residual.gap.result import Rollout
+from residual.gap.result import Gap, Rollout
 from studies.gap.figures import lags, profile, rollout, shrinking
-from studies.gap.words import quantity_text, seconds_text
+from studies.gap.words import CROSS_VALIDATED, ahead, percent, quantity_text, seconds_text
 from studies.reporting import Figure, Gallery, KeyValues, Prose, Section, Table
 from studies.reporting.sections import Cell
 
@@ -21,18 +21,18 @@ ROLLOUTS, PROFILES = 4, 6
 def tiles(result: GapResult) -> KeyValues:
     """The headline numbers."""
     gap = result.gap
-    ahead = f"{seconds_text(gap.horizon_s)} error of {gap.channel}"
-    items: dict[str, Any] = {f"{ahead}, nominal": quantity_text(gap.before.value, gap.unit)}
+    items: dict[str, Any] = {}
     if result.effects:
-        items[f"{ahead}, corrected"] = quantity_text(gap.after.value, gap.unit)
+        items["of the gap has a name"] = percent(gap.share.value).replace("more than", ">")
+    items[f"{ahead(gap)}, nominal"] = quantity_text(gap.before.value, gap.unit)
+    if result.effects:
+        items[f"{ahead(gap)}, corrected"] = quantity_text(gap.after.value, gap.unit)
     items["what noise alone would give"] = quantity_text(gap.noise_floor.value, gap.unit)
-    if gap.ceiling is not None:
-        items["with a flexible estimator instead"] = quantity_text(gap.ceiling.value, gap.unit)
     return KeyValues(items, style="tiles")
 
 
 def rollouts(result: GapResult, folder: Path) -> list[Section]:
-    """Held-out forecasts, before and after."""
+    """Forecasts before and after."""
     pictures = [
         Figure(
             rollout(result, shown, folder / f"rollout-{number}.png"),
@@ -46,9 +46,9 @@ def rollouts(result: GapResult, folder: Path) -> list[Section]:
     return [
         Gallery(
             pictures,
-            f"Forecasts over {seconds_text(result.gap.horizon_s)} on data that were not used to "
-            "find the answer. Each starts from a state fitted to the samples before it.",
-            heading="Before and after, on held-out data",
+            f"Forecasts over {seconds_text(result.gap.horizon_s)} of data that did not fit the "
+            "numbers. Each starts from a state fitted to its first samples.",
+            heading="Before and after",
         )
     ]
 
@@ -63,47 +63,61 @@ def spread(result: GapResult) -> list[Rollout]:
 def bars(result: GapResult, folder: Path) -> Figure:
     """The gap, shrinking."""
     gap = result.gap
-    left_out = (
-        f" {100 * gap.left_out:.0f} % of the forecasts were left out, since no model could make "
-        "them from a noisy start."
-        if gap.left_out > 0.005
-        else ""
-    )
-    error = "Root mean square error"
-    if result.robust:
-        error = "Median over forecasts of the root mean square error"
     return Figure(
         shrinking(result, folder / "gap.png"),
         f"The error falls from {gap.before.value:.3g} to {gap.after.value:.3g} {gap.unit}; noise "
         f"alone gives {gap.noise_floor.value:.3g}.",
-        f"{error} of {gap.channel} over {seconds_text(gap.horizon_s)} on held-out "
-        "data, with the 95 % interval over forecasts. **Noise floor**: what the corrected "
-        f"simulator would reach on its own data plus noise. **Flexible estimator**: the nominal "
-        f"simulator plus a learnt correction without physics.{left_out}",
+        f"Root mean square error of {gap.channel} over {seconds_text(gap.horizon_s)}, in "
+        f"{CROSS_VALIDATED}: {gap.blocks} blocks of the records, dealt over {gap.folds} groups "
+        "that are left out in turn; 95 % interval over blocks. **Noise floor**: what the corrected "
+        "simulator would reach on its own data plus noise.",
         heading="The gap, step by step",
     )
 
 
+def set_aside(result: GapResult) -> list[Section]:
+    """Errors on the records that were never used."""
+    gap = result.held_out
+    if gap is None:
+        return []
+    return [
+        Table(
+            ["channel", "nominal", "corrected", "noise floor"],
+            _errors(gap),
+            f"Root mean square errors over {seconds_text(gap.horizon_s)} in the records that were "
+            "held out: they had no part in the answer.",
+            heading="Records set aside",
+        )
+    ]
+
+
+def _errors(gap: Gap) -> list[list[Cell]]:
+    """Channel, nominal, corrected, noise floor."""
+    return [
+        [
+            f"{name} ({of.unit})" if of.unit else name,
+            of.before.value, of.after.value, of.noise_floor.value,
+        ]
+        for name, of in gap.by_channel.items()
+    ]  # fmt: skip
+
+
 def where(result: GapResult, folder: Path) -> list[Section]:
     """Channel, region and lag."""
-    gap = result.gap
-    rows: list[list[Cell]] = []
-    for name, ratio in result.where.by_channel.items():
-        of = gap.by_channel[name]
-        rows.append([
-            f"{name} ({of.unit})" if of.unit else name, float(ratio), of.before.value,
-            of.after.value, of.noise_floor.value, of.ceiling.value if of.ceiling else None,
-        ])  # fmt: skip
+    ratios = result.where.by_channel
+    rows: list[list[Cell]] = [
+        [*errors, float(ratios[name])]
+        for name, errors in zip(result.gap.by_channel, _errors(result.gap), strict=True)
+    ]
     sections: list[Section] = [
         Table(
-            ["channel", "residual / noise", "nominal", "corrected", "noise floor",
-             "flexible estimator"],
+            ["channel", "nominal", "corrected", "noise floor", "residual / noise"],
             rows,
-            "Residual of the nominal simulator in training windows over the noise (1 is noise), "
-            "and held-out forecast errors.",
+            f"Root mean square errors, {CROSS_VALIDATED}; and the residual of the nominal "
+            "simulator over the noise in windows with free start states (1 is noise).",
             heading="Where the nominal simulator fails",
         )
-    ]  # fmt: skip
+    ]
     pictures = [
         Figure(
             profile(found, folder / f"missing-{number}.png"),

@@ -10,9 +10,8 @@ from typing import Any
 import yaml
 
 from residual.gap import GapResult
-from studies.gap.forecasts import bars, rollouts, tiles, where
-from studies.gap.verdicts import apart, banner, blind, evidence
-from studies.gap.words import twins
+from studies.gap.forecasts import bars, rollouts, set_aside, tiles, where
+from studies.gap.verdicts import apart, banners, blind, evidence
 from studies.reporting import Code, Prose, Report, Section, Table
 
 # Findings beyond these are in gap.json.
@@ -27,15 +26,16 @@ def write_report(result: GapResult, record: Mapping[str, Any], folder: Path) -> 
         record: What ``gap.json`` holds.
         folder: Where to.
     """
-    figures, alike = folder / "figures", twins(result)
+    figures = folder / "figures"
     sections: list[Section] = [
-        *(banner(v, result, alike) for v in result.verdicts if v.kind != "needs_data"),
+        *banners(result, record["config"].get("tolerance")),
         tiles(result),
         *rollouts(result, figures),
         bars(result, figures),
+        *set_aside(result),
         *where(result, figures),
         evidence(result),
-        *apart(result, alike),
+        *apart(result),
         *blind(result),
         *quality(result, record),
         *provenance(record),

@@ -2,117 +2,124 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Literal
 
 from residual.gap import GapResult
 from residual.gap.result import Verdict as Answer
-from studies.gap.words import (
-    KINDS,
-    effect_name,
+from studies.gap.answer import (
     experiment,
     headline,
-    label_of,
+    is_footnote,
+    kind_text,
+    lead,
+    notes,
+    rivals,
     sentence,
-    set_name,
-    unlike_and_alike,
 )
-from studies.reporting import Section, Table, Verdict
+from studies.gap.words import effect_name, label_of, names_of, set_name
+from studies.reporting import Prose, Section, Table, Verdict
 from studies.reporting.sections import Cell
 
-# Effects that no motion can tell apart, by label; see ``words.twins``.
-Twins = Mapping[str, tuple[str, ...]]
 Tone = Literal["good", "warning", "bad", "neutral"]
 TONES: dict[str, Tone] = {
     "confirmed": "good",
     "ambiguous": "warning",
-    "needs_data": "neutral",
     "unexplained": "bad",
     "no_gap": "good",
 }
-# Explanations listed.
-RIVALS = 10
+#: Explanations listed.
+RIVALS = 12
+#: Sets of effects listed that make the same motion together.
+TOGETHER = 2
 
 
-def banner(answer: Answer, result: GapResult, alike: Twins) -> Verdict:
-    """One verdict."""
-    text = []
-    if answer.effect:
-        label = label_of(answer)
-        text.append(sentence(label, result))
-        ties, same = unlike_and_alike(answer, alike)
-        if ties:
-            family = f", all of them {answer.family}" if answer.family else ""
-            text.append(f"These data cannot tell it from **{names_of(ties)}**{family}.")
-        if same:
-            text.append(f"No motion can tell it from **{names_of(same)}**.")
-        if answer.kind == "confirmed":
-            text.append("Confirmed on held-out data.")
-        elif "nothing confirms it" in answer.says:
-            text.append("Held-out data do not go where it shows, so nothing confirms it.")
-        elif not ties:
-            text.append("A remainder is unexplained, so take this as a lead.")
-        if "provisional" in answer.says:
-            text.append("Provisional: there is one record only, whose end was held out.")
-    elif answer.kind == "unexplained" and answer.says.startswith("unexplained: no single"):
-        text.append("Together they reach the noise, but so do others: take the names as leads.")
-    elif answer.kind == "unexplained":
-        text.append(
-            "Something is left above the noise that no effect of the library names; the figures "
-            "below show where."
+def banners(result: GapResult, tolerance: float | None) -> list[Section]:
+    """The first sentence, one banner per verdict, and what is too small for one."""
+    worst = {verdict.kind for verdict in result.verdicts if not is_footnote(verdict)}
+    tone: Tone = "good"
+    if result.effects and worst & {"ambiguous", "unexplained"}:
+        tone = "warning"
+    elif not result.effects and "unexplained" in worst:
+        tone = "bad"
+    sections: list[Section] = [Verdict(lead(result, tolerance), tone=tone, label="answer")]
+    small = []
+    for verdict in result.verdicts:
+        if verdict.kind in ("confirmed", "ambiguous", "unexplained") and not is_footnote(verdict):
+            sections.append(banner(verdict, result))
+        elif verdict.kind == "minor" or is_footnote(verdict):
+            says = headline(verdict, result)
+            small.append("; ".join([says[:-1], *notes(verdict, result)]) + ".")
+    if small:
+        minor = any(verdict.kind == "minor" for verdict in result.verdicts)
+        why = (
+            " Minor effects take less than a fifth off what remains without them, so they are "
+            "not in the corrected simulator."
+            if minor
+            else ""
         )
-    elif answer.kind == "no_gap":
-        text.append("The simulator predicts held-out data as well as the noise allows.")
+        sections.append(Prose(" ".join(small) + why))
+    return sections
+
+
+def banner(answer: Answer, result: GapResult) -> Verdict:
+    """One verdict."""
+    text = [sentence(label_of(answer), result)] if answer.effect else []
+    text += [f"{note[:1].upper()}{note[1:]}." for note in notes(answer, result)]
     return Verdict(
-        headline(answer, result), " ".join(text), tone=TONES[answer.kind], label=KINDS[answer.kind]
-    )
-
-
-def names_of(labels: list[str]) -> str:
-    """Effects in words: ``a, b or c``."""
-    words = [effect_name(label) for label in labels]
-    return " or ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+        headline(answer, result), " ".join(filter(None, text)), tone=TONES[answer.kind],
+        label=kind_text(answer),
+    )  # fmt: skip
 
 
 def evidence(result: GapResult) -> Table:
-    """What was tried, best first."""
-    rows: list[list[Cell]] = []
-    for rival in result.evidence[:RIVALS]:
-        judged = "chosen" if rival.chosen else "excluded" if rival.excluded else "not excluded"
-        rows.append([set_name(rival.effects), float(rival.ratio), float(rival.excess), judged])
-    judged_by = (
-        "The score is chi-squared plus a price for each number; an effect had to lower it by "
-        f"{result.threshold[0]:.3g}, calibrated on data without a gap."
-    )
-    if result.robust:
-        judged_by = (
-            "The score is a robust loss in which every window has one vote; an effect had to lower "
-            f"it by {result.threshold[0]:.3g}, the windows that gain and lose most left out."
-        )
+    """What was tried: the chosen set, then by error."""
+    shown = list(result.evidence[:RIVALS])
+    if not any(not rival.effects for rival in shown):
+        shown += [rival for rival in result.evidence if not rival.effects][:1]
+    rows: list[list[Cell]] = [
+        [
+            set_name(rival.effects),
+            float(rival.error),
+            "chosen" if rival.chosen else rival.reason,
+        ]
+        for rival in shown
+    ]
+    more = len(result.evidence) - len(shown)
     return Table(
-        ["explanation", "residual / noise", "score above the chosen", "judgement"],
+        ["explanation", "error / nominal", "why not"],
         rows,
-        f"Every explanation is refitted in full on the training data. {judged_by}",
-        highlight=[i for i, rival in enumerate(result.evidence[:RIVALS]) if rival.chosen],
+        "Every explanation is fitted in full; 0 is a perfect forecast, 1 is as bad as the nominal "
+        "simulator, always on data that did not fit the numbers, all channels together. The "
+        "smallest set that is good enough is chosen: each effect has to take a fifth off what "
+        "remains without it, or a third at one joint; where only noise remains, chance decides."
+        + (f" {more} more are in `gap.json`." if more > 0 else ""),
+        highlight=[i for i, rival in enumerate(shown) if rival.chosen],
         heading="Evidence and runners-up",
     )
 
 
-def apart(result: GapResult, alike: Twins) -> list[Section]:
+def apart(result: GapResult) -> list[Section]:
     """What could not be told apart, and what would tell."""
-    rows = []
+    rows: list[list[Cell]] = []
     for answer in result.verdicts:
-        if not answer.effect:
+        if answer.kind not in ("confirmed", "ambiguous"):
             continue
         label = label_of(answer)
-        ties, same = unlike_and_alike(answer, alike)
-        for group, exact in ((ties, False), (same, True)):
-            if group:
-                rows.append([
-                    effect_name(label), names_of(group),
-                    "the same motion in any data" if exact else "these data",
-                    experiment(label, group, result, exact),
-                ])  # fmt: skip
+        groups = (
+            (rivals(answer), "these data", False),
+            (answer.form, "these data, and it is of the same family", False),
+            (answer.same_motion, "the same motion in any data", True),
+            (
+                tuple(" with ".join(names) for names in answer.together[:TOGETHER]),
+                "the same motion in any data, in one exact proportion",
+                True,
+            ),
+        )
+        rows += [
+            [effect_name(label), names_of(group), why, experiment(label, group, result, same)]
+            for group, why, same in groups
+            if group
+        ]
     if not rows:
         return []
     return [
@@ -128,7 +135,7 @@ def blind(result: GapResult) -> list[Section]:
     """Effects that this log could hide."""
     if not result.blind:
         return []
-    rows = [
+    rows: list[list[Cell]] = [
         [effect_name(b.effect), f"{b.visible_from:.3g} {b.unit}".removesuffix(" 1"), b.needs]
         for b in result.blind
     ]

@@ -1,26 +1,29 @@
-"""What find_gap found, in words: for the report and for the terminal."""
+"""Names, numbers and errors in words, for the report and for the terminal."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from residual.gap import GapResult
-from residual.gap.confirm import Span
-from residual.gap.result import Number, Verdict
+from residual.gap.result import Gap, Number, Span, Verdict
 from sims.effects.base import Effect
-from sims.effects.library import exact_aliases, library
+from sims.effects.library import library
 
 KINDS = {
     "confirmed": "confirmed",
     "ambiguous": "not certain",
+    "minor": "minor",
     "needs_data": "this log cannot show",
     "unexplained": "unexplained",
     "no_gap": "no gap",
 }
-
-#: Rows of the shrinking gap that are no steps.
-FLOOR, CEILING = "noise floor", "flexible estimator"
+#: Row of the shrinking gap that is no step.
+FLOOR = "noise floor"
+#: What the errors are errors of.
+CROSS_VALIDATED = "forecasts of data that did not fit the numbers"
+#: Names of people, in the names of effects.
+PEOPLE = ("Coulomb", "Stribeck")
 
 
 def effect_name(label: str) -> str:
@@ -28,12 +31,27 @@ def effect_name(label: str) -> str:
     if " with " in label:
         return " with ".join(map(effect_name, label.split(" with ")))
     name, _, where = label.partition("@")
-    return name.replace("_", " ") + (f" at {where.replace('_', ' ')}" if where else "")
+    words = name.replace("_", " ")
+    for person in PEOPLE:
+        words = words.replace(person.lower(), person)
+    return words + (f" at {where.replace('_', ' ')}" if where else "")
 
 
 def set_name(labels: Sequence[str]) -> str:
     """A set of effects in words; the empty set is the nominal simulator."""
     return " + ".join(map(effect_name, labels)) or "nominal simulator"
+
+
+def listed(words: Sequence[str], last: str = "and") -> str:
+    """``a, b and c``."""
+    if len(words) < 2:
+        return "".join(words)
+    return f"{', '.join(words[:-1])} {last} {words[-1]}"
+
+
+def names_of(labels: Sequence[str], last: str = "or") -> str:
+    """Effects in words: ``a, b or c``."""
+    return listed([effect_name(label) for label in labels], last)
 
 
 def rounded(value: float, half: float) -> str:
@@ -54,10 +72,14 @@ def unit_text(unit: str) -> str:
 
 
 def number_text(number: Number, sign: bool = False) -> str:
-    """Value and 95 % interval with the unit."""
+    """Value and 95 % interval with the unit; of a number at its bound no interval is known."""
+    plus = "+" if sign and number.value > 0 else ""
+    if number.at_bound:
+        return f"{plus}{number.value:.3g}{unit_text(number.unit)} (at its bound)".replace(
+            "-", "\u2212"
+        )
     half = 0.5 * (number.high - number.low)
     value, low, high = (rounded(x, half) for x in (number.value, number.low, number.high))
-    plus = "+" if sign and number.value > 0 else ""
     return f"{plus}{value}{unit_text(number.unit)} ({low} to {high})".replace("-", "\u2212")
 
 
@@ -73,47 +95,27 @@ def quantity_text(value: float, unit: str) -> str:
     return f"{value:.3g}{unit_text(unit)}"
 
 
+def percent(share: float) -> str:
+    """A share as ``12 %``, with more digits where it is close to nothing or to all."""
+    hundredths = 100 * min(max(share, 0.0), 1.0)
+    if not math.isfinite(hundredths):
+        return "an unknown part"
+    if 0 < hundredths < 0.1:
+        return "less than 0.1 %"
+    if 99.9 < hundredths < 100:
+        return "more than 99.9 %"
+    close = hundredths < 2 or hundredths > 99
+    return f"{hundredths:.1f}".removesuffix(".0") + " %" if close else f"{hundredths:.0f} %"
+
+
 def seconds_text(seconds: float) -> str:
     """A forecast length: ``1 s``."""
     return f"{float(f'{seconds:.3g}'):g} s"
 
 
-def headline(verdict: Verdict, result: GapResult) -> str:
-    """The verdict in one sentence."""
-    if not verdict.effect:
-        says = verdict.says.removeprefix(f"{verdict.kind}: ")
-        return says[:1].upper() + says[1:] + "."
-    name = effect_name(label_of(verdict))
-    parameter = result.corrected.parameters.get(verdict.where)
-    if verdict.effect == verdict.where and parameter is not None:
-        (change,) = verdict.parameters.values()
-        total = rounded(float(parameter.value) + change.value, 0.5 * (change.high - change.low))
-        return (
-            f"{name.capitalize()}: {number_text(change, sign=True)}, so {total}"
-            f"{unit_text(change.unit)} in place of {float(parameter.value):g}."
-        )
-    numbers = ", ".join(
-        f"{field.replace('_', ' ')} {number_text(number)}"
-        for field, number in verdict.parameters.items()
-    )
-    return f"{name[:1].upper()}{name[1:]}{shape(verdict, result)}: {numbers}."
-
-
-def shape(verdict: Verdict, result: GapResult) -> str:
-    """Numbers that were chosen rather than fitted, such as the order of a cogging."""
-    for effect in result.effects:
-        fitted = {name: number.value for name, number in verdict.parameters.items()}
-        if str(effect) == label_of(verdict) and all(
-            getattr(effect, name) == value for name, value in fitted.items()
-        ):
-            known = effect.quantities(result.corrected)
-            words = [
-                f"{name} {getattr(effect, name):g}{unit_text(quantity.unit)}"
-                for name, quantity in known.items()
-                if name not in fitted and quantity.role == "shape"
-            ]
-            return f" ({', '.join(words)})" if words else ""
-    return ""
+def ahead(gap: Gap) -> str:
+    """``1 s error of angle``."""
+    return f"{seconds_text(gap.horizon_s)} error of {gap.channel}"
 
 
 def label_of(verdict: Verdict) -> str:
@@ -128,95 +130,10 @@ def known_effects(result: GapResult) -> dict[str, Effect]:
     return found | {str(effect): effect for effect in result.effects}
 
 
-def sentence(label: str, result: GapResult) -> str:
-    """What an effect is."""
-    effect = known_effects(result).get(label)
-    parameter = result.corrected.parameters.get(label)
-    if parameter is not None:
-        return f"The {parameter.meaning} differs from what the simulator says."
-    return effect.sentence if effect else ""
-
-
-def twins(result: GapResult) -> dict[str, tuple[str, ...]]:
-    """Effects that no motion can tell apart, by label, if a verdict leaves alternatives."""
-    found: dict[str, tuple[str, ...]] = {}
-    if not any(verdict.effect and verdict.alternatives for verdict in result.verdicts):
-        return found  # the search below takes seconds for a walking robot
-    for alias in exact_aliases(result.corrected):
-        if "combination" not in alias.says:
-            found.update({name: alias.effects for name in alias.effects})
-    return found
-
-
-def unlike_and_alike(
-    verdict: Verdict, alike: Mapping[str, Sequence[str]]
-) -> tuple[list[str], list[str]]:
-    """Alternatives that these data cannot tell from an effect, and those that no motion can.
-
-    Args:
-        verdict: Names the effect and its alternatives.
-        alike: See ``twins``.
-    """
-    same = alike.get(label_of(verdict), ())
-    return (
-        [name for name in verdict.alternatives if name not in same],
-        [name for name in verdict.alternatives if name in same],
-    )
-
-
-def experiment(label: str, rivals: Sequence[str], result: GapResult, same: bool) -> str:
-    """What would tell an effect from its rivals."""
-    if same:
-        return (
-            f"No log of this motion can tell. Measure one of them directly, or change "
-            f"{effect_name(label)} by a known amount, such as a known payload, and log again."
-        )
-    known = known_effects(result)
-    needs = [known[name].needs for name in (label, *rivals) if name in known]
-    return "Log " + ", and ".join(dict.fromkeys(needs)) + "." if needs else ""
-
-
-def summary(result: GapResult) -> str:
-    """One screen of text."""
-    alike = twins(result)
-    lines = []
-    for verdict in result.verdicts:
-        if verdict.kind == "needs_data":
-            names = ", ".join(map(effect_name, verdict.alternatives))
-            lines.append(f"{'THIS LOG CANNOT SHOW':<16} {names}")
-            continue
-        lines.append(f"{KINDS[verdict.kind].upper():<16} {headline(verdict, result)}")
-        if "provisional" in verdict.says:
-            lines.append(f"{'':<16} provisional: there is one record only")
-        if verdict.effect and verdict.alternatives:
-            ties, same = unlike_and_alike(verdict, alike)
-            if same:
-                words = ", ".join(map(effect_name, same))
-                lines.append(f"{'':<16} no motion can tell it from: {words}")
-            if ties:
-                words = ", ".join(map(effect_name, ties))
-                lines.append(f"{'':<16} these data cannot tell it from: {words}")
-    gap = result.gap
-    rows = gap_rows(result)
-    width = max(len(name) for name, _ in rows)
-    top = max(span.value for _, span in rows) or 1.0
-    unit = f" in {gap.unit}" if gap.unit else ""
-    ahead = f"error of a {seconds_text(gap.horizon_s)} forecast of {gap.channel}{unit}"
-    lines += ["", f"{ahead}, held-out data (95 % interval)"]
-    for name, span in rows:
-        bar = "█" * max(1, round(24 * span.value / top))
-        lines.append(f"  {name:<{width}}  {span_text(span):<28} {bar}")
-    return "\n".join(lines)
-
-
-def gap_rows(result: GapResult) -> list[tuple[str, Span]]:
-    """The shrinking gap: nominal, one more effect each time, noise floor, ceiling."""
-    gap = result.gap
+def gap_rows(gap: Gap) -> list[tuple[str, Span]]:
+    """The shrinking gap: nominal, one more effect each time, noise floor."""
     rows = [
         (f"+ {effect_name(step.added)}" if step.added else "nominal", step.gap)
         for step in gap.steps
     ]
-    rows.append((FLOOR, gap.noise_floor))
-    if gap.ceiling is not None:
-        rows.append((CEILING, gap.ceiling))
-    return rows
+    return [*rows, (FLOOR, gap.noise_floor)]

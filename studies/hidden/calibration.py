@@ -15,19 +15,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import threadpoolctl
 from jsonargparse.typing import PositiveInt
 
 from residual.gap.adequacy import remainder
-from residual.gap.arena import Settings
+from residual.gap.aliases import aliases
 from residual.gap.candidates import candidates
-from residual.gap.claims import aliases
-from residual.gap.holdout import split
-from residual.gap.samples import Samples
-from residual.gap.search import search
-from residual.gap.signatures import gains
+from residual.gap.horizon import usual_horizon
+from residual.gap.noise import Floor
+from residual.gap.prepare import prepare
+from residual.gap.screening import gains
+from residual.gap.search import Search
+from residual.gap.smooth import SmoothFitter
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
@@ -44,27 +44,30 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
         logs = make_logs(
             Truth(), config["seed"], config["excitation"], config["noise"], config["runs"]
         )
-        train, _ = split(logs)
-        samples = Samples.join(train, simulator.substeps)
         offered = library(simulator)
         groups, _ = aliases(simulator, offered)
         kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
-        pool = candidates(simulator, kept, samples)
-        rng = np.random.default_rng(0)
-        found = search(simulator, pool, samples, rng, Settings())
+        ready = prepare(simulator, logs, usual_horizon(simulator, logs))
+        assert isinstance(ready.fitter, SmoothFitter)
+        assert isinstance(ready.floor, Floor)
+        fitter = ready.fitter
+        pool = candidates(simulator, kept, fitter.samples)
+        search = Search(simulator, pool, fitter)
+        nominal = search.tried[()]
         left = remainder(
-            found.arena.tried[()], samples, found.arena.windows, found.arena.sigma,
-            found.nominal_floor, found.arena.scale,
+            nominal.inner, fitter.samples, fitter.blocks.windows, fitter.sigma, ready.floor,
+            fitter.scale,
         )  # fmt: skip
-        # Not more than one round: what noise reaches before anything is chosen.
-        best = gains(found.trial.signatures(()))[0]
+        around = search.signatures(())
+        best = gains(around)[0].value
+        needed = fitter.needed(around, nominal)
+        count = int(fitter.valid.sum())
     return {
         **{key: config[key] for key in ("excitation", "noise", "runs", "seed")},
-        "chosen": len(found.key),
-        "gain": best.value,
-        "gain_share": best.value / found.trial.size,
-        "drawn_point": found.trial.noise_gain,
-        "threshold": found.trial.threshold,
+        "chosen": int(best > needed),
+        "gain": best,
+        "gain_share": best / count,
+        "threshold": needed,
         "ratio": float(left.ratio.max()),
         "ratio_in_errors": float(((left.ratio - 1) / left.error).max()),
         "chance": left.chance,

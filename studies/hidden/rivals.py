@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 from scipy.stats import chi2
 
+from residual.gap.aliases import aliases
 from residual.gap.candidates import Candidate, candidates
-from residual.gap.claims import aliases
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from residual.trajectories import Trajectory

@@ -6,20 +6,22 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from residual.gap import GapResult
-from residual.gap.verdicts import FAMILIES
 from sims.effects.library import exact_aliases
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.strengths import HIDDEN
 
 #: Declared near-twins: forms of one effect that most data hardly tell apart.
-TWINS: tuple[frozenset[str], ...] = (FAMILIES["delay or lag"], FAMILIES["dry friction"])
+TWINS: tuple[frozenset[str], ...] = (
+    frozenset({"delay", "actuator_lag"}),
+    frozenset({"coulomb_friction", "stribeck_friction", "directional_friction"}),
+)
 
 
 def same_motion() -> dict[str, frozenset[str]]:
     """For every effect the names that no data could tell from it, its own included."""
     found: dict[str, frozenset[str]] = {}
     for alias in exact_aliases(PendulumEquation()):
-        if "combination" not in alias.says:
+        if not alias.combination:
             names = frozenset(label.split("@")[0] for label in alias.effects)
             found.update(dict.fromkeys(names, names))
     return found
@@ -29,7 +31,7 @@ _SAME = same_motion()
 _COMBINED = [
     {label.split("@")[0] for label in alias.effects}
     for alias in exact_aliases(PendulumEquation())
-    if "combination" in alias.says
+    if alias.combination
 ]
 
 

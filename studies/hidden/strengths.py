@@ -16,13 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.blocks import blocks
 from residual.gap.candidates import Trial, candidates
+from residual.gap.fitting import Fit
 from residual.gap.model import Model
 from residual.gap.samples import Samples
-from residual.gap.shooting import Fit, fit
-from residual.gap.signatures import signatures
+from residual.gap.screening import signatures
+from residual.gap.screening import trials as trial_variants
 from residual.gap.slopes import slopes
-from residual.gap.windows import Windows, by_growth
+from residual.gap.smooth import SmoothFitter
+from residual.gap.windows import cut
 from residual.trajectories import Trajectory
 from sims import effects as known
 from sims.effects.base import Effect
@@ -114,10 +117,8 @@ def truth(strengths: Mapping[str, float]) -> Truth:
 class _Reference:
     """Windows of a pendulum that lacks nothing, around its true path."""
 
-    samples: Samples
-    windows: Windows
+    fitter: SmoothFitter
     fit: Fit
-    sigma: Array
     freedom: int
 
 
@@ -137,10 +138,11 @@ def _reference(excitation: Excitation, noise: str) -> _Reference:
     scale = np.array([1.0, 10.0])
     model, none = Model(simulator), np.zeros(0)
     slope = slopes(model, samples, nodes, none, none, scale)
-    windows = by_growth(samples, slope.by_state, scale, 25)
-    found = fit(model, samples, windows, nodes, none, sigma, scale, iterations=2)
+    windows = cut(samples, slope.by_state, scale, 25 * DT)
+    grouped = blocks(samples, windows, np.zeros(len(samples)), len(windows))
+    fitter = SmoothFitter(samples, grouped, nodes, slope.by_state, sigma, scale, turns=2)
     freedom = int(windows.inside.sum()) * len(sigma) - 2 * len(windows)
-    return _Reference(samples, windows, found, sigma, freedom)
+    return _Reference(fitter, fitter.fit(model, none), freedom)
 
 
 def sizes(name: str, strengths: Array, excitation: Excitation, noise: str) -> Array:
@@ -154,7 +156,7 @@ def sizes(name: str, strengths: Array, excitation: Excitation, noise: str) -> Ar
     bound = [hidden.effect(_from_reach(name, float(s), excitation)) for s in strengths]
     (candidate,) = (
         c
-        for c in candidates(simulator, [bound[0]], ground.samples)
+        for c in candidates(simulator, [bound[0]], ground.fitter.samples)
         if name != "cogging" or getattr(c.effect, "order", None) == COGGING_ORDER
     )
     names = [knob.field for knob in candidate.knobs]
@@ -162,7 +164,8 @@ def sizes(name: str, strengths: Array, excitation: Excitation, noise: str) -> Ar
         Trial(np.array([[getattr(effect, n) for n in names]]), np.array([True])) for effect in bound
     )
     tried = dataclasses.replace(candidate, trials=trials)
-    found = signatures(ground.fit, ground.samples, ground.windows, ground.sigma, [tried])
+    columns = ground.fitter.columns(ground.fit, [tried])
+    found = signatures(ground.fit, trial_variants([tried]), columns)
     return np.sqrt(1 + found.strengths / ground.freedom)
 
 

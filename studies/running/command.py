@@ -20,6 +20,8 @@ from typing import Any, NoReturn
 
 import jsonargparse
 
+from sims.loading import model_settings
+
 _PACKAGES = ("torch", "scikit-learn", "gpytorch", "pymunk", "numpy", "scipy", "gymnasium")
 
 
@@ -30,11 +32,36 @@ class HelpFormatter(jsonargparse.DefaultHelpFormatter, RawDescriptionHelpFormatt
 class Parser(jsonargparse.ArgumentParser):
     """An argument parser whose errors are one line on stderr, with exit code 2."""
 
+    def parse_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, *rest: Any, **options: Any
+    ) -> Any:
+        """As usual; a robot's model file may stand where a simulator is expected."""
+        given = list(sys.argv[1:] if args is None else args)
+        for i, text in enumerate(given):
+            name, equals, value = text.partition("=")
+            if name == "--simulator" and equals:
+                given[i] = f"--simulator={_simulator(value)}"
+            elif name == "--simulator" and i + 1 < len(given):
+                given[i + 1] = _simulator(given[i + 1])
+        return super().parse_args(given, *rest, **options)
+
+    def parse_object(self, cfg_obj: Any, *rest: Any, **options: Any) -> Any:
+        """As usual; a robot's model file may stand where a simulator is expected."""
+        value = cfg_obj.get("simulator") if isinstance(cfg_obj, Mapping) else None
+        if isinstance(value, str) and (settings := model_settings(value)):
+            cfg_obj = {**cfg_obj, "simulator": settings}
+        return super().parse_object(cfg_obj, *rest, **options)
+
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
         """Say what is wrong and how to learn more, in one line."""
         reason = re.sub(r"\s*\n\s*-?\s*", " ", str(message).strip())
         sys.stderr.write(f"error: {reason} (see --help)\n")
         raise SystemExit(2)
+
+
+def _simulator(value: str) -> str:
+    settings = model_settings(value)
+    return json.dumps(settings) if settings else value
 
 
 def fail(message: str) -> NoReturn:

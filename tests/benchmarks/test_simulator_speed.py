@@ -7,6 +7,9 @@ solve the control period to the error in ``extra_info`` (RMS over random states,
 adaptive Runge-Kutta method of order 8). Leo, for which the peer is only a unit of measure, is
 stepped through what random voltages make of its start, feet on the ground for the most part;
 its error is measured in ``tests/sims/test_leo.py``.
+
+``-k effect`` times one control period with dry friction and play, the systems with one joint and
+with two, alone and in batches.
 """
 
 from __future__ import annotations
@@ -25,13 +28,15 @@ from scipy.integrate import solve_ivp
 from residual.corrected import CorrectedSimulator
 from residual.difference import DifferenceModel
 from residual.linear import Linear
-from sims.effects import CoulombFriction, ViscousFriction
+from sims.effects import Backlash, CoulombFriction, Effect, StribeckFriction, ViscousFriction
 from sims.environment import SimulatorEnv
+from sims.equations import EquationOfMotion
+from sims.host import HostSimulator
 from sims.leo import Leo
 from sims.leo.walking import Walking
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
-from sims.simulator import Simulator
+from sims.simulator import Channel, Parameter, Simulator
 from sims.tasks import SwingUp, Task
 
 # Processor time of this one thread: another program on the core then does not count.
@@ -165,3 +170,86 @@ def test_environment_speed(benchmark: Any, name: str) -> None:
 
     measure(benchmark, work, STEPS)
     benchmark.extra_info.update(simulator=f"SimulatorEnv({name})", rows=1)
+
+
+class DoublePendulum(EquationOfMotion):
+    """Two point masses on rods in a row, hanging; a motor at each joint; 500 Hz."""
+
+    dt = 0.002
+    substeps = 2
+    state_channels = (
+        Channel("upper", "rad", "position", angle=True),
+        Channel("lower", "rad", "position", angle=True),
+        Channel("upper rate", "rad/s", "rate", rate_of="upper", scale=3.0),
+        Channel("lower rate", "rad/s", "rate", rate_of="lower", scale=3.0),
+    )
+    action_channels = (
+        Channel("upper torque", "N m", "input", scale=5.0),
+        Channel("lower torque", "N m", "input", scale=2.0),
+    )
+    parameters = {  # noqa: RUF012
+        "upper_mass": Parameter(1.0, "kg", "mass at the end of the upper rod", low=0.1),
+        "lower_mass": Parameter(0.6, "kg", "mass at the end of the lower rod", low=0.1),
+    }
+
+    def acceleration(self, q: Any, v: Any, u: Any, force: Any, p: Any) -> np.ndarray:
+        whole, rod, arm = p.upper_mass + p.lower_mass, 0.4, 0.3
+        coupled = p.lower_mass * rod * arm
+        cosine, sine = coupled * np.cos(q[:, 1]), coupled * np.sin(q[:, 1])
+        second = p.lower_mass * arm * arm
+        first = whole * rod * rod + second + 2 * cosine
+        mixed = second + cosine
+        low = 9.81 * p.lower_mass * arm * np.sin(q[:, 0] + q[:, 1])
+        high = 9.81 * whole * rod * np.sin(q[:, 0]) + low
+        turning = 2 * v[:, 0] * v[:, 1] + v[:, 1] * v[:, 1]
+        a = u[:, 0] + force[:, 0] - high + sine * turning
+        b = u[:, 1] + force[:, 1] - low - sine * v[:, 0] * v[:, 0]
+        determinant = first * second - mixed * mixed
+        return np.stack(
+            [(second * a - mixed * b) / determinant, (first * b - mixed * a) / determinant], axis=1
+        )
+
+
+def effects_on(simulator: HostSimulator) -> dict[str, list[Effect]]:
+    """What is timed, at strengths that stop and hold the joints now and then."""
+    if isinstance(simulator, DoublePendulum):
+        levels = {"upper": 0.5, "lower": 0.1}
+        return {
+            "none": [],
+            "Coulomb": [CoulombFriction(name, level) for name, level in levels.items()],
+            "Stribeck": [StribeckFriction(n, level, 2 * level, 0.3) for n, level in levels.items()],
+        }
+    return {
+        "none": [],
+        "Coulomb": [CoulombFriction("pivot", 2e-3)],
+        "Stribeck": [StribeckFriction("pivot", 1e-3, 2.5e-3, 0.8)],
+        "backlash": [Backlash("pivot", 0.2)],
+    }
+
+
+HOSTS = (Pendulum(), PendulumEquation(), DoublePendulum())
+CASES = [(host, name) for host in HOSTS for name in effects_on(host)]
+
+
+@pytest.mark.parametrize("rows", [1, 64, 2048])
+@pytest.mark.parametrize(("host", "effects"), CASES, ids=[f"{h.name}-{e}" for h, e in CASES])
+def test_effect_speed(benchmark: Any, host: HostSimulator, effects: str, rows: int) -> None:
+    simulator = host.with_effects(effects_on(host)[effects])
+    rng = np.random.default_rng(7)
+    reach = [np.pi if c.angle else c.scale for c in host.state_channels]
+    states = rng.uniform(-1, 1, (rows, len(reach))) * reach
+    # A fifth of the rates rest, and a fifth is about to.
+    slow = rng.choice([0.0, 0.03, 1.0], states.shape, p=[0.2, 0.2, 0.6])
+    states = np.where([c.kind == "rate" for c in host.state_channels], slow * states, states)
+    actions = rng.uniform(-1, 1, (rows, len(host.action_channels)))
+    actions *= [channel.scale for channel in host.action_channels]
+    start = simulator.augment(states, -actions)
+    after = simulator.step(start, actions)
+    benchmark.pedantic(simulator.step, args=(start, actions), rounds=20, warmup_rounds=1)
+    benchmark.extra_info.update(
+        simulator=host.name,
+        effects=effects,
+        rows=rows,
+        microseconds_per_row=1e6 * benchmark.stats.stats.median / rows,
+    )
+    assert np.isfinite(after).all()

@@ -32,13 +32,16 @@ def smooth_step(
 
 
 def dry_step(state, u, limit, dt=0.05):
-    """One control period with dry friction of size ``limit(w)``, from event to event."""
+    """One control period with dry friction, from event to event.
+
+    ``limit(w, side)`` is its size against sliding to a side, or a pull to it at rest.
+    """
     q, w = state
     t = 0.0
     while t < dt - 1e-12:
         pull = 0.055 * G * LENGTH * math.sin(q) + motor(u, 0.0)
         if abs(w) < 1e-9:
-            if abs(pull) <= limit(0.0):
+            if abs(pull) <= limit(0.0, math.copysign(1.0, pull)):
                 return np.array([q, 0.0])
             side = math.copysign(1.0, pull)
         else:
@@ -46,7 +49,7 @@ def dry_step(state, u, limit, dt=0.05):
 
         def rates(_, y, side=side):
             torque = 0.055 * G * LENGTH * math.sin(y[0]) - DAMPING * y[1] + motor(u, y[1])
-            return [y[1], (torque - side * limit(abs(y[1]))) / INERTIA]
+            return [y[1], (torque - side * limit(abs(y[1]), side)) / INERTIA]
 
         def stops(t, y, side=side, t0=t):
             return side * y[1] if t > t0 + 1e-9 else 1.0

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sims.checks import check_simulator
+from sims.equations import EquationOfMotion
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel, Parameter, Simulator
@@ -101,6 +102,25 @@ def test_what_breaks_it_is_named(broken, check):
     assert check in failed
     if check in ("repeatable", "pure", "batch", "finite"):
         assert "for example state [" in failed[check]
+
+
+class Falling(EquationOfMotion):
+    name = "falling body"
+    state_channels = (
+        Channel("height", "m", "position"),
+        Channel("speed", "m/s", "rate", rate_of="height"),
+    )
+    action_channels = ()
+    parameters = {"gravity": Parameter(9.81, "m/s^2", "acceleration of gravity")}  # noqa: RUF012
+
+    def acceleration(self, q, v, u, force, p):
+        return (force[:, 0] - p.gravity)[:, None]
+
+
+def test_a_system_without_inputs_can_be_checked():
+    findings = check_simulator(Falling())
+    assert all(finding.ok for finding in findings), "\n".join(map(str, findings))
+    assert "effect quadratic_drag@height" in {finding.check for finding in findings}
 
 
 def test_rows_can_be_given():

@@ -20,6 +20,8 @@ from sims.effects import (
     CubicSpring,
     DeadZone,
     Delay,
+    DirectionalFriction,
+    DryFriction,
     JointEffect,
     LinearSpring,
     ParameterChange,
@@ -65,7 +67,7 @@ def dead(u, width):
     return math.copysign(max(abs(u) - width, 0.0), u)
 
 
-def stribeck(w):
+def stribeck(w, _):
     return 1e-3 + 1.5e-3 * math.exp(-((w / 0.8) ** 2))
 
 
@@ -105,13 +107,18 @@ EQUATIONS = {
     ),
     "coulomb": (
         CoulombFriction("pivot", 2e-3),
-        lambda s, u: dry_step(s, u, lambda w: 2e-3),
+        lambda s, u: dry_step(s, u, lambda w, _: 2e-3),
         (5e-6, 5e-5),
     ),
     "stribeck": (
         StribeckFriction("pivot", 1e-3, 2.5e-3, 0.8),
         lambda s, u: dry_step(s, u, stribeck),
         (1e-5, 2e-4),
+    ),
+    "directional": (
+        DirectionalFriction("pivot", 3e-3, 5e-4),
+        lambda s, u: dry_step(s, u, lambda _, side: 3e-3 if side > 0 else 5e-4),
+        (5e-6, 5e-5),
     ),
     "gain": (ActuatorGain("voltage", 0.2), lambda s, u: smooth_step(s, 1.2 * u), (1e-6, 1e-5)),
     "bias": (ActuatorBias("voltage", 0.3), lambda s, u: smooth_step(s, u + 0.3), (1e-6, 1e-5)),
@@ -183,6 +190,18 @@ def test_backlash_obeys_its_equation(host):
     truth = np.array([play_step(s, u, 0.2) for s, u in zip(start, actions[:, 0], strict=True)])
     assert (np.abs(found - truth).max(axis=0) < [1e-5, 2e-4, 1e-5]).all()
     assert np.abs(found[:, :2] - HOSTS[host].step(states, actions)).max() > 0.05
+
+
+def test_two_plays_of_one_drive_are_one_of_their_sum():
+    states, actions = rows(25, seed=3)
+    one, two = (
+        Pendulum(effects=[Backlash("pivot", width) for width in widths])
+        for widths in ((0.2,), (0.15, 0.05))
+    )
+    wanted = one.step(one.augment(states, -actions), actions)
+    found = two.step(two.augment(states, -actions), actions)
+    assert found[:, :2] == pytest.approx(wanted[:, :2], abs=1e-12)
+    assert found[:, 2:] == pytest.approx(wanted[:, 2:] * [0.75, 0.25], abs=1e-12)
 
 
 @host
@@ -269,6 +288,16 @@ def test_what_friction_holds_does_not_creep(host, friction):
     assert np.array_equal(path, np.tile(start, (201, 1)))
     # A voltage that pulls harder than friction and gravity together moves it.
     assert simulator.rollout(start, np.full((2, 1), 3.0))[-1, 1] != 0
+
+
+@host
+def test_friction_that_differs_by_direction_holds_one_way_and_slips_the_other(host):
+    # 0.1 rad off hanging, gravity pulls back with 2.3e-3 N m.
+    start = np.array([[np.pi - 0.1, 0.0], [np.pi + 0.1, 0.0]])
+    for levels, held in (((3e-3, 1e-3), 0), ((1e-3, 3e-3), 1), ((3e-3, 3e-3), 2)):
+        simulator = HOSTS[host].with_effects([DirectionalFriction("pivot", *levels)])
+        stays = (simulator.step(start, np.zeros((2, 1))) == start).all(axis=1)
+        assert np.array_equal(stays, {0: [True, False], 1: [False, True], 2: [True, True]}[held])
 
 
 @host
@@ -389,3 +418,84 @@ def test_an_effect_of_the_users_own_is_hosted(host):
         for s, u in zip(states, actions[:, 0], strict=True)
     ]
     assert found == pytest.approx(np.array(truth), abs=2e-5)
+
+
+def test_every_effect_says_which_family_it_belongs_to():
+    pendulum = Pendulum()
+    families = {str(effect): effect.family_in(pendulum) for effect in library(pendulum)}
+    assert {name for name, family in families.items() if family == "dissipation"} == {
+        "viscous_friction@pivot",
+        "coulomb_friction@pivot",
+        "stribeck_friction@pivot",
+        "directional_friction@pivot",
+        "quadratic_drag@pivot",
+        "damping",
+    }
+    assert families["mass"] == families["actuator_gain@voltage"] == ""
+    dry = {effect.name for effect in library(pendulum) if effect.subfamily == "dry friction"}
+    assert dry == {"coulomb_friction", "stribeck_friction", "directional_friction"}
+    (general,) = [e for e in library(pendulum) if e.name == "directional_friction"]
+    states, actions = rows(6)
+    for name in general.special_cases:
+        (special,) = [typical(e, pendulum) for e in library(pendulum) if e.name == name]
+        equal = general.with_values(forward=special.level, backward=special.level)
+        one, other = (pendulum.with_effects([e]).step(states, actions) for e in (special, equal))
+        assert np.array_equal(one, other)
+    before_the_sensor = {e.name for e in library(pendulum) if e.upstream_of_sensor}
+    assert before_the_sensor == {"dead_zone", "saturation", "actuator_lag"}
+
+
+def test_a_spring_may_rest_anywhere_and_is_absent_without_stiffness():
+    for kind in (LinearSpring, CubicSpring):
+        rest = kind("pivot").quantities(Pendulum())["rest"]
+        assert rest.role == "shape" and rest.starts == (-0.5, 0.0, 0.5)
+        assert kind("pivot", 0.0, 0.4).absent
+        assert not np.any(kind("pivot", np.zeros(3), np.ones(3)).present())
+        assert next(e for e in library(Pendulum()) if isinstance(e, kind)) == kind("pivot")
+
+
+@dataclasses.dataclass(frozen=True)
+class Seal(DryFriction):
+    level: float = number(force=1, low=0.0)
+    name = "seal"
+    sentence = "Dry friction of the user's own."
+    needs = "reversals of the motion"
+
+    def limit(self, v):
+        return self.level + 0.0 * v
+
+
+@dataclasses.dataclass(frozen=True)
+class Magnet(JointEffect):
+    level: float = number(force=1)
+    name = "magnet"
+    sentence = "A torque of the user's own that depends on the angle alone."
+    needs = "whole turns"
+    follows_rate = False
+
+    def force(self, q, v):
+        return self.level * np.sin(3 * q)
+
+
+@host
+def test_effects_of_the_users_own_move_like_those_of_the_library(host):
+    states, actions = rows(12)
+    states[::3, 1] = 0.0
+    levels = np.where(np.arange(12) % 2, 2e-3, 0.0)
+    for own, known in (
+        (Seal("pivot", levels), CoulombFriction("pivot", levels)),
+        (Magnet("pivot", levels), Cogging("pivot", levels, 0.0, 3.0)),
+    ):
+        found, wanted = (HOSTS[host].with_effects([e]).step(states, actions) for e in (own, known))
+        assert found == pytest.approx(wanted, abs=1e-12)
+        assert np.array_equal(found[::2], HOSTS[host].step(states, actions)[::2])
+
+
+@host
+def test_what_goes_wrong_in_an_effect_of_the_users_own_is_raised(host):
+    class Broken(Magnet):
+        def force(self, q, v):
+            raise KeyError("level of the magnet")
+
+    with pytest.raises(KeyError, match="level of the magnet"):
+        HOSTS[host].with_effects([Broken("pivot", 1e-3)]).step(*rows(2))

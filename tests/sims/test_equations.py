@@ -1,5 +1,7 @@
 """Systems that a user brings: two joints, first order, and what they are told when wrong."""
 
+import itertools
+
 import numpy as np
 import pytest
 from pendulum_reference import TIGHT
@@ -10,6 +12,7 @@ from sims.effects import (
     ActuatorLag,
     ConstantLoad,
     CoulombFriction,
+    StribeckFriction,
     ViscousFriction,
     exact_aliases,
     library,
@@ -122,6 +125,75 @@ def test_cart_pole_keeps_the_contract_with_every_effect():
     assert not names & {"cogging@x", "backlash@x"}
     aliases = {frozenset(alias.effects) for alias in exact_aliases(CartPole())}
     assert frozenset({"constant_load@x", "actuator_bias@push"}) in aliases
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        (),
+        (CoulombFriction("x", 2.0), CoulombFriction("angle", 0.3)),
+        (StribeckFriction("x", 1.0, 2.0, 0.3), CoulombFriction("angle", 0.3)),
+    ],
+)
+def test_a_row_that_diverges_is_seen_and_loses_only_itself(effects):
+    simulator = CartPole(effects=effects)
+    states, actions = rows(6)
+    states[:, 2] = 0.0  # held carts need a system of equations to be solved
+    states[:3, 3] = 0.0
+    expected = simulator.step(states, actions)
+    for column, value in itertools.product(range(4), (np.nan, np.inf, 1e200)):
+        wild = states.copy()
+        wild[1, column] = wild[4, column] = value
+        with np.errstate(all="ignore"):
+            found = simulator.step(wild, actions)
+        assert np.array_equal(found[[0, 2, 3, 5]], expected[[0, 2, 3, 5]])
+        if not np.isfinite(value):
+            assert not np.isfinite(found[[1, 4]]).all(axis=1).any()
+    assert np.isfinite(expected).all()
+
+
+def test_what_an_equation_does_not_know_is_not_hidden_by_friction():
+    class Blind(CartPole):
+        def acceleration(self, q, v, u, force, p):
+            return np.where(q > 0.5, np.nan, super().acceleration(q, v, u, force, p))
+
+    simulator = Blind(effects=[CoulombFriction("x", 50.0), CoulombFriction("angle", 50.0)])
+    states = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.6, 0.0, 0.0]])
+    found = simulator.step(states, np.zeros((2, 1)))
+    assert np.array_equal(found[0], states[0]) and np.isnan(found[1]).any()
+
+
+class Chain(EquationOfMotion):
+    """Three masses in a row, coupled by their inertia: M q'' = force, M full and constant."""
+
+    name = "chain"
+    dt = 0.02
+    state_channels = tuple(
+        channel
+        for i in "abc"
+        for channel in (
+            Channel(i, "m", "position"),
+            Channel(f"v{i}", "m/s", "rate", rate_of=i),
+        )
+    )
+    action_channels = (Channel("push", "N", "input", scale=5.0),)
+    mass = np.array([[2.0, 0.5, 0.2], [0.5, 1.5, 0.4], [0.2, 0.4, 1.0]])
+
+    def acceleration(self, q, v, u, force, p):
+        total = force + u * [1.0, 0.0, 0.5]
+        rows = np.linalg.inv(self.mass)
+        return np.stack([sum(rows[i, j] * total[:, j] for j in range(3)) for i in range(3)], axis=1)
+
+
+def test_friction_holds_some_of_three_joints():
+    levels = {"a": 0.5, "b": 3.0, "c": 4.0}
+    chain = Chain(effects=[CoulombFriction(name, level) for name, level in levels.items()])
+    found = chain.step(np.zeros((2, 6)), [[3.0], [0.4]])
+    # Only the first mass slides: the others are held by what its acceleration pulls with.
+    acceleration = (3.0 - 0.5) / 2.0
+    assert 0.5 * acceleration < 3.0 and abs(1.5 - 0.2 * acceleration) < 4.0
+    assert found[0] == pytest.approx([0.5 * acceleration * 4e-4, acceleration * 0.02, 0, 0, 0, 0])
+    assert np.array_equal(found[0, 2:], np.zeros(4)) and np.array_equal(found[1], np.zeros(6))
 
 
 def test_many_rows_are_split_without_a_trace():

@@ -64,7 +64,7 @@ def test_effects_come_beside_those_that_are_there():
 
 def test_a_class_without_effects_among_its_arguments_gets_them_too():
     plain = {
-        "class_path": "studies.real_systems.GearedPendulum",
+        "class_path": "studies.real.systems.GearedPendulum",
         "init_args": {"inertia": 0.2, "moment": 0.4},
     }
     effects = [CoulombFriction("angle", 0.3), ActuatorLag("torque", 0.02)]
@@ -77,6 +77,13 @@ def test_arguments_are_kept():
     settings = simulator_settings({"class_path": PENDULUM, "init_args": {"mass": 0.07}})
     assert settings["init_args"]["mass"] == 0.07 and settings["init_args"]["substeps"] == 8
     assert load_simulator(settings).parameters["mass"].value == 0.07
+
+
+def test_a_class_that_is_out_of_reach_says_where_to_start(tmp_path):
+    path = tmp_path / "corrected.yaml"
+    path.write_text(yaml.safe_dump({"class_path": "arm_of_mine.Arm", "init_args": {}}))
+    with pytest.raises(ValueError, match=r"no module 'arm_of_mine'.*PYTHONPATH"):
+        load_simulator(path)
 
 
 @pytest.mark.parametrize(

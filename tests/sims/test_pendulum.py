@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pendulum_reference import smooth_step
 
+from sims.effects import CoulombFriction, ParameterChange
 from sims.pendulum import Pendulum
 
 SYSTEMS = {
@@ -39,6 +40,33 @@ def test_one_step_agrees_with_an_independent_integrator(system):
     error = pendulum.step(states, actions) - reference(states, actions[:, 0], mass, inertia)
     rms = np.sqrt(np.mean(error**2, axis=0))
     assert rms[0] < 1e-6 and rms[1] < 2e-5
+
+
+def test_what_is_compiled_follows_the_scheme_of_pymunk():
+    states, actions = random_rows(200)
+    pendulum = Pendulum.true()
+    held = np.repeat(actions[:, None], pendulum.substeps, axis=1)
+    inputs = np.stack([held, 0 * held], axis=-1)
+    found = pendulum.integrate(states, inputs, np.full(200, pendulum.dt))
+    assert np.abs(found - pendulum.step(states, actions)).max() < 1e-12
+    for change in (0.0, 0.02):
+        pymunk = Pendulum(0.055 + change, substeps=5)
+        compiled = Pendulum(substeps=5, effects=[ParameterChange("mass", change or 1e-300)])
+        paths = [s.rollout(states, np.repeat(actions[:, None], 4, 1)) for s in (pymunk, compiled)]
+        assert np.abs(paths[0] - paths[1]).max() < 1e-11
+
+
+@pytest.mark.parametrize("effects", [(), (CoulombFriction("pivot", 1e-3),)])
+def test_a_row_that_runs_away_is_seen_and_leaves_the_others_alone(effects):
+    pendulum = Pendulum(effects=effects)
+    states, actions = random_rows(3)
+    wild = states.copy()
+    wild[1] = [1.0, np.inf]
+    after = pendulum.step(wild, actions)
+    assert np.isnan(after[1]).all()
+    assert np.array_equal(after[::2], pendulum.step(states, actions)[::2])
+    wild[1] = np.nan
+    assert np.isnan(pendulum.step(wild, actions)[1]).all()
 
 
 def test_half_the_sub_step_gives_a_sixteenth_of_the_error():

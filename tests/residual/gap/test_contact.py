@@ -6,10 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
-
-from residual.gap import find_gap
-from residual.gap.candidates import candidates
 from residual.gap.contact.duel import duels, excluded
 from residual.gap.contact.exchange import ALIKE, cosines, exchange
 from residual.gap.contact.noise import quieten
@@ -17,9 +13,13 @@ from residual.gap.contact.quadratic import Quadratic, minimise
 from residual.gap.contact.search import Proposal, Rules, Search
 from residual.gap.contact.student import losses, trimmed_drop
 from residual.gap.contact.windows import lay_out, pieces, scales
+from residual.gap.workflow import substeps_for
+from scipy.optimize import minimize
+
+from residual.gap import find_gap
+from residual.gap.candidates import candidates
 from residual.gap.model import Model
 from residual.gap.samples import Samples
-from residual.gap.workflow import substeps_for
 from residual.trajectories import Trajectory
 from sims.effects.parameter import ParameterChange
 from sims.leo import Leo, Walking

@@ -1,0 +1,65 @@
+"""Effects that no data could tell apart, and effects that this log could hide."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from residual.gap.candidates import Candidate
+from residual.gap.result import Blind
+from residual.gap.screening import Signatures
+from sims.effects.base import Effect
+from sims.effects.library import exact_aliases
+from sims.host import HostSimulator
+
+
+def aliases(
+    simulator: HostSimulator, offered: Sequence[Effect]
+) -> tuple[dict[str, tuple[str, ...]], tuple[tuple[str, ...], ...]]:
+    """Exact aliases among the offered effects: twins by name, and dependent sets."""
+    names = {str(effect) for effect in offered}
+    groups: dict[str, tuple[str, ...]] = {}
+    sets = []
+    for alias in exact_aliases(simulator):
+        inside = tuple(name for name in alias.effects if name in names)
+        if len(inside) < 2:
+            continue
+        if alias.combination:
+            if len(inside) == len(alias.effects):
+                sets.append(inside)
+        else:
+            groups.update({name: inside for name in inside})
+    return groups, tuple(sets)
+
+
+def hidden(
+    around: Signatures, pool: Sequence[Candidate], chosen: Sequence[int], threshold: float
+) -> tuple[Blind, ...]:
+    """Effects that could be there at a size that matters without this log showing it.
+
+    Args:
+        around: Signatures around the chosen set, in units of the noise.
+        pool: The candidates.
+        chosen: Numbers of the chosen ones.
+        threshold: Fall of the cost that would have been noticed.
+    """
+    smallest: dict[int, tuple[float, str, float]] = {}
+    for variant in around.variants:
+        candidate = pool[variant.candidate]
+        if candidate.fixed_level or variant.candidate in chosen:
+            continue
+        for row, column in enumerate(variant.columns):
+            knob = next(i for i in np.flatnonzero(variant.linear) if variant.trial.values[row, i])
+            size = variant.trial.values[row, knob]
+            strength = max(around.strengths[column], 1e-300)
+            visible = float(size * np.sqrt(threshold / strength))
+            limit = 10 * candidate.knobs[knob].step
+            known = smallest.get(variant.candidate)
+            if known is None or visible < known[0]:
+                smallest[variant.candidate] = (visible, candidate.knobs[knob].unit, limit)
+    return tuple(
+        Blind(pool[number].label, visible, unit, pool[number].effect.needs)
+        for number, (visible, unit, limit) in smallest.items()
+        if visible > limit
+    )

@@ -1,0 +1,255 @@
+"""How sure a chosen effect is: without it, with rivals in its place, by folds, and numerics."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t
+
+from residual.gap.blocks import Blocks
+from residual.gap.choice import AT_ONE
+from residual.gap.fitting import Fit
+from residual.gap.result import Number
+from residual.gap.search import Key, Search
+from residual.gap.significance import score
+
+Array = NDArray[np.float64]
+
+#: Forecast error of a rival, over that of the chosen set, that excludes it while a remainder is
+#: left: model imperfection of that size may favour either.
+CLEARLY = 1.5
+#: How far a strength may lie off in a fold, or with other numerics, as a share of it.
+STEADY = 0.5
+#: Standard errors by which forecasts must be worse without the effect.
+WORSE = 2.0
+#: Blocks below which forms within a family are not told apart, and below which nothing is sure.
+FEW, TOO_FEW = 8, 4
+
+
+@dataclasses.dataclass(frozen=True)
+class Claim:
+    """One chosen effect with everything that bears on its verdict.
+
+    Attributes:
+        number: The candidate.
+        numbers: Fitted numbers.
+        form: Effects of the same family and place that do nearly as well.
+        alike: Effects of other families that do, with the same motion in these data.
+        rivals: Effects of other families that do, with another motion.
+        twins: Effects that make the same motion in any data.
+        needed: Whether forecasts are clearly worse without it.
+        steady: Whether its strength is about the same in every fold.
+        sound: Whether it survives other numerics.
+        bounded: Whether a strength lies at its bound.
+        share: Part of the nominal squared error that it takes off, with a 95 % interval.
+    """
+
+    number: int
+    numbers: dict[str, Number]
+    form: tuple[str, ...]
+    alike: tuple[str, ...]
+    rivals: tuple[str, ...]
+    twins: tuple[str, ...]
+    needed: bool
+    steady: bool
+    sound: bool
+    bounded: bool
+    share: tuple[float, float, float]
+
+
+def claims(
+    search: Search,
+    key: Key,
+    adequate: bool,
+    groups: dict[str, tuple[str, ...]],
+    numerics: Sequence[Array],
+) -> list[Claim]:
+    """What is claimed of every chosen effect, the one that takes off most first.
+
+    Args:
+        search: With the chosen set, what is left of it without each member, and exchanges.
+        key: The chosen set.
+        adequate: Whether it leaves no more than noise, so that chance alone decides.
+        groups: Exact twins by label.
+        numerics: Its numbers at half the step and with the other hold, each (p,).
+    """
+    fit = search.tried[key]
+    half = 1.96 * deviations(fit, search.fitter.blocks)
+    found = []
+    for place, number in enumerate(key):
+        own = [int(j) for j in np.flatnonzero(fit.model.owner == place)]
+        label = search.candidates[number].label
+        form, alike, rivals = near(search, key, number, adequate)
+        twins = tuple(name for name in groups.get(label, ()) if name != label)
+        strengths = [j for j in own if fit.model.knobs[j].strength] or own
+        found.append(
+            Claim(
+                number,
+                {fit.model.knobs[j].field: bounded(fit, j, half[j], numerics) for j in own},
+                tuple(name for name in form if name not in twins),
+                tuple(name for name in alike if name not in twins),
+                tuple(name for name in rivals if name not in twins),
+                twins,
+                needed(search, key, number, adequate),
+                all(steady(search, key, j) for j in strengths),
+                all(survives(fit.theta[j], half[j], [n[j] for n in numerics]) for j in strengths),
+                any(at_bound(fit, j) for j in strengths),
+                share(search, key, number),
+            )
+        )
+    return sorted(found, key=lambda claim: -claim.share[0])
+
+
+def near(
+    search: Search, key: Key, number: int, adequate: bool
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Effects that do nearly as well in place of a chosen one, see ``Claim``."""
+    rest = set(key) - {number}
+    form: list[str] = []
+    same: list[str] = []
+    others: list[str] = []
+    for rival in search.usable():
+        fresh = set(rival) - rest
+        if len(rival) != len(key) or not rest < set(rival) or fresh == {number}:
+            continue
+        (other,) = fresh
+        if search.contains(other, number):
+            continue  # the same law with more freedom
+        family = search.family(number)
+        alike = bool(family) and search.family(other) == family
+        label = search.candidates[other].label
+        out = excluded(search, key, rival, number, adequate, alike)
+        if alike and not out:
+            form.append(label)
+        elif not adequate and search.same_motion(tuple(sorted(rest)), number, other):
+            same.append(label)
+        elif not out:
+            others.append(label)
+    return tuple(form), tuple(same), tuple(others)
+
+
+def excluded(
+    search: Search, key: Key, rival: Key, number: int, adequate: bool, alike: bool
+) -> bool:
+    """Whether a rival with one effect exchanged is out.
+
+    Down to the noise, chance decides. While a remainder is left, a rival has to be clearly worse;
+    one that differs in form alone has to lose at the horizon and at half of it.
+    """
+    if adequate:
+        return score(search, rival) - score(search, key) > tie(search)
+    group = where_it_matters(search, key, number)
+    own, its = (search.validated[k] for k in (key, rival))
+    ratio = _ratio(search, its.squares, own.squares, group)
+    if ratio > CLEARLY:
+        return True
+    if not alike or len(search.fitter.blocks) < FEW:
+        return False
+    behind, error = search.currency.difference(its.squares, own.squares, group)
+    return behind > error and _ratio(search, its.half, own.half, group) > 1.0 and ratio > 1.05
+
+
+def tie(search: Search) -> float:
+    """Difference of scores beyond which chance excludes a rival."""
+    return search.fitter.tie(search.tried[()])
+
+
+def _ratio(search: Search, one: Array, other: Array, group: int) -> float:
+    errors = [search.currency.by_group(squares)[group] for squares in (one, other)]
+    return float(errors[0] / max(errors[1], 1e-12))
+
+
+def where_it_matters(search: Search, key: Key, number: int) -> int:
+    """The joint at which forecasts suffer most without an effect."""
+    rest = tuple(i for i in key if i != number)
+    base = rest if rest in search.validated else ()
+    before = search.currency.by_group(search.validated[base].squares)
+    after = search.currency.by_group(search.validated[key].squares)
+    return int(np.argmax((before - after) / np.maximum(before, 1e-12)))
+
+
+def needed(search: Search, key: Key, number: int, adequate: bool) -> bool:
+    """Whether forecasts are clearly worse without an effect."""
+    rest = tuple(i for i in key if i != number)
+    if rest not in search.validated:
+        return False
+    group = where_it_matters(search, key, number)
+    without, own = search.validated[rest].squares, search.validated[key].squares
+    lost, _ = search.currency.difference(without, own, group)
+    if adequate:
+        return score(search, rest) - score(search, key) > tie(search) and lost > 0
+    gone = 1 - 1 / max(_ratio(search, without, own, group), 1e-12)
+    return gone > 0.5 * AT_ONE and search.currency.clearly(without, own, group) > WORSE
+
+
+def steady(search: Search, key: Key, j: int) -> bool:
+    """Whether a number has one sign and about one size in every fold."""
+    value, folds = search.tried[key].theta[j], search.validated[key].thetas[:, j]
+    return bool((np.abs(folds - value) <= STEADY * abs(value)).all())
+
+
+def survives(value: float, half: float, others: Sequence[float]) -> bool:
+    """Whether a number keeps its sign and about its size under other numerics."""
+    return all(abs(other - value) <= max(STEADY * abs(value), half) for other in others)
+
+
+def at_bound(fit: Fit, j: int) -> bool:
+    """Whether a number lies at its bound."""
+    knob, value = fit.model.knobs[j], float(fit.theta[j])
+    close = 1e-6 * max(abs(value), 1e-3 * knob.step)
+    return bool(abs(value - knob.low) <= close or abs(value - knob.high) <= close)
+
+
+def bounded(fit: Fit, j: int, half: float, numerics: Sequence[Array]) -> Number:
+    """A number with its interval, widened to what half the step makes of it."""
+    knob, value = fit.model.knobs[j], float(fit.theta[j])
+    fine = float(numerics[0][j]) if len(numerics) else value
+    low, high = min(value, fine) - half, max(value, fine) + half
+    return Number(value, max(low, knob.low), min(high, knob.high), knob.unit, at_bound(fit, j))
+
+
+def share(search: Search, key: Key, number: int) -> tuple[float, float, float]:
+    """Part of the nominal squared error that an effect takes off, last of all in its set."""
+    rest = tuple(i for i in key if i != number)
+    base = rest if rest in search.validated else ()
+    squares = search.validated
+    return search.currency.share(
+        squares[base].squares, squares[key].squares, np.random.default_rng(0)
+    )
+
+
+def deviations(fit: Fit, blocks: Blocks) -> Array:
+    """Standard deviation of the numbers, (p,): the larger of two.
+
+    One is Gauss-Newton's with start states projected out, times the residual variance; the other
+    the sandwich over blocks, which allows for errors that go together within a block, with
+    Student's t for few blocks. Source: White, "Maximum likelihood estimation of misspecified
+    models", Econometrica 50 (1982).
+    """
+    p = len(fit.theta)
+    if not p:
+        return np.zeros(0)
+    root = np.sqrt(fit.weights)[:, None]
+    rows, residual = fit.by_knob * root[..., None], fit.projected * root
+    scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
+    unit = rows / scale
+    inverse = np.linalg.pinv(np.einsum("wri,wrj->ij", unit, unit), rcond=1e-12)
+    used = int((np.abs(residual) > 0).sum())
+    freedom = max(used - fit.basis.shape[2] * len(residual) - p, 1)
+    variance = max(1.0, float((residual**2).sum()) / freedom)
+    plain = variance * np.diag(inverse)
+    count = len(blocks)
+    if count <= p + 1:
+        return np.sqrt(plain) / scale
+    per_window = np.einsum("wri,wr->wi", unit, residual)
+    scores = np.stack([per_window[blocks.block == b].sum(axis=0) for b in range(count)])
+    sandwich = np.diag(inverse @ (scores.T @ scores) @ inverse) * count / (count - p)
+    return np.sqrt(np.maximum(plain, sandwich)) * _student(count - p) / scale
+
+
+def _student(freedom: int) -> float:
+    """Student's 95 % quantile over the normal one."""
+    return float(t.ppf(0.975, freedom) / 1.96)

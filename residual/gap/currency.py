@@ -1,0 +1,93 @@
+"""What is compared: the error of forecasts, in units of what the nominal simulator makes of them.
+
+0 is perfect, 1 as bad as the nominal simulator. Errors of a channel are summed over blocks, the
+channels of one joint (its position and its rate) are averaged, and then all joints.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sims.simulator import Channel
+
+Array = NDArray[np.float64]
+
+
+def groups(channels: Sequence[Channel]) -> tuple[tuple[int, ...], ...]:
+    """Positions in a list of measured channels that belong to one joint."""
+    found: dict[str, list[int]] = {}
+    for place, channel in enumerate(channels):
+        found.setdefault(channel.rate_of or channel.name, []).append(place)
+    return tuple(tuple(places) for places in found.values())
+
+
+@dataclasses.dataclass(frozen=True)
+class Currency:
+    """Turns mean squared errors of blocks into relative errors.
+
+    Attributes:
+        nominal: Of the nominal simulator, (B, m).
+        groups: Channels that count as one.
+    """
+
+    nominal: Array
+    groups: tuple[tuple[int, ...], ...]
+
+    def by_block(self, squares: Array) -> Array:
+        """Share of every block and group in the relative error, (B, g); sums over B are errors."""
+        weights = np.sqrt(self.nominal) / np.maximum(np.nansum(self.nominal, axis=0), 1e-300)
+        shares = np.nan_to_num(np.sqrt(squares) * weights)
+        return np.stack([shares[:, list(group)].mean(axis=1) for group in self.groups], axis=1)
+
+    def by_group(self, squares: Array) -> Array:
+        """Relative error of every group, (g,)."""
+        return self.by_block(squares).sum(axis=0)
+
+    def error(self, squares: Array) -> float:
+        """Relative error, all groups averaged."""
+        return float(self.by_group(squares).mean())
+
+    def difference(self, one: Array, other: Array, group: int | None = None) -> tuple[float, float]:
+        """Relative error of one less that of another, and its standard error over blocks."""
+        change = self.by_block(one) - self.by_block(other)
+        per_block = change.mean(axis=1) if group is None else change[:, group]
+        n = len(per_block)
+        spread = float(per_block.std(ddof=1) * np.sqrt(n)) if n > 1 else np.inf
+        return float(per_block.sum()), spread
+
+    def clearly(self, one: Array, other: Array, group: int) -> float:
+        """Standard errors by which one set is worse than another, block by block.
+
+        Ratios of the blocks' errors are compared, weighed by what is at stake: blocks are driven
+        unequally hard, so that differences would have the spread of the drive.
+        """
+        a, b = (self.by_block(squares)[:, group] for squares in (one, other))
+        there = (a > 0) & (b > 0)
+        if there.sum() < 3:
+            return 0.0
+        ratios, weights = np.log(a[there] / b[there]), a[there] / a[there].sum()
+        mean = float(weights @ ratios)
+        n = int(there.sum())
+        error = float(np.sqrt((weights**2) @ (ratios - mean) ** 2 * n / (n - 1)))
+        return mean / max(error, 1e-12)
+
+    def share(
+        self, less: Array, more: Array, rng: np.random.Generator
+    ) -> tuple[float, float, float]:
+        """Part of the nominal squared error that lies between two sets, with a 95 % interval.
+
+        Args:
+            less, more: Mean squared errors of blocks, (B, m), without and with something.
+            rng: Draws blocks for the interval.
+        """
+        n = len(self.nominal)
+        picks = np.vstack([np.arange(n)[None], rng.integers(0, n, (400, n))])
+        base = np.maximum(np.nan_to_num(self.nominal)[picks].sum(axis=1), 1e-300)
+        gained = np.nan_to_num(less - more)[picks].sum(axis=1) / base
+        drawn = np.stack([gained[:, list(g)].mean(axis=1) for g in self.groups], axis=1).mean(1)
+        low, high = np.quantile(drawn[1:], [0.025, 0.975])
+        return float(drawn[0]), float(min(low, drawn[0])), float(max(high, drawn[0]))

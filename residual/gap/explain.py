@@ -1,0 +1,144 @@
+"""From a fitter to the effects that explain what it holds: search, weigh anew, choose."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.beam import run
+from residual.gap.candidates import Candidate
+from residual.gap.choice import Choice, choose, reasons
+from residual.gap.fitting import Fit, Fitter, Left
+from residual.gap.noise import Noise
+from residual.gap.search import Effort, Key, Proposals, Search
+from residual.gap.significance import significant
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+#: Residual over noise below which a remainder is a footnote.
+FOOTNOTE = 1.1
+#: Times that channels are weighed anew by what the best set leaves of them.
+ROUNDS = 3
+#: Change of a weight that is worth another search.
+WORTH = 1.3
+#: Effects tried in place of each chosen one, and rounds of that.
+RIVALS, EXCHANGES = 5, 3
+#: Sets that a new search begins with.
+SEEDS = 12
+
+
+#: From the fitter that made a fit, and the fit: the fitter whose channels are weighed by what that
+#: leaves of them, and the noise around it.
+Weighing = Callable[[Fitter, Fit], tuple[Fitter, Noise]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Explanation:
+    """What was chosen, and on what grounds.
+
+    Attributes:
+        search: All that was tried, in the final weights.
+        choice: The chosen set, reasons for the others, what is minor.
+        left: What it leaves.
+        nominal_left: What the nominal simulator leaves.
+        floor: Noise around the chosen set.
+        needed: Fall of the cost that earns a name where only noise is left; infinite elsewhere.
+    """
+
+    search: Search
+    choice: Choice
+    left: Left
+    nominal_left: Left
+    floor: Noise
+    needed: float
+
+    @property
+    def key(self) -> Key:
+        """The chosen set."""
+        return self.choice.key
+
+    @property
+    def adequate(self) -> bool:
+        """Whether chance decided."""
+        return bool(np.isfinite(self.needed))
+
+
+def explain(
+    simulator: HostSimulator,
+    pool: Sequence[Candidate],
+    fitter: Fitter,
+    floor: Noise,
+    weigh: Weighing,
+    effort: Effort,
+    tell: Callable[[str], None],
+    until: float,
+) -> Explanation:
+    """Search, weigh the channels by what is left, search again, until nothing changes.
+
+    Args:
+        simulator: The nominal simulator.
+        pool: What may be missing.
+        fitter: Channels weighed by what the nominal simulator leaves.
+        floor: Noise around it.
+        weigh: Weighs the channels anew.
+        effort: How hard to search.
+        tell: Progress.
+        until: When to stop searching, on the clock of ``time.perf_counter``.
+    """
+    seeds: Proposals = {}
+    key: Key = ()
+    for _ in range(ROUNDS):
+        search = Search(simulator, pool, fitter, effort, tell, until)
+        run(search, seeds)
+        key = _best_explained(search)
+        fresh, floor = weigh(fitter, search.tried[key])
+        ratio = fresh.sigma / fitter.sigma
+        if search.late or ((ratio > 1 / WORTH).all() and (ratio < WORTH).all()):
+            break
+        best = sorted(search.usable(), key=search.error)[:SEEDS]
+        seeds = {k: search.tried[k].theta for k in {*best, key} if k}
+        fitter = fresh
+    return settle(search, floor, key)
+
+
+def _best_explained(search: Search) -> Key:
+    """What channels are weighed by: the chosen set."""
+    return choose(search).key
+
+
+def settle(search: Search, floor: Noise, key: Key) -> Explanation:
+    """The final choice, after everything chosen has met its rivals."""
+    fitter = search.fitter
+    nominal_left = fitter.left(search.tried[()], floor)
+    needed = np.inf
+
+    def enough(key: Key) -> bool:
+        return fitter.left(search.tried[key], floor).ratio < FOOTNOTE
+
+    choice = choose(search, enough)
+    for _ in range(EXCHANGES):
+        quiet = [k for k in {(), choice.key, search.best()} if _quiet(search, k, floor)]
+        if quiet:
+            needed = fitter.needed(search.signatures(()), search.tried[()])
+            key = significant(search, needed)
+            choice = Choice(key, reasons(search, key), {})
+        else:
+            needed = np.inf
+            choice = choose(search, enough)
+            key = choice.key
+        before = len(search.tried)
+        search.add_exchanged(key, RIVALS)
+        if len(search.tried) == before or search.late:
+            break
+        if not quiet and choose(search, enough).key == key:
+            break
+    left = fitter.left(search.tried[choice.key], floor)
+    return Explanation(search, choice, left, nominal_left, floor, needed)
+
+
+def _quiet(search: Search, key: Key, floor: Noise) -> bool:
+    return search.fitter.left(search.tried[key], floor).adequate

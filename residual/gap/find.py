@@ -1,0 +1,150 @@
+"""The pipeline: data, numerics, search, choice, confirmation, verdict."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.aliases import aliases
+from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
+from residual.gap.candidates import candidates
+from residual.gap.data import examine
+from residual.gap.explain import Explanation, explain
+from residual.gap.horizon import usual_horizon
+from residual.gap.numerics import fits_better, forecast_error, held_as, held_otherwise, how_held
+from residual.gap.prepare import Prepared, prepare
+from residual.gap.result import GapResult
+from residual.gap.workers import workers
+from residual.trajectories import Trajectory
+from sims.effects.base import Effect
+from sims.effects.library import library
+from sims.host import HostSimulator
+from sims.simulator import Hold
+
+Array = NDArray[np.float64]
+
+#: Sets listed as evidence.
+EVIDENCE = 40
+#: Rise of the loss with inputs held the other way, as a share of it, that rules that out.
+OTHER_HOLD = 0.5
+#: Part of the time budget after which nothing new is tried.
+SEARCHING = 0.7
+
+
+def find_gap(
+    simulator: HostSimulator,
+    trajectories: Sequence[Trajectory],
+    *,
+    held: Sequence[Trajectory] = (),
+    tolerance: float | None = None,
+    effects: Iterable[Effect] | None = None,
+    hold: Hold | Mapping[str, Hold] | None = None,
+    measured_input: bool = False,
+    horizon: float | None = None,
+    minutes: float = 2.0,
+    n_jobs: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> GapResult:
+    """Find where a simulator and measured logs disagree, and name what is missing.
+
+    Args:
+        simulator: The nominal simulator.
+        trajectories: Measured runs; blocks of them are left out in turn to judge what is found.
+        held: Runs that are used for the final table only.
+        tolerance: Forecast error that does not matter, in the unit of the first measured
+            position; below it the verdict is "nothing that matters".
+        effects: Effects that may be missing; by default all that the simulator can host.
+        hold: How inputs run between samples, ``"zero"`` (held, as commands are) or ``"linear"``
+            (straight to the next, as most measured inputs are), for all or by input; by default
+            whichever the nominal simulator fits better.
+        measured_input: True if the logged inputs were measured at the actuator's output; what
+            happens before that (dead zone, saturation, lag) is then no candidate.
+        horizon: Forecast length in seconds; by default a third of the usual period of the motion,
+            see ``residual.gap.horizon``.
+        minutes: Time budget; the search for rival explanations ends in time.
+        n_jobs: Processes for a simulator that steps row by row.
+        progress: Called with a line of text now and then.
+
+    Returns:
+        The verdicts and everything behind them.
+
+    Raises:
+        ValueError: There are no trajectories, nothing was measured, samples are too rare, the
+            simulator returns values that are not finite, or a position of a system that strikes
+            the ground was not measured.
+    """
+    clock = Clock()
+    tell = progress or (lambda _: None)
+    until = time.perf_counter() + 60 * minutes * SEARCHING
+    offered = tuple(library(simulator) if effects is None else effects)
+    if measured_input:
+        offered = tuple(e for e in offered if not e.upstream_of_sensor)
+    examined = examine(simulator, trajectories)
+    runs = examined.trajectories
+    quality = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
+    for says in quality:
+        tell(says)
+    horizon = horizon or usual_horizon(simulator, runs)
+    kept = _asked(simulator, offered)
+
+    def explained(simulator: HostSimulator) -> tuple[Prepared, Explanation]:
+        ready = prepare(simulator, runs, horizon)
+        pool = ready.pool(candidates(simulator, kept, ready.fitter.samples))
+        tell(
+            f"{len(ready.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s, "
+            f"{len(pool)} candidate effects"
+        )
+        return ready, explain(
+            simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, tell, until
+        )
+
+    with workers(n_jobs):
+        simulator = held_as(simulator, hold)
+        clock.lap("read")
+        prepared, found = explained(simulator)
+        other = held_otherwise(simulator) if hold is None else None
+        if other is not None and fits_better(found.search, found.key, other):
+            tell("inputs held the other way fit better: once more so")
+            again = explained(other)
+            if forecast_error(again[1].search, again[1].key) < forecast_error(
+                found.search, found.key
+            ):
+                prepared, found = again
+                quality.append(
+                    f"inputs were taken to {how_held(other)}: the data fit better so; set hold to "
+                    "say otherwise"
+                )
+        clock.lap("search")
+        tell("confirming")
+        groups, sets = aliases(simulator, offered)
+        answer = confirm(found, groups, matters(found, tolerance))
+        clock.lap("confirm")
+        table = summed_up(answer)
+        apart = None
+        if held:
+            apart = judged_apart(answer, prepared, examine(simulator, held).trajectories, table)
+        clock.lap("forecast")
+    return told(answer, table, apart, sets, tolerance, quality, clock.laps)
+
+
+def _asked(simulator: HostSimulator, offered: Sequence[Effect]) -> list[Effect]:
+    """The first of every group of effects that make the same motion."""
+    groups, _ = aliases(simulator, offered)
+    return [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
+
+
+class Clock:
+    """Seconds by stage."""
+
+    def __init__(self) -> None:
+        self.laps: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, stage: str) -> None:
+        """End of a stage."""
+        now = time.perf_counter()
+        self.laps[stage] = now - self._last
+        self._last = now

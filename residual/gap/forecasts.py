@@ -1,0 +1,145 @@
+"""Forecast errors in the units of the channels: before, step by step, after, noise alone."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.blocks import Blocks
+from residual.gap.fitting import Fit, Fitter
+from residual.gap.result import ChannelGap, Gap, Rollout, Span, Step
+from residual.gap.search import Key, Search
+from residual.gap.validation import Validated, by_block
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+#: Forecasts drawn for pictures.
+PICTURES = 6
+
+
+def span(squares: Array, draws: int = 400) -> Span:
+    """Root mean square over blocks, (B,), with a bootstrap interval over blocks."""
+    known = squares[np.isfinite(squares)]
+    if not len(known):
+        return Span(np.nan, np.nan, np.nan)
+    rng = np.random.default_rng(0)
+    spread = np.sqrt(known[rng.integers(0, len(known), (draws, len(known)))].mean(axis=1))
+    low, high = np.quantile(spread, [0.025, 0.975])
+    return Span(float(np.sqrt(known.mean())), float(low), float(high))
+
+
+def noise_floor(fitter: Fitter, fit: Fit, sigma: Array, draws: int = 2) -> Array:
+    """Mean squared errors of blocks if the fitted simulator were the truth, (B, m).
+
+    Its own data plus noise go through the same forecasts.
+    """
+    rng = np.random.default_rng(0)
+    thetas, which = fit.theta[None], np.zeros(len(fitter.blocks.windows), np.int64)
+    found = []
+    for _ in range(draws):
+        drawn = fitter.redrawn(fit, sigma, rng)
+        squares = drawn.foretell(fit.model, thetas, which, fit).squares
+        found.append(by_block(squares, fitter.blocks))
+    return np.mean(found, axis=0)
+
+
+def gap(
+    search: Search, key: Key, order: Sequence[int], floor: Array, ratios: tuple[float, float]
+) -> Gap:
+    """Errors of the nominal and the corrected simulator on data that did not fit their numbers.
+
+    Args:
+        search: With the chosen set and its parts.
+        key: The chosen set.
+        order: Its members, the one that takes off most first.
+        floor: See ``noise_floor``.
+        ratios: Residual over noise in windows, before and after.
+    """
+    samples, simulator = search.fitter.samples, search.simulator
+    before, after = search.validated[()], search.validated[key]
+    by_channel = {}
+    for i, c in enumerate(samples.measured):
+        channel = simulator.physical_channels[c]
+        by_channel[channel.name] = ChannelGap(
+            channel.unit, span(before.squares[:, i]), span(after.squares[:, i]), span(floor[:, i])
+        )
+    main = main_channel(simulator, samples.measured, before.squares, floor)
+    name = simulator.physical_channels[samples.measured[main]].name
+    steps = [Step("", by_channel[name].before)]
+    for count in range(1, len(order) + 1):
+        part = tuple(sorted(order[:count]))
+        if part not in search.validated:
+            partial, theta = search.merged(key, (), drop=tuple(set(key) - set(part)))
+            search.fit(partial, theta)
+        label = search.candidates[order[count - 1]].label
+        steps.append(Step(label, span(search.validated[part].squares[:, main])))
+    blocks: Blocks = search.fitter.blocks
+    rows = blocks.windows.inside.sum(axis=1)
+    share = search.currency.share(before.squares, after.squares, np.random.default_rng(0))
+    return Gap(
+        name, by_channel[name].unit, float(np.median(rows) - 1) * samples.step,
+        by_channel[name].before, by_channel[name].after, by_channel[name].noise_floor,
+        tuple(steps), by_channel, *ratios, Span(*share) if key else Span(0.0, 0.0, 0.0),
+        len(blocks), blocks.folds,
+    )  # fmt: skip
+
+
+def main_channel(
+    simulator: HostSimulator, measured: NDArray[np.int64], before: Array, floor: Array
+) -> int:
+    """Place of the position (or state) whose error is largest beside its noise."""
+    kinds = [simulator.physical_channels[c].kind for c in measured]
+    places = [i for i, kind in enumerate(kinds) if kind in ("position", "other")] or [0]
+    times = np.nanmean(before, axis=0) / np.maximum(np.nanmean(floor, axis=0), 1e-300)
+    return max(places, key=lambda i: times[i])
+
+
+def rollouts(search: Search, before: Validated, after: Validated) -> tuple[Rollout, ...]:
+    """Some forecasts from the first to the last, measured, nominal and corrected."""
+    samples, windows = search.fitter.samples, search.fitter.blocks.windows
+    found = []
+    count = min(PICTURES, len(windows))
+    for w in np.unique(np.linspace(0, len(windows) - 1, count).astype(int)):
+        inside = windows.inside[w]
+        index = windows.index[w][inside]
+        found.append(
+            Rollout(
+                samples.names[windows.run[w]], samples.times[index],
+                samples.seen[index][:, samples.measured],
+                before.foretold.shown[w][inside], after.foretold.shown[w][inside],
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def held_out(gap: Gap, fitter: Fitter, before: Fit, after: Fit, floor: Array) -> Gap:
+    """The same table for records that were set aside.
+
+    Args:
+        gap: Of the records that were used.
+        fitter: For the records set aside.
+        before, after: Nominal and corrected simulator with start states on these records.
+        floor: See ``noise_floor``.
+    """
+    which = np.zeros(len(fitter.blocks.windows), np.int64)
+    squares = [
+        by_block(fitter.foretell(fit.model, fit.theta[None], which, fit).squares, fitter.blocks)
+        for fit in (before, after)
+    ]
+    channels = before.model.simulator.physical_channels
+    by_channel = {
+        channels[c].name: ChannelGap(
+            channels[c].unit, span(squares[0][:, i]), span(squares[1][:, i]), span(floor[:, i])
+        )
+        for i, c in enumerate(fitter.samples.measured)
+    }
+    main = by_channel.get(gap.channel) or next(iter(by_channel.values()))
+    steps = (Step("", main.before), Step("all that was found", main.after))
+    return dataclasses.replace(
+        gap, before=main.before, after=main.after, noise_floor=main.noise_floor, steps=steps,
+        by_channel=by_channel, blocks=len(fitter.blocks), folds=1,
+    )  # fmt: skip

@@ -1,0 +1,60 @@
+"""What each number of a model, and each candidate effect, does to every window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.candidates import Candidate
+from residual.gap.impacts.single_shooting import Aimed, Shots, job, run, shown, whitened
+from residual.gap.model import Model
+
+Array = NDArray[np.float64]
+
+#: Trial strength of a smooth effect, as a share of what candidates are tried at elsewhere. A
+#: window of steps shows a hundredth of most effects, and an impact comes soon after the last.
+GENTLE = 0.3
+
+
+def chosen_changes(model: Model, theta: Array, shots: Shots, aimed: Aimed) -> Array:
+    """Derivative of the whitened output by the unknowns of the model, (W, R, p)."""
+    steps = np.where(theta + 0.1 * model.step > model.high, -0.1, 0.1) * model.step
+    thetas = theta + np.diag(steps)
+    jobs = [job(model, t, shots, aimed.starts[None]) for t in thetas]
+    measured = shots.samples.measured
+    columns = [
+        whitened(shots, (shown(one, path, measured)[0] - aimed.shown) / step)
+        for one, path, step in zip(jobs, run(jobs), steps, strict=True)
+    ]
+    return np.stack(columns, axis=2) if columns else np.zeros((*aimed.residual.shape, 0))
+
+
+def candidate_changes(
+    model: Model, theta: Array, shots: Shots, aimed: Aimed, candidates: Sequence[Candidate]
+) -> Array:
+    """Change of the whitened output by every trial of candidates beside a fitted model, (W, R, c).
+
+    Args:
+        model: The fitted simulator with effects.
+        theta: Their numbers.
+        shots: The windows.
+        aimed: The fit to them.
+        candidates: All that may be missing.
+    """
+    jobs, shares = [], []
+    for candidate in candidates:
+        joint = Model(model.simulator, (*model.chosen, candidate))
+        gentle = 1.0 if candidate.rough or candidate.fixed_level else GENTLE
+        for trial in candidate.trials:
+            for row in trial.values:
+                values = np.where(candidate.linear, gentle * row, row)
+                jobs.append(job(joint, np.append(theta, values), shots, aimed.starts[None]))
+                shares.append(gentle)
+    measured = shots.samples.measured
+    changes = [
+        whitened(shots, shown(one, path, measured)[0] - aimed.shown) / share
+        for one, path, share in zip(jobs, run(jobs), shares, strict=True)
+    ]
+    return np.stack(changes, axis=2)

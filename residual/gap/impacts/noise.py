@@ -1,0 +1,69 @@
+"""Noise of every channel from robust windows: the windows that fit badly hardly count."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.impacts.robust import weights
+from residual.gap.impacts.single_shooting import Aimed, Shots, aim
+from residual.gap.model import Model
+from residual.gap.samples import Samples
+
+Array = NDArray[np.float64]
+
+#: Noise is never less than this share of a channel's typical size, not even in a simulator's rows.
+FINEST = 1e-5
+
+
+def first_guess(samples: Samples, nodes: Array) -> Array:
+    """A tenth of what each measured channel usually moves from sample to sample, (m,)."""
+    steps = np.abs(np.diff(nodes[:, samples.measured], axis=0))
+    inside = np.ones(len(steps), bool)
+    inside[[stop - 1 for _, stop in samples.runs[:-1]]] = False
+    return np.maximum(0.1 * np.median(steps[inside], axis=0), 1e-9)
+
+
+def spread(shots: Shots, aimed: Aimed) -> tuple[Array, Array]:
+    """Noise of every measured channel and its standard error, (m,).
+
+    One step of the EM algorithm for Student's t, start states allowed for.
+    """
+    count, length, measured = aimed.shown.shape
+    rows = length * measured
+    basis, _ = np.linalg.qr(aimed.by_start)
+    leverage = (basis[:, :rows] ** 2).sum(axis=2).reshape(count, length, measured)
+    square = (aimed.residual[:, :rows] ** 2).reshape(count, length, measured)
+    weight = weights(aimed.costs, shots.freedom)[:, None, None]
+    valid = np.isfinite(shots.seen)
+    free = (weight * valid * (1 - leverage)).sum(axis=(0, 1))
+    ratio = (weight * square).sum(axis=(0, 1)) / np.maximum(free, 1e-9)
+    sigma = shots.sigma * np.sqrt(np.maximum(ratio, 1e-12))
+    counted = (valid * (1 - leverage)).sum(axis=(0, 1))
+    return sigma, sigma / np.sqrt(2 * np.maximum(counted, 1.0))
+
+
+def with_noise(shots: Shots, sigma: Array, scale: Array) -> Shots:
+    """The windows in units of another noise.
+
+    States are moved by a quarter of it, so that the kinks of contacts are averaged; a rate by
+    what such an error makes of it over an interval.
+    """
+    samples = shots.samples
+    sigma = np.maximum(sigma, FINEST * scale[samples.measured])
+    moves = np.array(shots.moves)
+    moves[samples.measured] = 0.25 * np.minimum(sigma, 0.02 * scale[samples.measured])
+    return dataclasses.replace(shots, sigma=sigma, moves=moves)
+
+
+def quieten(
+    model: Model, theta: Array, shots: Shots, starts: Array, scale: Array, turns: int
+) -> tuple[Shots, Aimed]:
+    """Start states and noise in turns."""
+    for _ in range(turns):
+        aimed = aim(model, theta, shots, starts, 1)
+        starts = aimed.starts
+        shots = with_noise(shots, spread(shots, aimed)[0], scale)
+    return shots, aimed

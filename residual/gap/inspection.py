@@ -1,0 +1,210 @@
+"""What can be read off measured runs alone: one function for each kind of finding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.logs.checks import Finding
+from residual.logs.faults import (
+    dropped_samples,
+    frozen_samples,
+    rounding,
+    summed_up,
+    wild_samples,
+)
+from residual.trajectories import Trajectory
+from sims.host import HostSimulator
+from sims.simulator import Channel
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# One sample in more control periods than these should be known.
+_SLOW = 4.0
+# An input is in another unit if it goes beyond its bounds by this factor, or if it mostly does so.
+_FAR_BEYOND = 3.0
+
+
+def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Samples much rarer than the control period."""
+    period = float(np.median(np.concatenate([run.durations for run in trajectories])))
+    if period <= _SLOW * simulator.dt:
+        return []
+    says = (
+        f"a sample every {period:.4g} s, {period / simulator.dt:.0f} control periods of "
+        f"{simulator.name} ({simulator.dt:g} s): what the input did between samples is not known, "
+        "and fast effects cannot show; log at the control period if you can"
+    )
+    numbers = {"period_s": period, "control_period_s": simulator.dt}
+    return [Finding("sampling", "", says, numbers, "warning")]
+
+
+def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Inputs beyond the bounds of their actuators, which a simulator would cut without a word."""
+    found = []
+    for column, channel in enumerate(simulator.action_channels):
+        low, high = channel.low, channel.high
+        room = 1e-6 * max(abs(bound) for bound in (low, high, 1e-300) if np.isfinite(bound))
+        total, beyond = 0, 0
+        rows: list[tuple[str, float]] = []
+        most = 0.0
+        for run in trajectories:
+            values = run.actions[:, column]
+            outside = (values < low - room) | (values > high + room)
+            total, beyond = total + len(values), beyond + int(outside.sum())
+            rows += [(run.name, float(t)) for t in run.times[:-1][outside]]
+            if outside.any():
+                most = max((most, *values[outside].tolist()), key=abs)
+        if not beyond:
+            continue
+        bounds = f"{low:g} to {high:g} {channel.unit}"
+        reaches = f"reaches {most:.4g} {channel.unit}, beyond the actuator's bounds of {bounds}"
+        size = max(abs(bound) for bound in (low, high) if np.isfinite(bound))
+        if abs(most) > _FAR_BEYOND * size or beyond > 0.5 * total:
+            says = (
+                f"{reaches}, in {beyond} of {total} samples: another unit (mV for V), or bounds "
+                f"of the simulator's channel {channel.name!r} that are not the actuator's"
+            )
+            found.append(refusal("bounds", channel.name, says))
+            continue
+        says = (
+            f"{reaches}, in {beyond} of {total} samples{_first(rows)}; the simulator cuts it there"
+        )
+        numbers = {"samples": beyond, "most": most}
+        found.append(Finding("bounds", channel.name, says, numbers, "warning", tuple(rows)))
+    return found
+
+
+def still(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Channels that never change."""
+    found, moving = [], 0
+    for channel, runs in measured(simulator, trajectories):
+        values = np.concatenate(runs)
+        values = values[np.isfinite(values)]
+        if np.ptp(values) > 0:
+            moving += 1
+            continue
+        says = (
+            f"is {values[0]:g} {channel.unit} in all {len(values)} samples: not connected, frozen, "
+            "or at rest throughout; it is taken as not measured"
+        )
+        found.append(Finding("still", channel.name, says, {"value": values[0]}, "warning"))
+    if not moving:
+        says = "no measured channel ever changes: nothing can be learnt from a system at rest"
+        return [refusal("still", "", says)]
+    return found
+
+
+def faults(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Samples that cannot be true."""
+    found = []
+    total = sum(len(run.times) for run in trajectories)
+    for channel, masks in faulty(simulator, trajectories):
+        for kind, words in _WORDS.items():
+            rows = _rows(trajectories, masks[kind])
+            if rows:
+                says = f"{len(rows)} of {total} samples {words}{_first(rows)}; taken as missing"
+                numbers = {"samples": len(rows)}
+                found.append(Finding(kind, channel.name, says, numbers, "warning", rows))
+    return found
+
+
+def rounded(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Channels that were rounded by more than they change between samples."""
+    found = []
+    for channel, runs in measured(simulator, trajectories):
+        step = rounding(runs)
+        if step:
+            says = (
+                f"was rounded to steps of {step:.4g} {channel.unit}, which alone is a noise of "
+                f"{step / np.sqrt(12):.2g} {channel.unit}"
+            )
+            found.append(Finding("rounded", channel.name, says, {"step": step}))
+    return found
+
+
+def sums(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Channels that are the running sum of another one, and were not declared so."""
+    durations = [run.durations for run in trajectories]
+    states = measured(simulator, trajectories)
+    inputs = [
+        (channel, [np.append(run.actions[:, j], np.nan) for run in trajectories])
+        for j, channel in enumerate(simulator.action_channels)
+    ]
+    found = []
+    for channel, values in states:
+        for other, rates in (*states, *inputs):
+            summable = other.unit == f"{channel.unit}/s" and other is not channel
+            if not summable or channel.integrates == other.name:
+                continue
+            if summed_up(values, rates, durations):
+                says = (
+                    f"is the running sum of {other.name}, noise included, and no measurement of "
+                    f"its own: its error grows with time. Declare it by integrates={other.name!r} "
+                    "on its channel, or leave it out of the log's columns"
+                )
+                found.append(Finding("integral", channel.name, says, {}, "warning"))
+    return found
+
+
+def measured(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory]
+) -> list[tuple[Channel, list[Array]]]:
+    """Every channel that was measured, with its values in every run."""
+    columns = [
+        (channel, [run.states[:, j] for run in trajectories])
+        for j, channel in enumerate(simulator.physical_channels)
+    ]
+    return [(c, runs) for c, runs in columns if any(np.isfinite(v).any() for v in runs)]
+
+
+#: What the samples marked by each test are, in words.
+_WORDS = {
+    "dropped": "are exact zeros amid other values, as if the sensor had dropped out",
+    "wild": "stand alone far from both neighbours",
+    "frozen": "repeat the one before in full motion, as if the sensor had frozen",
+}
+
+
+def faulty(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory]
+) -> list[tuple[Channel, dict[str, list[Mask]]]]:
+    """Samples that cannot be true: for every measured channel masks by kind, one for each run."""
+    names = [channel.name for channel in simulator.physical_channels]
+    rates = {c.rate_of: names.index(c.name) for c in simulator.physical_channels if c.rate_of}
+    found = []
+    for channel, runs in measured(simulator, trajectories):
+        moved = None
+        if channel.name in rates:
+            moved = [run.states[:-1, rates[channel.name]] * run.durations for run in trajectories]
+        masks = {
+            "dropped": dropped_samples(runs, 2 * np.pi if channel.angle else 0.0),
+            "wild": wild_samples(runs),
+            "frozen": frozen_samples(runs, moved),
+        }
+        found.append((channel, masks))
+    return found
+
+
+def _rows(
+    trajectories: Sequence[Trajectory], masks: Sequence[Mask]
+) -> tuple[tuple[str, float], ...]:
+    """Run and time of every marked sample."""
+    return tuple(
+        (run.name, float(time))
+        for run, mask in zip(trajectories, masks, strict=True)
+        for time in run.times[mask]
+    )
+
+
+def _first(rows: Sequence[tuple[str, float]]) -> str:
+    name, time = rows[0]
+    return f" (the first at {time:.6g} s of {name})"
+
+
+def refusal(kind: str, where: str, says: str) -> Finding:
+    """A finding after which no answer could mean anything."""
+    return Finding(kind, where, says, severity="refuse")

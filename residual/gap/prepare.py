@@ -1,0 +1,152 @@
+"""From trajectories to a fitter: table, windows, blocks, weights of the channels."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap import noise, paths
+from residual.gap.blocks import blocks, drive
+from residual.gap.candidates import Candidate
+from residual.gap.fitting import Fit, Fitter
+from residual.gap.impacts.prepare import impact_fitter, simple, weigh_impacts
+from residual.gap.model import Model
+from residual.gap.numerics import enough_substeps, own_substeps, stride_for
+from residual.gap.samples import Samples
+from residual.gap.search import Effort
+from residual.gap.smooth import LEAD, SmoothFitter
+from residual.gap.windows import cut
+from residual.trajectories import Trajectory
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+#: A window's loss counts by its logarithm beyond so many times the upper quartile of all.
+ROBUST = 4.0
+#: Smallest noise that is believed, as a share of each state's usual variation: below it
+#: integrators differ, not physics.
+FINEST = 1e-5
+#: Windows that are fitted: where all rows advance at once, and row by row.
+AT_ONCE, BY_ROW = 120, 40
+
+
+@dataclasses.dataclass(frozen=True)
+class Prepared:
+    """What a search needs.
+
+    Attributes:
+        fitter: Channels weighed by what the nominal simulator leaves.
+        floor: Noise around it.
+        weigh: Weighs the channels anew, see ``residual.gap.explain.Weighing``.
+        effort: How hard to search.
+        horizon: Forecast length in s.
+        pool: Which candidates, and trials of them, are worth their cost.
+    """
+
+    fitter: Fitter
+    floor: noise.Noise
+    weigh: Callable[[Fitter, Fit], tuple[Fitter, noise.Noise]]
+    effort: Effort
+    horizon: float
+    pool: Callable[[Sequence[Candidate]], list[Candidate]] = list
+
+
+def prepare(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory], horizon: float
+) -> Prepared:
+    """Table, windows, blocks and weights for a simulator and its logs.
+
+    Raises:
+        ValueError: Nothing was measured, or every record is too short.
+    """
+    if simulator.has_contacts:
+        impacts, around = impact_fitter(simulator, trajectories, horizon)
+        effort = Effort(5, 4, 1, 3, 3)
+        return Prepared(impacts, around, weigh_impacts, effort, horizon, simple)
+    fitter, floor = smooth_fitter(simulator, trajectories, horizon)
+    finest = own_substeps(simulator, trajectories, fitter.samples.stride)
+
+    def weigh(now: Fitter, fit: Fit) -> tuple[Fitter, noise.Noise]:
+        assert isinstance(now, SmoothFitter)
+        around = floor
+        if len(fit.theta):
+            # Noise suffers from a large gap, so it is estimated around the better model.
+            better = _noise_around(fit, fitter, floor)
+            around = better if (better.sigma < floor.sigma).all() else floor
+        again = weighted(now, fit, around.sigma)
+        few = enough_substeps(simulator, now.samples, now.nodes, again.sigma, finest)
+        return again.with_substeps(max(few, now.samples.substeps)), around
+
+    effort = Effort() if simulator.advances_rows_at_once else Effort(5, 1, 1, 3, 4)
+    return Prepared(fitter, floor, weigh, effort, horizon)
+
+
+def _noise_around(fit: Fit, fitter: SmoothFitter, floor: noise.Floor) -> noise.Floor:
+    corrected = Model(fit.model.bind(fit.theta))
+    samples, none = fitter.samples, np.zeros(0)
+    nodes = paths.measured(corrected, samples, none)
+    scale = corrected.scales(fitter.scale)
+    found = noise.estimate(corrected, samples, nodes, none, floor.sigma, scale)
+    least = FINEST * fitter.scale[samples.measured]
+    return dataclasses.replace(found, sigma=np.maximum(found.sigma, least))
+
+
+def smooth_fitter(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory], horizon: float
+) -> tuple[SmoothFitter, noise.Floor]:
+    """A fitter for a system without impacts, weighed by what the nominal simulator leaves."""
+    stride = stride_for(trajectories, horizon)
+    finest = own_substeps(simulator, trajectories, stride)
+    samples = Samples.join(trajectories, finest, stride)
+    if not len(samples.measured):
+        raise ValueError("no state channel was measured: every value in the trajectories is NaN")
+    model = Model(simulator)
+    nodes = paths.measured(model, samples, np.zeros(0))
+    scale = paths.variation(samples, nodes)
+    floor = noise.estimate(model, samples, nodes, np.zeros(0), noise.local_noise(samples), scale)
+    least = FINEST * scale[samples.measured]
+    floor = dataclasses.replace(floor, sigma=np.maximum(floor.sigma, least))
+    seconds = horizon / (1 - LEAD)
+    windows = cut(samples, floor.slope.by_state, _foreseen(simulator, samples, scale), seconds)
+    moving = np.array(noise.driven_states(model))
+    most = AT_ONCE if simulator.advances_rows_at_once else BY_ROW
+    grouped = blocks(samples, windows, drive(samples, nodes, moving), most)
+    start = SmoothFitter(samples, grouped, nodes, floor.slope.by_state, floor.sigma, scale)
+    nominal = start.fit(model, np.zeros(0))
+    fitter = weighted(start, nominal, floor.sigma)
+    few = enough_substeps(simulator, samples, nodes, fitter.sigma, finest)
+    return fitter.with_substeps(few), floor
+
+
+def _foreseen(simulator: HostSimulator, samples: Samples, scale: Array) -> Array:
+    """Scales by which to judge how the error of a start state grows.
+
+    The variation of a position that nobody measured is not known, so its channel's scale stands
+    for it: what moves nothing that was measured must not forbid a forecast.
+    """
+    channels = simulator.physical_channels
+    usual = np.array([channel.scale for channel in channels])
+    seen = np.isin(np.arange(len(channels)), samples.measured)
+    moving = np.array([channel.kind == "rate" for channel in channels])
+    return np.where(seen | moving, scale, np.maximum(scale, usual))
+
+
+def weighted(fitter: SmoothFitter, fit: Fit, sigma: Array) -> SmoothFitter:
+    """The fitter with every channel weighted by what a fit leaves of it, noise at least.
+
+    Weighted by noise, a clean encoder beside a noisy rate would decide everything as long as a
+    gap is left.
+    """
+    count, size = fitter.blocks.windows.index.shape
+    square = fit.projected.reshape(count, size, -1) ** 2
+    valid = fitter.valid
+    # A few windows that no model follows must not set the scale.
+    per_window = np.where(valid, square, 0.0).sum(axis=1) / np.maximum(valid.sum(axis=1), 1)
+    left = fitter.sigma * np.sqrt(np.quantile(per_window, 0.75, axis=0))
+    fresh = dataclasses.replace(fitter, sigma=np.maximum(left, sigma), cap=np.inf)
+    costs = (square * (fitter.sigma / fresh.sigma) ** 2).sum(axis=(1, 2))
+    cap = ROBUST * max(float(np.quantile(costs, 0.75)), float(np.median(valid.sum(axis=(1, 2)))))
+    return dataclasses.replace(fresh, cap=cap)

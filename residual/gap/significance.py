@@ -1,0 +1,47 @@
+"""Names for data that a set of effects explains down to the noise.
+
+Only there does significance name anything. While a remainder is left, every trifle is significant,
+and ``residual.gap.choice`` decides by shares of the error instead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from residual.gap.search import Key, Search
+
+
+def size(search: Search) -> int:
+    """Number of residuals."""
+    samples, windows = search.fitter.samples, search.fitter.blocks.windows
+    rows = windows.index[windows.inside]
+    return int(np.isfinite(samples.seen[rows][:, samples.measured]).sum())
+
+
+def score(search: Search, key: Key) -> float:
+    """Cost and a price for each number (the Bayesian information criterion); lower is better."""
+    return search.tried[key].merit + np.log(size(search)) * search.numbers(key)
+
+
+def significant(search: Search, needed: float) -> Key:
+    """The set of least score, of which every effect lowers the cost by what chance does not.
+
+    Args:
+        search: Fitted sets, residuals in units of the noise.
+        needed: See ``threshold``.
+    """
+    key = min(search.usable(), key=lambda k: score(search, k))
+    while key:
+        search.add_without_each(key)
+        smaller = [tuple(i for i in key if i != gone) for gone in key]
+        falls = {
+            k: search.tried[k].merit - search.tried[key].merit
+            - np.log(size(search)) * (search.numbers(key) - search.numbers(k) - 1)
+            for k in smaller if k in search.tried
+        }  # fmt: skip
+        weakest = min(falls, key=lambda k: falls[k])
+        if falls[weakest] > needed:
+            break
+        key = min([weakest, *(k for k in search.usable() if len(k) < len(key))],
+                  key=lambda k: score(search, k))  # fmt: skip
+    return key

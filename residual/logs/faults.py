@@ -1,0 +1,207 @@
+"""Faults of sensors that show in the numbers of one channel alone.
+
+Each test looks at all runs of a channel, since one run may hold too little of what is usual. All
+are made so that noise, rounding, rest and sudden pushes are no faults.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# A sample is wild if it leaves its neighbours, and comes back, by so many times what nearly all
+# changes between samples reach.
+_WILD = 8.0
+# More of them than this share are noise with heavy tails, no accidents.
+_RARE = 0.01
+# Equal samples in a row that a moving channel does not have by chance.
+_STILL = 10
+# Share of the range of values above which a step of rounding is worth a word.
+_COARSE = 3e-4
+# Zeros in a row that are a drop-out rather than a time at which nothing happened.
+_LONGEST_DROP = 50
+
+
+def wild_samples(runs: Sequence[Array]) -> list[Mask]:
+    """Single samples far from both neighbours, which agree with each other.
+
+    Args:
+        runs: Values of one channel, NaN where missing, shape (n,) each.
+
+    Returns:
+        True where a sample is wild; nowhere if there are too many for accidents.
+    """
+    usual, step = _usual_change(runs), rounding(runs)
+    found = []
+    for values in runs:
+        mask = np.zeros(len(values), bool)
+        if len(values) > 2:
+            before, after = np.diff(values)[:-1], np.diff(values)[1:]
+            least = np.minimum(np.abs(before), np.abs(after))
+            with np.errstate(invalid="ignore"):
+                mask[1:-1] = (
+                    (before * after < 0)
+                    & (least > _WILD * max(usual, step))
+                    & (np.abs(before + after) < 0.3 * least)
+                )
+        found.append(mask)
+    share = sum(int(mask.sum()) for mask in found) / max(1, sum(map(len, runs)))
+    return found if share <= _RARE else [np.zeros(len(values), bool) for values in runs]
+
+
+def dropped_samples(runs: Sequence[Array], turn: float = 0.0) -> list[Mask]:
+    """Exact zeros in the middle of values far from zero.
+
+    Args:
+        runs: As for ``wild_samples``.
+        turn: What one turn measures, for an angle that was unwrapped; multiples of it are zeros.
+
+    Returns:
+        True where a sample is an exact zero that was jumped to and jumped from.
+    """
+    usual = max(_usual_change(runs), rounding(runs))
+    found = []
+    for values in runs:
+        rest = values - turn * np.round(values / turn) if turn else values
+        mask = np.zeros(len(values), bool)
+        for a, b in _stretches(np.abs(rest) <= 1e-12 * max(1.0, turn)):
+            if a == 0 or b == len(values) or b - a > _LONGEST_DROP:
+                continue
+            least = min(abs(rest[a - 1]), abs(rest[b]))
+            # What comes back elsewhere, or crosses zero on its way, is motion.
+            same = abs(values[a - 1] - values[b]) < 0.5 * least
+            mask[a:b] = same and least > _WILD * usual
+        found.append(mask)
+    return found
+
+
+def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) -> list[Mask]:
+    """Repeats of one value where the channel was moving until then.
+
+    A system at rest gives equal samples too. A frozen sensor stops in full motion, and has to catch
+    up when it thaws; if it does not thaw, only another sensor can tell.
+
+    Args:
+        runs: As for ``wild_samples``.
+        moved: What another sensor says of the change from each sample to the next, (n - 1,) for
+            each run; the integral of a measured rate, for example.
+
+    Returns:
+        True where a value repeats the one before and should not.
+    """
+    changes = [np.abs(np.diff(values)) for values in runs]
+    moving = np.concatenate([change[change > 0] for change in changes] or [np.zeros(0)])
+    found = [np.zeros(len(values), bool) for values in runs]
+    if not moving.size:
+        return found
+    typical, step = float(np.median(moving)), rounding(runs)
+    others = moved or [np.zeros(len(change)) for change in changes]
+    for values, change, other, mask in zip(runs, changes, others, found, strict=True):
+        for a, b in _stretches(change == 0):  # samples a to b are equal
+            if b - a < _STILL or a < 3:
+                continue
+            steps = np.diff(values[max(0, a - 3) : a + 1])
+            if not np.isfinite(steps).all() or len(steps) < 3:
+                continue
+            entry = abs(float(steps.mean()))
+            steady = np.all(np.sign(steps) == np.sign(steps[-1]))
+            least = max(_WILD * typical, 2.1 * step)
+            thawed = b + 1 < len(values) and abs(values[b + 1] - values[b]) > least
+            contradicted = float(np.abs(np.nancumsum(other[a:b])).max()) > least
+            fast = entry > max(0.3 * typical, 1.5 * step)
+            if steady and fast and (thawed or contradicted):
+                mask[a + 1 : b + 1] = True
+    return found
+
+
+def rounding(runs: Sequence[Array]) -> float:
+    """The step to which values were rounded, if it is coarse.
+
+    Returns:
+        The step, or 0 if there is none, or one too fine to matter.
+    """
+    values = np.concatenate([np.ravel(v) for v in runs] or [np.zeros(0)])
+    values = values[np.isfinite(values)]
+    step = _grain(runs)
+    return step if values.size and step > _COARSE * float(np.ptp(values)) else 0.0
+
+
+def summed_up(
+    positions: Sequence[Array], rates: Sequence[Array], durations: Sequence[Array]
+) -> bool:
+    """Whether a channel is nothing but the running sum of another one, noise and all.
+
+    The change of an independent sensor does not contain the noise of the rate; that of a sum
+    contains it to the digit, so it cannot be told from the rate by any of the usual rules.
+
+    Args:
+        positions: What may be a sum, shape (n,) for each run.
+        rates: What may have been summed up, shape (n,).
+        durations: From each sample to the next in s, shape (n - 1,).
+
+    Returns:
+        True if it is; False also where the rate has too little noise to tell.
+    """
+    moved = np.concatenate([np.diff(x) for x in positions])
+    bends = np.concatenate([np.diff(v, 3) for v in rates])
+    speeds = np.concatenate(list(rates))
+    bends, speeds = bends[np.isfinite(bends)], speeds[np.isfinite(speeds)]
+    if bends.size < 20:
+        return False
+    # Third differences of white noise have 20 times its variance.
+    noise = float(np.median(np.abs(bends))) / (0.6745 * np.sqrt(20))
+    if noise < 1e-3 * float(np.std(speeds)):
+        return False
+    rules = (
+        np.concatenate([v[:-1] * h for v, h in zip(rates, durations, strict=True)]),
+        np.concatenate([v[1:] * h for v, h in zip(rates, durations, strict=True)]),
+        np.concatenate([0.5 * (v[:-1] + v[1:]) * h for v, h in zip(rates, durations, strict=True)]),
+    )
+    step = float(np.median(np.concatenate(list(durations))))
+    lost = []
+    for rule in rules:
+        off = np.abs(moved - rule)
+        off = off[np.isfinite(off)]
+        lost.append(float(np.median(off)) / 0.6745 if off.size > 20 else np.inf)
+    # Digits that were not printed are lost; fast motion looks like noise, up to some ten times it.
+    printed = 0.6 * _grain(positions)
+    return min(lost) < max(0.01 * noise * step, min(printed, 0.1 * noise * step))
+
+
+def _usual_change(runs: Sequence[Array]) -> float:
+    """What 99 % of the changes between samples stay below, accidents left out."""
+    changes = np.concatenate([np.abs(np.diff(values)) for values in runs] or [np.zeros(0)])
+    changes = changes[np.isfinite(changes)]
+    if not changes.size:
+        return np.inf
+    high = float(np.quantile(changes, 0.99))
+    # Short runs: one accident makes two of the largest changes.
+    usual = 5.0 * float(np.quantile(changes, 0.9))
+    return min(high, usual) if usual > 0 else high
+
+
+def _stretches(mask: Mask) -> list[tuple[int, int]]:
+    """First and one-past-last index of every stretch of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _grain(runs: Sequence[Array]) -> float:
+    """What all values are multiples of, but for a constant; 0 if there is no such number."""
+    values = np.concatenate([np.ravel(v) for v in runs] or [np.zeros(0)])
+    values = np.unique(values[np.isfinite(values)])
+    if len(values) < 8:
+        return 0.0
+    gaps = np.diff(values)
+    gaps = gaps[gaps > 1e-9 * max(abs(values[0]), abs(values[-1]))]
+    if not gaps.size:
+        return 0.0
+    grain = float(gaps.min())
+    # Numbers printed with few digits are nearly, not exactly, multiples of their last digit.
+    whole = np.abs(gaps / grain - np.round(gaps / grain)) < 0.02
+    return grain if whole.all() else 0.0

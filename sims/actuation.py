@@ -1,0 +1,154 @@
+"""The actuator path of a simulator: inputs of recorded runs and of one period, and its memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sims import drive as path
+from sims.effects.actuator import ActuatorEffect
+from sims.simulator import Array, Channel, Hold
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
+
+
+def history(simulator: HostSimulator, actuator: str) -> int:
+    """Past commands that the delays of an input reach back to."""
+    late = path.total_delay(simulator.actuator_effects(actuator))
+    return int(np.ceil(np.max(late) / simulator.dt - 1e-9))
+
+
+def memory_channels(simulator: HostSimulator) -> Iterator[Channel]:
+    """Channels of the places in plays, past commands and lagged inputs, in this order."""
+    channels = {channel.name: channel for channel in simulator.state_channels}
+    joints = {joint.name: joint for joint in simulator.joints}
+    for play in simulator.plays():
+        position = channels[joints[play.joint].position]
+        yield Channel(f"{play.joint} play", position.unit, "memory", scale=position.scale)
+    for channel in simulator.action_channels:
+        for k in range(history(simulator, channel.name), 0, -1):
+            past = f"{channel.name} {k} ago"
+            yield Channel(past, channel.unit, "memory", scale=channel.scale)
+        for i, _ in enumerate(path.lags(simulator.actuator_effects(channel.name))):
+            name = f"{channel.name} lagged" + (f" {i + 1}" if i else "")
+            yield Channel(name, channel.unit, "memory", scale=channel.scale)
+
+
+def with_memory(simulator: HostSimulator, states: Array, actions: Array) -> Array:
+    """Physical states with the memory that a command has left which was applied for long.
+
+    Args:
+        simulator: Gives effects and joints.
+        states: (n, n_physical).
+        actions: (n, n_a) within their bounds.
+
+    Returns:
+        (n, n_s), see ``HostSimulator.augment``.
+    """
+    n, physical = states.shape
+    full = np.zeros((n, len(simulator.state_channels)))
+    full[:, :physical] = states
+    received = np.empty_like(actions)
+    at = physical + len(simulator.plays())
+    for j, channel in enumerate(simulator.action_channels):
+        effects = simulator.actuator_effects(channel.name)
+        received[:, j] = path.shaped(actions[:, j : j + 1], effects)[:, 0]
+        kept = history(simulator, channel.name)
+        full[:, at : at + kept] = actions[:, j : j + 1]
+        at += kept
+        count = len(path.lags(effects))
+        full[:, at : at + count] = received[:, j : j + 1]
+        at += count
+    if simulator.plays():
+        names = [joint.name for joint in simulator.joints]
+        sides = np.sign(simulator.drive_forces(states, received))
+        for i, play in enumerate(simulator.plays()):
+            full[:, physical + i] = 0.5 * play.width * sides[:, names.index(play.joint)]
+    return full
+
+
+def recorded_inputs(
+    simulator: HostSimulator,
+    commands: Array,
+    durations: Array,
+    substeps: int,
+    holds: Sequence[Hold],
+) -> Array:
+    """Mean and rise of every input in every sub-step of a record, (V, T, substeps, n_a, 2).
+
+    Args:
+        simulator: Gives the effects on the inputs.
+        commands: (T, n_a) within their bounds.
+        durations: (T,) seconds.
+        substeps: In each interval.
+        holds: How each input runs between samples.
+    """
+    columns = []
+    for j, channel in enumerate(simulator.action_channels):
+        effects = simulator.actuator_effects(channel.name)
+        samples = path.shaped(commands[None, :, j], effects)
+        late = path.total_delay(effects)
+        if np.ndim(late):
+            samples = np.broadcast_to(samples, (len(np.asarray(late)), samples.shape[1]))
+        means, rises = path.substep_inputs(samples, durations, substeps, late, holds[j])
+        for lag in path.lags(effects):
+            shape = (lag.rows or len(means), *means.shape[1:])
+            means, rises = np.broadcast_to(means, shape), np.broadcast_to(rises, shape)
+            start = np.broadcast_to(samples[:, 0], len(means))
+            means, rises, _ = simulator.lagged(means, rises, durations, lag.time_constant, start)
+        columns.append(np.stack([means, rises], axis=-1))
+    if not columns:
+        return np.empty((1, len(commands), substeps, 0, 2))
+    return np.stack(np.broadcast_arrays(*columns), axis=3)
+
+
+def next_inputs(
+    simulator: HostSimulator, memory: Array, actions: Array, upcoming: Array | None
+) -> tuple[Array, Array]:
+    """Effective inputs of one control period and the memory after it.
+
+    Args:
+        simulator: Gives the effects on the inputs.
+        memory: (n, n_memory) past commands and lagged inputs.
+        actions: (n, n_a) within their bounds.
+        upcoming: The actions after them, for inputs that run straight to these; None to hold.
+
+    Returns:
+        Inputs as ``HostSimulator.integrate`` wants them, and the memory after the period.
+    """
+    inputs = np.repeat(actions[:, None, :], simulator.substeps, axis=1)
+    acting = any(isinstance(effect, ActuatorEffect) for effect in simulator.effects)
+    if not acting and upcoming is None:
+        return inputs, memory
+    inputs = np.stack([inputs, np.zeros_like(inputs)], axis=-1)
+    after = np.empty_like(memory)
+    at = 0
+    for j, channel in enumerate(simulator.action_channels):
+        effects = simulator.actuator_effects(channel.name)
+        straight = upcoming is not None and channel.hold == "linear"
+        if not effects and not straight:
+            continue
+        kept = history(simulator, channel.name)
+        commands = np.concatenate([memory[:, at : at + kept], actions[:, j : j + 1]], axis=1)
+        after[:, at : at + kept] = commands[:, 1:]
+        at += kept
+        if upcoming is not None and straight:
+            commands = np.concatenate([commands, upcoming[:, j : j + 1]], axis=1)
+        means, rises = path.substep_inputs(
+            path.shaped(commands, effects),
+            np.full(commands.shape[1], simulator.dt),
+            simulator.substeps,
+            path.total_delay(effects),
+            "linear" if straight else "zero",
+        )
+        means, rises = means[:, kept : kept + 1], rises[:, kept : kept + 1]
+        for lag in path.lags(effects):
+            means, rises, after[:, at] = simulator.lagged(
+                means, rises, np.array([simulator.dt]), lag.time_constant, memory[:, at]
+            )
+            at += 1
+        inputs[:, :, j] = np.stack([means[:, 0], rises[:, 0]], axis=-1)
+    return inputs, after

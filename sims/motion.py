@@ -1,0 +1,149 @@
+"""What moves in a batch of rows: accelerations, and the forces that are added to them.
+
+Joints first and rows last, (n_joints, n), as in ``sims.rows``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import numpy as np
+
+from sims.effects.backlash import Backlash
+from sims.effects.friction import CoulombFriction, DryFriction
+from sims.effects.joint import JointEffect
+from sims.rows import Mask, Rows, State
+from sims.simulator import Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Motion:
+    """What moves.
+
+    Args:
+        acceleration: (q, v, u, force, parameters) -> accelerations; all (n_joints, n) but
+            u (n_a, n). Linear in the force.
+        drive_force: (q, v, u, parameters) -> (n_joints, n).
+        parameters: Each a scalar or (n,).
+        smooth, dry, plays: Effects with the number of the joint they act on.
+    """
+
+    acceleration: Callable[[Array, Array, Array, Array, SimpleNamespace], Array]
+    drive_force: Callable[[Array, Array, Array, SimpleNamespace], Array]
+    parameters: SimpleNamespace
+    smooth: tuple[tuple[int, JointEffect], ...] = ()
+    dry: tuple[tuple[int, DryFriction], ...] = ()
+    plays: tuple[tuple[int, Backlash], ...] = ()
+
+    def take(self, rows: Rows) -> Motion:
+        """The same for some rows."""
+        return Motion(
+            self.acceleration,
+            self.drive_force,
+            _some(self.parameters, rows),
+            tuple((j, effect.take(rows)) for j, effect in self.smooth),
+            tuple((j, effect.take(rows)) for j, effect in self.dry),
+            tuple((j, effect.take(rows)) for j, effect in self.plays),
+        )
+
+    @property
+    def even(self) -> bool:
+        """Whether dry friction is of the same size at every rate."""
+        return all(type(effect) is CoulombFriction for _, effect in self.dry)
+
+    def load(self, q: Array, v: Array, force: Array | None = None) -> Array:
+        """Force of the smooth effects on every joint, and a further force."""
+        total = np.zeros_like(q) if force is None else force
+        for j, effect in self.smooth:
+            total[j] += effect.force(q[j], v[j])
+        return total
+
+    def accelerate(self, q: Array, v: Array, u: Array, load: Array) -> Array:
+        """Accelerations under a force on every joint."""
+        return self.acceleration(q, v, u, load, self.parameters)
+
+    def mobility(
+        self,
+        q: Array,
+        v: Array,
+        u: Array,
+        load: Array,
+        acceleration: Array,
+        asked: Mask,
+        rows: Rows,
+    ) -> Array:
+        """Acceleration of joint i per unit force on joint j, as [j, i, row].
+
+        Args:
+            q, v, u, load: As for ``accelerate``.
+            acceleration: Which that returned.
+            asked: (n_joints, n), for which joints j; for the others it is zero.
+            rows: In which rows.
+        """
+        joints = len(q)
+        found = np.zeros((joints, joints, rows.size))
+        # One call for all joints.
+        places = [np.flatnonzero(asked[j, rows]) for j in range(joints)]
+        index = rows[np.concatenate(places)]
+        more = load.take(index, 1)
+        ends = np.cumsum([place.size for place in places]).tolist()
+        for j, (start, end) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
+            more[j, start:end] += 1.0
+        change = self.acceleration(
+            q.take(index, 1), v.take(index, 1), u.take(index, 1), more,
+            _some(self.parameters, index),
+        ) - acceleration.take(index, 1)  # fmt: skip
+        for j, (start, end) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
+            found[j][:, places[j]] = change[:, start:end]
+        return found
+
+    def drive(self, q: Array, v: Array, u: Array) -> Array:
+        """Force of the actuators on every joint."""
+        return self.drive_force(q, v, u, self.parameters)
+
+    def drive_and_free(self, q: Array, v: Array, u: Array) -> tuple[Array, Array]:
+        """The same, and each drive's free speed across its play, (n_plays, n)."""
+        push = self.drive(q, v, u)
+        free = np.zeros((len(self.plays), q.shape[1]))
+        for i, (j, _) in enumerate(self.plays):
+            faster = v.copy()
+            faster[j] += 1.0
+            free[i] = push[j] / (push[j] - self.drive(q, faster, u)[j])
+        return push, free
+
+    def limits(self, v: Array) -> Array:
+        """Size of the dry friction on every joint."""
+        size = np.zeros_like(v)
+        for j, effect in self.dry:
+            size[j] += effect.limit(np.abs(v[j]))
+        return size
+
+
+def advance_smoothly(motion: Motion, state: State, u: Array, h: Array) -> State:
+    """State after ``h`` seconds, (n,), under inputs ``u`` (2, n_a, n), without friction and play.
+
+    One classical fourth-order step of Runge and Kutta.
+    """
+
+    def accelerations(q: Array, v: Array, u: Array) -> Array:
+        return motion.accelerate(q, v, u, motion.load(q, v))
+
+    q, v, x = state
+    middle, half = 0.5 * (u[0] + u[1]), 0.5 * h
+    a1 = accelerations(q, v, u[0])
+    v2 = v + half * a1
+    a2 = accelerations(q + half * v, v2, middle)
+    v3 = v + half * a2
+    a3 = accelerations(q + half * v2, v3, middle)
+    v4 = v + h * a3
+    a4 = accelerations(q + h * v3, v4, u[1])
+    sixth = h / 6
+    return State(q + sixth * (v + 2 * (v2 + v3) + v4), v + sixth * (a1 + 2 * (a2 + a3) + a4), x)
+
+
+def _some(parameters: SimpleNamespace, rows: Rows) -> SimpleNamespace:
+    return SimpleNamespace(
+        **{name: p[rows] if np.ndim(p) else p for name, p in vars(parameters).items()}
+    )

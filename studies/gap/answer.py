@@ -1,0 +1,240 @@
+"""The answer in sentences: what the gap is, each verdict, and why it is no more certain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from residual.gap import GapResult
+from residual.gap.confirmation import FEW
+from residual.gap.result import Doubt, Number, Verdict
+from studies.gap.words import (
+    KINDS,
+    ahead,
+    effect_name,
+    known_effects,
+    label_of,
+    listed,
+    names_of,
+    number_text,
+    percent,
+    quantity_text,
+    rounded,
+    unit_text,
+)
+
+#: Share of the gap without a name that is a footnote.
+FOOTNOTE = 0.02
+#: Rivals that are listed in the first sentence.
+FEW_RIVALS = 2
+
+DOUBTS: dict[Doubt, str] = {
+    "not_needed": "forecasts are not clearly worse without it",
+    "unsteady": "its size differs between parts of the data",
+    "numerics": "its size changes with the integration step or with how the input is held",
+    "at_bound": "its size lies at its bound",
+    "rivals": "an effect of another kind does nearly as well",
+}
+
+
+def lead(result: GapResult, tolerance: float | None = None) -> str:
+    """The first sentence: the share of the gap that has a name.
+
+    Args:
+        result: What was found.
+        tolerance: Forecast error that does not matter.
+    """
+    gap = result.gap
+    before = quantity_text(gap.before.value, gap.unit)
+    if tolerance is not None and gap.before.value <= tolerance:
+        allowed = quantity_text(tolerance, gap.unit)
+        smaller = " What is named below is smaller than that." if result.effects else ""
+        return f"Nothing that matters: the {ahead(gap)} is {before}, allowed is {allowed}.{smaller}"
+    if any(verdict.kind in ("confirmed", "ambiguous") for verdict in result.verdicts):
+        return f"{_first(percent(gap.share.value))} of the gap is {_what(result)}."
+    if any(v.kind == "unexplained" for v in result.verdicts):
+        return f"The gap has no name: the {ahead(gap)} is {before}."
+    floor = quantity_text(gap.noise_floor.value, gap.unit)
+    return f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
+
+
+def _what(result: GapResult) -> str:
+    """What the gap is made of, certain names first."""
+    certain = [v for v in result.verdicts if v.kind == "confirmed"]
+    others = [v for v in result.verdicts if v.kind == "ambiguous"]
+    sure = listed(_by_place([_briefly(verdict, result) for verdict in certain]))
+    if not others:
+        return sure
+    if len(others) == 1:
+        doubtful = _with_rivals(others[0], result)
+    else:
+        doubtful = "perhaps " + listed(_by_place([_briefly(v, result) for v in others]))
+    return f"{sure} and {doubtful}" if sure else doubtful
+
+
+def _briefly(verdict: Verdict, result: GapResult) -> str:
+    """The family if the form is undecided, else the effect."""
+    if not verdict.family:
+        return effect_name(_short(verdict, result))
+    _, at, place = effect_name(_short(verdict, result)).partition(" at ")
+    return f"{verdict.family}{at}{place}"
+
+
+def _with_rivals(verdict: Verdict, result: GapResult) -> str:
+    name, others = _briefly(verdict, result), rivals(verdict)
+    if not others:
+        return f"perhaps {name}"
+    if len(others) <= FEW_RIVALS:
+        return f"{name} or {names_of(others)}"
+    return f"{name} or one of {len(others)} others"
+
+
+def _by_place(names: Sequence[str]) -> list[str]:
+    """``friction at a`` and ``friction at b`` as ``friction at a and b``."""
+    places: dict[str, list[str]] = {}
+    for name in names:
+        what, _, place = name.partition(" at ")
+        places.setdefault(what, []).append(place)
+    return [f"{what} at {listed(found)}" if all(found) else what for what, found in places.items()]
+
+
+def _short(verdict: Verdict, result: GapResult) -> str:
+    """Name and place; of a system with a single joint the place goes without saying."""
+    joints = [joint.name for joint in result.corrected.joints]
+    return verdict.effect if joints == [verdict.where] else label_of(verdict)
+
+
+def rivals(verdict: Verdict) -> tuple[str, ...]:
+    """Effects of another kind that these data cannot exclude."""
+    known = {*verdict.same_motion, *verdict.form}
+    return tuple(label for label in verdict.alternatives if label not in known)
+
+
+def headline(verdict: Verdict, result: GapResult) -> str:
+    """The verdict in one sentence."""
+    gap = result.gap
+    if verdict.kind == "no_gap":
+        return f"The {ahead(gap)} is {quantity_text(gap.before.value, gap.unit)}."
+    if verdict.kind == "unexplained":
+        return f"{_first(percent(verdict.share.value))} of the gap has no name."
+    if verdict.kind == "needs_data":
+        return _first(names_of(verdict.alternatives, "and")) + "."
+    name = _first(effect_name(label_of(verdict)))
+    if verdict.kind == "minor":
+        return f"{name}: {percent(verdict.share.value)} of the gap, not added."
+    parameter = result.corrected.parameters.get(verdict.where)
+    if verdict.effect == verdict.where and parameter is not None:
+        (change,) = verdict.parameters.values()
+        half = 0.0 if change.at_bound else 0.5 * (change.high - change.low)
+        total = rounded(float(parameter.value) + change.value, half)
+        return (
+            f"{name}: {number_text(change, sign=True)}, so {total}"
+            f"{unit_text(change.unit)} in place of {float(parameter.value):g}."
+        )
+    numbers = ", ".join(_named(field, number) for field, number in verdict.parameters.items())
+    if verdict.family:
+        return f"{_first(verdict.family)}, form undecided: as {_lower(name)}, {numbers}."
+    return f"{name}{shape(verdict, result)}: {numbers}."
+
+
+def _named(field: str, number: Number) -> str:
+    return f"{field.replace('_', ' ')} {number_text(number)}"
+
+
+def shape(verdict: Verdict, result: GapResult) -> str:
+    """Numbers that were chosen rather than fitted, such as the order of a cogging."""
+    for effect in result.effects:
+        if str(effect) != label_of(verdict):
+            continue
+        words = [
+            f"{name} {getattr(effect, name):g}{unit_text(quantity.unit)}"
+            for name, quantity in effect.quantities(result.corrected).items()
+            if name not in verdict.parameters and quantity.role == "shape"
+        ]
+        return f" ({', '.join(words)})" if words else ""
+    return ""
+
+
+def notes(verdict: Verdict, result: GapResult) -> list[str]:
+    """What else there is to know of a verdict, each a clause without a full stop."""
+    if verdict.kind == "unexplained":
+        return _remainder_notes(verdict, result)
+    if verdict.kind not in ("confirmed", "ambiguous"):
+        return []
+    found = [f"without it, {percent(verdict.share.value)} of the gap would be back"]
+    doubts = [DOUBTS[doubt] for doubt in verdict.doubts if doubt != "rivals"]
+    others = rivals(verdict)
+    if others:
+        found.append(
+            f"one of {names_of((label_of(verdict), *others))}: these data cannot tell which"
+        )
+    if doubts:
+        found.append(f"not certain: {listed(doubts)}")
+    if verdict.form:
+        found.append(f"of the same family, {names_of(verdict.form)} would do as well")
+    if verdict.same_motion:
+        found.append(f"no motion can tell it from {names_of(verdict.same_motion)}")
+    if verdict.provisional:
+        found.append(provisional(result))
+    return found
+
+
+def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
+    found = [f"{result.gap.windows_after:.3g} times the noise is left"]
+    if verdict.follows:
+        found.append(f"it looks like a force that follows {verdict.follows}")
+    if verdict.alternatives:
+        found.append(
+            f"{names_of(verdict.alternatives, 'and')} would take some of it, and so would many "
+            "others"
+        )
+    return found
+
+
+def provisional(result: GapResult) -> str:
+    """Why an answer is provisional, and what would do."""
+    gap = result.gap
+    more = quantity_text((FEW - gap.blocks) * gap.horizon_s, "s")
+    blocks = "block" if gap.blocks == 1 else "blocks"
+    return (
+        f"provisional: there are {gap.blocks} {blocks} of data to confirm it, {FEW} would do "
+        f"(some {more} more)"
+    )
+
+
+def is_footnote(verdict: Verdict) -> bool:
+    """Whether a remainder is too small to be more than mentioned."""
+    return verdict.kind == "unexplained" and verdict.share.value < FOOTNOTE
+
+
+def sentence(label: str, result: GapResult) -> str:
+    """What an effect is."""
+    effect = known_effects(result).get(label)
+    parameter = result.corrected.parameters.get(label)
+    if parameter is not None:
+        return f"The {parameter.meaning} differs from what the simulator says."
+    return effect.sentence if effect else ""
+
+
+def experiment(label: str, others: Sequence[str], result: GapResult, same: bool) -> str:
+    """What would tell an effect from others."""
+    if same:
+        return (
+            f"No log of this motion can tell. Measure one of them directly, or change "
+            f"{effect_name(label)} by a known amount, such as a known payload, and log again."
+        )
+    known = known_effects(result)
+    needs = [known[name].needs for name in (label, *others) if name in known]
+    return "Log " + ", and ".join(dict.fromkeys(needs)) + "." if needs else ""
+
+
+def kind_text(verdict: Verdict) -> str:
+    """The kind in words, provisional ones marked."""
+    return KINDS[verdict.kind] + (", provisional" if verdict.provisional else "")
+
+
+def _first(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _lower(text: str) -> str:
+    return text if text.startswith(("Coulomb", "Stribeck")) else text[:1].lower() + text[1:]

@@ -1,0 +1,69 @@
+"""Lines of progress, and a sign of life in between."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+#: Seconds without a line after which the last one is repeated.
+QUIET = 4.0
+
+
+def to_terminal(line: str) -> None:
+    """One line on stderr, at once."""
+    print(line, file=sys.stderr, flush=True)
+
+
+class Heartbeat:
+    """Tells what is being done, with the time since the start and what is left of a budget.
+
+    Args:
+        budget: Seconds.
+        write: Takes a line.
+        quiet: Seconds without a line after which the last one is repeated.
+    """
+
+    def __init__(
+        self, budget: float, write: Callable[[str], None] = to_terminal, quiet: float = QUIET
+    ) -> None:
+        self._budget, self._write, self._quiet = budget, write, quiet
+        self._begin = self._spoke = time.perf_counter()
+        self._text = ""
+        self._lock, self._over = threading.Lock(), threading.Event()
+        self._thread = threading.Thread(target=self._beat, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._begin = self._spoke = time.perf_counter()
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def __call__(self, text: str) -> None:
+        """Say what is being done or was found."""
+        with self._lock:
+            self._text = text
+            self._say(text)
+
+    def _say(self, text: str) -> None:
+        self._spoke = time.perf_counter()
+        spent = self._spoke - self._begin
+        left = max(self._budget - spent, 0.0)
+        self._write(f"{spent:6.1f} s, {left:.0f} s left  {text}")
+
+    def _beat(self) -> None:
+        while not self._over.wait(0.25 * self._quiet):
+            with self._lock:
+                if self._text and time.perf_counter() - self._spoke > 0.75 * self._quiet:
+                    self._say(f"still working; last: {self._text.strip()}")

@@ -1,0 +1,105 @@
+"""The answer on the terminal: one screen of text."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+
+from residual.gap import GapResult
+from residual.gap.result import Gap
+from residual.logs import Finding
+from studies.gap.answer import headline, is_footnote, kind_text, lead, notes
+from studies.gap.words import CROSS_VALIDATED, ahead, gap_rows, span_text, unit_text
+
+#: Width of the text, and of the column of kinds.
+WIDTH, KIND = 100, 16
+#: Findings of the engine that are repeated below the answer.
+NOTES = 5
+
+
+def summary(result: GapResult, tolerance: float | None = None) -> str:
+    """Everything that matters, the share of the gap with a name first.
+
+    Args:
+        result: What was found.
+        tolerance: Forecast error that does not matter.
+    """
+    lines = [*wrapped(lead(result, tolerance), ""), ""]
+    for verdict in result.verdicts:
+        if verdict.kind == "no_gap":
+            continue  # the first sentence has said so
+        text = headline(verdict, result)
+        if is_footnote(verdict):
+            lines += wrapped(f"{text[:-1]}; {'; '.join(notes(verdict, result))}.", "")
+            continue
+        kind = kind_text(verdict).upper()
+        if len(kind) >= KIND:
+            lines += [kind, *wrapped(text, " " * KIND)]
+        else:
+            lines += wrapped(text, " " * KIND, kind)
+        for note in notes(verdict, result):
+            lines += wrapped(note, " " * KIND)
+    if lines[-1]:
+        lines.append("")
+    gap = result.gap
+    unit = f" in {gap.unit}" if gap.unit else ""
+    lines += [f"{ahead(gap)}{unit}, {CROSS_VALIDATED} (95 % interval)", *bars(gap)]
+    lines.append(f"  {gap.blocks} blocks of data, {gap.folds} groups of them left out in turn")
+    if result.held_out:
+        lines += ["", *held_out(result.held_out)]
+    if result.quality:
+        lines.append("")
+    for says in result.quality[:NOTES]:
+        lines += wrapped(says, "      ", "note:")
+    if len(result.quality) > NOTES:
+        lines.append(f"      and {len(result.quality) - NOTES} more in the report")
+    return "\n".join(lines)
+
+
+def wrapped(text: str, indent: str, first: str = "") -> list[str]:
+    """Lines of one paragraph."""
+    return textwrap.wrap(
+        text, WIDTH, initial_indent=first + indent[len(first) :], subsequent_indent=indent,
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
+
+
+def bars(gap: Gap) -> list[str]:
+    """The shrinking gap."""
+    rows = gap_rows(gap)
+    width = max(len(name) for name, _ in rows)
+    wide = max(len(span_text(span)) for _, span in rows)
+    top = max(span.value for _, span in rows) or 1.0
+    full = 24 / top
+    return [
+        f"  {name:<{width}}  {span_text(span):<{wide}}  {'█' * max(1, round(full * span.value))}"
+        for name, span in rows
+    ]
+
+
+def held_out(gap: Gap) -> list[str]:
+    """The table for the records that were set aside."""
+    lines = [f"records set aside with --held-out, {ahead(gap).split(' error')[0]} errors"]
+    for name, channel in gap.by_channel.items():
+        numbers = ", ".join(
+            f"{word} {span.value:.3g}"
+            for word, span in (
+                ("nominal", channel.before),
+                ("corrected", channel.after),
+                ("noise floor", channel.noise_floor),
+            )
+        )
+        lines.append(f"  {name}: {numbers}{unit_text(channel.unit)}")
+    return lines
+
+
+def found_in_data(findings: Sequence[Finding]) -> list[str]:
+    """What stands out in the logs, equal findings of several files in one line."""
+    places: dict[str, list[str]] = {}
+    for found in findings:
+        places.setdefault(found.says, []).append(Path(found.where).name)
+    return [
+        f"data: {where[0]}{f' and {len(where) - 1} more' if len(where) > 1 else ''}: {says}"
+        for says, where in places.items()
+    ]

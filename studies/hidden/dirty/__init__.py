@@ -1,0 +1,1 @@
+"""A dirty world: one effect hidden among things that no library holds, truth by SciPy."""

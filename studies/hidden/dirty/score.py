@@ -1,0 +1,155 @@
+"""How good an answer in the dirty world is, beside the oracle that knows what was hidden."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from residual.gap import GapResult, find_gap
+from residual.trajectories import Trajectory
+from sims.effects.base import Effect
+from sims.effects.library import exact_aliases, library
+from sims.host import HostSimulator
+from studies.hidden.dirty.sets import LEAD, Dirty, make_set, oracle_effect
+from studies.judging.forecasts import Forecasts, plan, relative_error, root_mean_squares
+from studies.judging.oracle import fit_effects
+
+#: Forecasts by which the oracle is fitted, and by which all are judged.
+FORECASTS = 120
+
+
+def run_dirty(config: Mapping[str, Any]) -> dict[str, Any]:
+    """Make a set, ask find_gap and the oracle, score both.
+
+    Args:
+        config: As for ``make_set``, and ``block``: ``"hidden"``, ``"dirt only"`` (nothing hidden)
+            or ``"removed"`` (not in the library that find_gap is offered).
+    """
+    made = make_set(config)
+    offered = list(library(made.simulator))
+    twins = same_as(made.label, made.simulator)
+    if config["block"] == "removed":
+        offered = [effect for effect in offered if str(effect) not in twins]
+    measured = made.sensors.input_noise is not None
+    begin = time.process_time()
+    result = find_gap(
+        made.simulator,
+        made.logs,
+        effects=offered,
+        hold="linear" if measured else "zero",
+        measured_input=measured,
+        horizon=made.horizon,
+    )
+    seconds = time.process_time() - begin
+    row = {
+        "rows": sum(len(run) for run in made.logs),
+        "period_s": made.simulator.dt,
+        "strength": made.truth.strength,
+        "seconds": seconds,
+        "findings": list(result.quality),
+        "says": [verdict.says for verdict in result.verdicts],
+    }
+    row |= names(result, made, twins)
+    row |= errors(result, made)
+    return row
+
+
+def errors(result: GapResult, made: Dirty) -> dict[str, Any]:
+    """Held-out errors of the nominal, the corrected simulator and the oracle; its strength."""
+    held = plan(made.simulator, made.held, made.horizon, LEAD * made.horizon, _each(made.held))
+    row: dict[str, Any] = {
+        "nominal": relative_error(made.simulator, held),
+        "corrected": relative_error(result.corrected, held),
+    }
+    if not made.label:
+        return row
+    fit = plan(made.simulator, made.logs, made.horizon, LEAD * made.horizon, _each(made.logs))
+    (found,) = oracle(made, fit)
+    repaired = made.simulator.with_effects([found])
+    row["oracle"] = relative_error(repaired, held)
+    (field,) = found.strengths()
+    row["oracle_strength"] = float(getattr(found, field))
+    covered = None
+    for verdict in result.verdicts:
+        if _label(verdict) == made.label and verdict.kind in ("confirmed", "ambiguous"):
+            number = verdict.parameters[field]
+            covered = bool(number.low <= row["oracle_strength"] <= number.high)
+            row["covered_truth"] = bool(number.low <= made.truth.strength <= number.high)
+            break
+    row["covered"] = covered
+    return row
+
+
+def oracle(made: Dirty, fit: Sequence[Forecasts]) -> tuple[Effect, ...]:
+    """The hidden effect, its strength fitted by the forecasts of the logs that find_gap saw."""
+    channels = list(root_mean_squares(made.simulator, fit))
+    return fit_effects(made.simulator, [oracle_effect(made.label, made.simulator)], fit, channels)
+
+
+def _each(runs: Sequence[Trajectory]) -> int:
+    return max(1, FORECASTS // len(runs))
+
+
+def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, Any]:
+    """What was named first and what with confidence, held against what was hidden."""
+    offered = {str(effect): effect for effect in library(made.simulator)}
+    chosen = [v for v in result.verdicts if v.effect and v.kind in ("confirmed", "ambiguous")]
+    sure = [_label(v) for v in chosen if v.kind == "confirmed"]
+    row: dict[str, Any] = {
+        "named": [_label(v) for v in chosen],
+        "sure": sure,
+        "kinds": [v.kind for v in result.verdicts],
+    }
+    # A parameter of the simulator that is off a little, as all are, is a name for something true.
+    row["truly_off"] = [
+        _label(v)
+        for v in chosen
+        if v.effect in made.truth.off
+        and v.effect != made.label
+        and v.parameters["change"].value * made.truth.off[v.effect] > 0
+    ]
+    if not made.label:
+        return row | {"first": None, "family": None, "among": None, "wrong_sure": list(sure)}
+    right = twins | _family(made.label, made.simulator, offered)
+    first = _label(chosen[0]) if chosen else ""
+    among = {first, *(chosen[0].alternatives if chosen else ())}
+    row["first"] = first in twins
+    row["family"] = first in right
+    row["among"] = bool(among & right)
+    row["wrong_sure"] = [name for name in sure if name not in right]
+    return row
+
+
+def same_as(label: str, simulator: HostSimulator) -> frozenset[str]:
+    """Labels that mean exactly the same motion, its own included; none for no label."""
+    found = {label} if label else set()
+    for alias in exact_aliases(simulator):
+        if "combination" not in alias.says and label in alias.effects:
+            found |= set(alias.effects)
+    return frozenset(found)
+
+
+def _family(label: str, simulator: HostSimulator, offered: Mapping[str, Effect]) -> frozenset[str]:
+    """Labels of the same family at the same place."""
+    if label not in offered:
+        return frozenset()
+    hidden = offered[label]
+    family = hidden.family_in(simulator)
+    return frozenset(
+        name
+        for name, effect in offered.items()
+        if family and effect.family_in(simulator) == family and effect.where == hidden.where
+    )
+
+
+def _label(verdict: Any) -> str:
+    alone = verdict.where in ("", verdict.effect)
+    return str(verdict.effect) if alone else f"{verdict.effect}@{verdict.where}"
+
+
+def finite(value: Any) -> float:
+    """A number from a result file, where infinity has become None."""
+    return np.inf if value is None else float(value)

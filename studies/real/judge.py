@@ -1,0 +1,201 @@
+"""A rig asked and judged: find_gap on the fit part, three simulators on the judge part."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import io
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+import studies
+from residual.logs import LogFormat
+from residual.trajectories import Trajectory
+from sims.host import HostSimulator
+from sims.loading import load_simulator
+from studies import find_gap
+from studies.gap.files import CORRECTED
+from studies.judging.forecasts import Forecasts, plan, root_mean_squares
+from studies.judging.oracle import fit_effects
+from studies.real import phone
+from studies.real.names import Named, named
+from studies.real.prepare import local_slope
+from studies.real.rigs import Part, Rig
+
+CONFIGS = Path(studies.__file__).parent / "configs" / "find_gap"
+
+
+@dataclasses.dataclass(frozen=True)
+class Judged:
+    """How a rig went.
+
+    Attributes:
+        rig: Its name.
+        said: Every verdict about an effect, in short.
+        named: What the key thinks of the names.
+        nominal, corrected, repaired: Errors on the judge part, by group of channels; repaired is
+            the nominal with the key's effects, fitted on the fit part by the same forecasts.
+        repair: The key's effects as fitted.
+        seconds: Processor time of find_gap, with its report.
+    """
+
+    rig: str
+    said: tuple[str, ...]
+    named: Named
+    nominal: dict[str, float]
+    corrected: dict[str, float]
+    repaired: dict[str, float]
+    repair: tuple[str, ...]
+    seconds: float
+
+    @property
+    def ratio(self) -> float:
+        """Corrected over repaired error, of the worst group."""
+        return max(self.corrected[g] / self.repaired[g] for g in self.corrected)
+
+
+def settings_of(rig: Rig, logs: Sequence[Path]) -> dict[str, Any]:
+    """Settings of find_gap as the rig's config and the logs give them."""
+    parser = find_gap.build_parser()
+    given = parser.parse_args(
+        ["--config", str(CONFIGS / f"{rig.name}.yaml"), "--logs", *map(str, logs),
+         "--output", "unused"]
+    )  # fmt: skip
+    settings = yaml.safe_load(parser.dump(given, format="yaml", skip_unset=False))
+    return {k: v for k, v in settings.items() if k not in ("output", "jobs", "config")}
+
+
+def files_of(rig: Rig, part: Part, data: Path, scratch: Path) -> list[Path]:
+    """The logs of a part, made readable where the rig needs it."""
+    found = []
+    for name in part.files:
+        source = data / rig.folder / name
+        if rig.prepare:
+            target = scratch / f"{rig.name}-{name}"
+            if not target.exists():
+                rig.prepare(source, target)
+            source = target
+        found.append(source)
+    return found
+
+
+class Judge:
+    """Judges any simulator of one rig; measured runs are read as find_gap reads them.
+
+    Args:
+        rig: Which.
+        data: Folder of all rigs.
+        scratch: Folder for logs that have to be prepared.
+    """
+
+    def __init__(self, rig: Rig, data: Path, scratch: Path) -> None:
+        self.rig = rig
+        logs = files_of(rig, rig.fit, data, scratch)
+        self.settings = settings_of(rig, logs)
+        parser = find_gap.build_parser()
+        made = parser.instantiate(
+            parser.parse_object({**self.settings, "output": "unused", "jobs": 1})
+        )
+        asked: HostSimulator = made["simulator"]
+        hold = made["hold"]
+        self.simulator = asked
+        if hold != "auto":
+            self.simulator = asked.with_hold({c.name: hold for c in asked.action_channels})
+        self._format: LogFormat = made["columns"]
+        self._fit = self._read(rig.fit, logs)
+        self._runs = self._read(rig.judge, files_of(rig, rig.judge, data, scratch))
+
+    def errors(self, simulator: HostSimulator) -> dict[str, float]:
+        """Forecast errors on the judge part by group of channels: root of the sum of squares."""
+        if self.rig.folder == "phone-drop":
+            return {"speed change": phone.speed_change_error(simulator, self._runs)}
+        found = root_mean_squares(simulator, self._plan(self._runs))
+        return {
+            " ".join(group): float(np.sqrt(sum(found[channel] ** 2 for channel in group)))
+            for group in self.rig.judged
+        }
+
+    def repaired(self) -> HostSimulator:
+        """The nominal simulator with the key's effects, fitted on the fit part."""
+        if self.rig.folder == "phone-drop":
+            return self.simulator.with_effects([phone.fit_drag(self.simulator, self._fit)])
+        channels = [channel for group in self.rig.judged for channel in group]
+        found = fit_effects(self.simulator, self.rig.key, self._plan(self._fit), channels)
+        return self.simulator.with_effects(found)
+
+    def _plan(self, runs: Sequence[Trajectory]) -> list[Forecasts]:
+        return plan(self.simulator, runs, self.rig.horizon)
+
+    def _read(self, part: Part, logs: Sequence[Path]) -> list[Trajectory]:
+        changed = {
+            name: value
+            for name in ("start", "stop", "only")
+            if (value := getattr(part, name)) is not None
+        }
+        states = {**self._format.states, **self.rig.derived}
+        layout = dataclasses.replace(self._format, states=states, **changed)
+        data = find_gap.read(self.simulator, [str(log) for log in logs], layout)
+        if self.rig.slopes is None:
+            return list(data.trajectories)
+        return [self._derived(run, self.rig.slopes) for run in data.trajectories]
+
+    def _derived(self, run: Trajectory, width: float) -> Trajectory:
+        """With the rates that were not measured, from the positions around each sample."""
+        states = np.array(run.states)
+        names = [channel.name for channel in self.simulator.physical_channels]
+        for column, channel in enumerate(self.simulator.physical_channels):
+            if channel.rate_of and np.isnan(states[:, column]).all():
+                position = states[:, names.index(channel.rate_of)]
+                states[:, column] = local_slope(run.times, position, width)
+        return dataclasses.replace(run, states=states)
+
+
+def ask(
+    rig: Rig, data: Path, output: Path, progress: Callable[[str], None] | None = None
+) -> Judged:
+    """find_gap with its default options on a rig, and what the key says of the answer.
+
+    Args:
+        rig: Which.
+        data: Folder of all rigs.
+        output: Folder for the answer.
+        progress: Called with a line of text now and then.
+    """
+    output.mkdir(parents=True, exist_ok=True)
+    judge = Judge(rig, data, output)
+    begin = time.process_time()
+    result = find_gap.run(judge.settings, output, 1, progress)
+    seconds = time.process_time() - begin
+    with contextlib.redirect_stdout(io.StringIO()):
+        corrected = load_simulator(output / CORRECTED)
+    assert isinstance(corrected, HostSimulator)
+    repaired = judge.repaired()
+    return Judged(
+        rig.name,
+        tuple(_short(verdict) for verdict in result.verdicts),
+        named(rig, judge.simulator, result.verdicts),
+        judge.errors(judge.simulator),
+        judge.errors(corrected),
+        judge.errors(repaired),
+        tuple(_numbers(effect) for effect in repaired.effects),
+        seconds,
+    )
+
+
+def _short(verdict: Any) -> str:
+    if not verdict.effect:
+        return verdict.kind
+    numbers = ", ".join(f"{n.value:.3g} {n.unit}" for n in verdict.parameters.values())
+    others = f" or {', '.join(verdict.alternatives)}" if verdict.alternatives else ""
+    where = "" if verdict.where == verdict.effect else f"@{verdict.where}"
+    return f"{verdict.kind}: {verdict.effect}{where} {numbers}{others}"
+
+
+def _numbers(effect: Any) -> str:
+    values = ", ".join(f"{getattr(effect, name):.4g}" for name in effect.strengths())
+    return f"{effect} {values}"

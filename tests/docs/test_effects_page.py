@@ -1,0 +1,50 @@
+"""docs/effects.md lists the whole library, with what the classes say."""
+
+import inspect
+from pathlib import Path
+
+import pytest
+
+from sims import effects
+from sims.effects import Effect, library
+from sims.pendulum_equation import PendulumEquation
+
+PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
+PLACES = {"joint": "joint", "actuator": "input", "channel": "measured channel"}
+
+
+def row(effect: Effect) -> str:
+    """The effect's row of the table; units are those of a joint that turns, driven by a voltage."""
+    known = effect.quantities(PendulumEquation())
+    numbers = ", ".join(f"`{name}` {quantity.unit}" for name, quantity in known.items())
+    place = PLACES[next(iter(inspect.signature(type(effect)).parameters))]
+    family = effect.family + (f", {effect.subfamily}" if effect.subfamily else "")
+    cells = (f"`{effect.name}`", place, numbers, family, effect.sentence, effect.needs)
+    return f"| {' | '.join(cells)} |"
+
+
+# One of each; on another channel an offset has another unit.
+LIBRARY = {e.name: e for e in reversed(library(PendulumEquation())) if e.enters != "parameter"}
+
+
+@pytest.mark.parametrize("effect", LIBRARY.values(), ids=str)
+def test_the_page_has_its_row(effect):
+    assert row(effect) in PAGE.read_text(encoding="utf-8").splitlines()
+
+
+def test_the_page_has_nothing_else():
+    text = PAGE.read_text(encoding="utf-8")
+    listed = {line.split("`")[1] for line in text.splitlines() if line.startswith("| `")}
+    assert listed == set(LIBRARY)
+
+
+def test_the_page_says_which_lie_upstream_of_a_sensor():
+    text = PAGE.read_text(encoding="utf-8")
+    upstream = [e.name for e in library(PendulumEquation()) if e.upstream_of_sensor]
+    (line,) = [line for line in text.splitlines() if line.startswith("Upstream of a sensor")]
+    assert [word for word in line.split("`")[1::2]] == upstream
+
+
+def test_what_one_derives_from_is_there():
+    for name in ("JointEffect", "DryFriction", "StaticActuatorEffect", "SensorEffect"):
+        assert f"`{name}`" in PAGE.read_text(encoding="utf-8") and hasattr(effects, name)

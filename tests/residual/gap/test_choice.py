@@ -1,0 +1,81 @@
+"""Enough is enough: the smallest set that forecasts about as well as any."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from toy import Toy
+
+from residual.gap.choice import choose
+
+
+@pytest.mark.parametrize(("second", "key"), [(0.41, (0,)), (0.39, (0, 1))])
+def test_an_effect_has_to_take_a_fifth_off_what_remains(second, key):
+    found = choose(Toy({(0,): 0.5, (0, 1): second}))
+    assert found.key == key
+
+
+@pytest.mark.parametrize(("first", "key"), [(0.65, (0, 1)), (0.70, (0,))])
+def test_or_a_third_at_one_joint_of_several(first, key):
+    # Over three joints that is a ninth: too little on the whole.
+    toy = Toy({(0,): 0.6, (0, 1): (0.6 * first, 0.6, 0.6)}, joints=3)
+    assert choose(toy).key == key
+
+
+def test_what_takes_less_is_minor_and_says_what_it_took():
+    found = choose(Toy({(0,): 0.5, (0, 1): 0.43}))
+    assert found.key == (0,)
+    assert found.minor == {1: (0, 1)}
+    assert found.reasons[0, 1] == "takes only 14 % off what remains"
+
+
+def test_a_trifle_beside_the_nominal_error_is_no_effect_however_much_of_the_rest_it_is():
+    assert choose(Toy({(0,): 0.03, (0, 1): 0.015})).key == (0,)
+
+
+def test_nothing_is_chosen_where_nothing_helps_beyond_chance():
+    assert choose(Toy({(0,): 0.99, (1,): 1.02}, scatter=0.2)).key == ()
+
+
+def test_fewest_numbers_win_among_equals():
+    toy = Toy({(0, 1): 0.200, (3,): 0.205, (0,): 0.6, (1,): 0.6})
+    assert choose(toy).key == (3,)
+
+
+def test_ties_go_to_the_better_fit():
+    toy = Toy({(0,): 0.200, (3,): 0.201}, merits={(0,): 50.0, (3,): 20.0})
+    assert choose(toy).key == (3,)
+    worse = Toy({(0,): 0.2, (3,): 0.4}, merits={(0,): 50.0, (3,): 20.0})
+    assert choose(worse).key == (0,)
+
+
+def test_a_set_that_is_good_enough_asks_for_no_more():
+    toy = Toy({(0,): 0.10, (0, 1): 0.05})
+    assert choose(toy).key == (0, 1)
+    assert choose(toy, lambda key: key == (0,)).key == (0,)
+
+
+def test_fits_that_did_not_converge_or_cannot_be_are_no_evidence():
+    toy = Toy({(0,): 0.5, (1,): 0.1, (3,): 0.05})
+    toy.unfit.add((1,))
+    toy.refused[(3,)] = "mass would be 60 times its nominal value"
+    found = choose(toy)
+    assert found.key == (0,)
+    assert found.reasons[(1,)] == "did not converge"
+    assert found.reasons[(3,)].startswith("mass would be")
+
+
+def test_every_other_set_has_a_reason_with_its_worst_place():
+    found = choose(Toy({(0,): 0.2, (1,): 0.5, (0, 1): 0.195}))
+    assert set(found.reasons) == {(), (1,), (0, 1)}
+    assert found.reasons[(1,)].startswith("2.5 times the error, most at ")
+
+
+@given(st.lists(st.floats(0.02, 1.2), min_size=6, max_size=6), st.integers(0, 3))
+@settings(max_examples=60, deadline=None)
+def test_what_is_chosen_is_never_worse_than_the_nominal(errors, seed):
+    keys = [(0,), (1,), (3,), (0, 1), (0, 3), (0, 1, 3)]
+    toy = Toy(dict(zip(keys, errors, strict=True)), scatter=0.1 * seed)
+    found = choose(toy)
+    assert toy.error(found.key) <= 1.0 + 1e-9
+    assert not set(found.key) & set(found.minor)
+    assert set(found.reasons) == set(toy.tried) - {found.key}

@@ -1,0 +1,131 @@
+"""How sure a chosen effect is, and what is said of it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from toy import Toy
+
+from residual.gap.candidates import candidates
+from residual.gap.confirmation import Claim, at_bound, bounded, near, needed, steady, survives
+from residual.gap.model import Model
+from residual.gap.result import Number
+from residual.gap.samples import Samples
+from residual.gap.verdicts import effect_verdict, minor_verdict, nameable
+from residual.trajectories import Trajectory
+from sims.effects import DeadZone
+from sims.pendulum_equation import PendulumEquation
+
+
+def claim(number=0, **changed):
+    made = Claim(
+        number, {"change": Number(0.01, 0.009, 0.011, "kg")}, (), (), (), (),
+        needed=True, steady=True, sound=True, bounded=False, share=(0.9, 0.8, 0.95),
+    )  # fmt: skip
+    return dataclasses.replace(made, **changed)
+
+
+@pytest.mark.parametrize(("times", "left"), [(1.4, ("constant_load@pivot",)), (1.6, ())])
+def test_a_rival_is_out_when_it_is_clearly_worse(times, left):
+    toy = Toy({(0,): 0.3, (3,): 0.3 * times})
+    assert near(toy, (0,), 0, adequate=False) == ((), (), left)
+
+
+def test_the_ratio_is_taken_at_the_joint_where_the_effect_matters():
+    toy = Toy({(0,): (0.2, 0.9), (3,): (0.4, 0.9)}, joints=2)
+    assert near(toy, (0,), 0, adequate=False) == ((), (), ())
+
+
+def test_forms_of_one_family_are_apart_if_the_same_wins_at_half_the_horizon_too():
+    errors = {(1,): 0.3, (2,): 0.36}
+    assert near(Toy(errors), (1,), 1, adequate=False) == ((), (), ())
+    other = near(Toy(errors, half={(1,): 0.3, (2,): 0.25}), (1,), 1, adequate=False)
+    assert other == (("coulomb_friction@pivot",), (), ())
+    few = near(Toy(errors, blocks=7), (1,), 1, adequate=False)
+    assert few == (("coulomb_friction@pivot",), (), ())
+
+
+def test_a_set_that_did_not_converge_is_no_rival():
+    toy = Toy({(0,): 0.3, (3,): 0.3})
+    toy.unfit.add((3,))
+    assert near(toy, (0,), 0, adequate=False) == ((), (), ())
+
+
+@pytest.mark.parametrize(("rest", "scatter", "sure"), [(0.9, 0.1, True), (0.33, 0.6, False)])
+def test_an_effect_is_needed_if_forecasts_are_clearly_worse_without_it(rest, scatter, sure):
+    toy = Toy({(0,): 0.3, (0, 1): 0.3, (1,): rest}, scatter=scatter)
+    assert needed(toy, (0, 1), 0, adequate=False) is sure
+
+
+def test_a_size_has_to_be_about_the_same_in_every_fold():
+    toy = Toy({(0,): 0.3})
+    toy.tried[(0,)].theta = np.array([1.0])
+    for folds, wanted in (([0.6, 1.4], True), ([0.4, 1.0], False), ([1.0, -0.1], False)):
+        toy.validated[(0,)].thetas = np.array(folds)[:, None]
+        assert steady(toy, (0,), 0) is wanted
+
+
+def test_a_size_has_to_survive_other_numerics():
+    assert survives(1.0, 0.1, [1.4, 0.6])
+    assert not survives(1.0, 0.1, [1.0, 1.6])
+    assert survives(0.01, 0.1, [0.1])
+
+
+def test_a_number_at_its_bound_is_said_to_be_there():
+    volts = np.linspace(-3, 3, 20)[:, None]
+    run = Trajectory("run", 0.05 * np.arange(21.0), np.ones((21, 2)), volts)
+    simulator = PendulumEquation()
+    pool = candidates(simulator, [DeadZone("voltage")], Samples.join([run], 5))
+    model = Model(simulator, pool)
+    for value, there in ((0.0, True), (0.2, False)):
+        fit = dataclasses.make_dataclass("Fit", ["model", "theta"])(model, np.array([value]))
+        assert at_bound(fit, 0) is there
+        number = bounded(fit, 0, 0.05, [])
+        assert number.at_bound is there
+        assert model.low[0] <= number.low <= value <= number.high
+
+
+def test_only_what_leaves_no_doubt_is_confirmed():
+    toy = Toy({(0,): 0.3})
+    assert effect_verdict(toy, claim(), 20).kind == "confirmed"
+    for doubt, changed in {
+        "not_needed": {"needed": False},
+        "unsteady": {"steady": False},
+        "numerics": {"sound": False},
+        "at_bound": {"bounded": True},
+        "rivals": {"rivals": ("constant_load@pivot",)},
+    }.items():
+        verdict = effect_verdict(toy, claim(**changed), 20)
+        assert (verdict.kind, verdict.doubts) == ("ambiguous", (doubt,))
+    alike = effect_verdict(toy, claim(alike=("constant_load@pivot",)), 20)
+    assert (alike.kind, alike.alternatives) == ("ambiguous", ("constant_load@pivot",))
+
+
+def test_rivals_of_one_family_leave_the_family_confirmed():
+    verdict = effect_verdict(Toy({(1,): 0.3}), claim(1, form=("coulomb_friction@pivot",)), 20)
+    assert (verdict.kind, verdict.family) == ("confirmed", "dissipation")
+    assert verdict.form == ("coulomb_friction@pivot",)
+
+
+def test_few_blocks_confirm_families_for_the_time_being_and_fewer_than_four_nothing():
+    toy = Toy({(1,): 0.3})
+    for blocks, provisional in ((8, False), (7, True), (4, True)):
+        verdict = effect_verdict(toy, claim(1), blocks)
+        assert (verdict.kind, verdict.provisional) == ("confirmed", provisional)
+        assert verdict.family == ("dissipation" if provisional else "")
+        assert nameable(toy, claim(1), blocks)
+    assert effect_verdict(toy, claim(1), 3).kind == "ambiguous"
+    assert not nameable(toy, claim(1), 3)
+
+
+def test_what_could_be_too_many_others_has_no_name():
+    toy = Toy({(0,): 0.3})
+    some = ("constant_load@pivot", "viscous_friction@pivot", "coulomb_friction@pivot")
+    assert nameable(toy, claim(rivals=some), 20)  # two forms of dissipation count once
+    assert not nameable(toy, claim(rivals=(*some, "actuator_gain@voltage")), 20)
+
+
+def test_minor_effects_carry_their_share_and_no_number():
+    verdict = minor_verdict(Toy({(0,): 0.3}), 3, (0.02, 0.01, 0.03))
+    assert (verdict.kind, verdict.effect, verdict.parameters) == ("minor", "constant_load", {})
+    assert (verdict.share.low, verdict.share.value, verdict.share.high) == (0.01, 0.02, 0.03)

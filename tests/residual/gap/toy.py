@@ -1,0 +1,98 @@
+"""A search whose sets of effects have given forecast errors, to see what is made of them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from residual.gap.blocks import Blocks
+from residual.gap.currency import Currency
+from residual.gap.windows import Windows
+from sims.effects import (
+    ActuatorGain,
+    ConstantLoad,
+    CoulombFriction,
+    Delay,
+    ParameterChange,
+    ViscousFriction,
+)
+from sims.pendulum_equation import PendulumEquation
+
+#: Numbers 0 to 5; 1 and 2 are of one family.
+EFFECTS = (
+    ParameterChange("mass"),
+    ViscousFriction("pivot"),
+    CoulombFriction("pivot"),
+    ConstantLoad("pivot"),
+    ActuatorGain("voltage"),
+    Delay("voltage"),
+)
+
+
+class Toy:
+    """Sets with relative errors as given, by joint; blocks scatter by ``scatter``.
+
+    Args:
+        errors: By key: the error of every joint, or one for all.
+        merits: By key; if not given, the mean error.
+        joints: Number of joints, a channel each.
+        blocks: Number of blocks.
+        scatter: Relative spread of the blocks' errors about the given ones.
+        half: Errors at half the horizon, if not the same.
+    """
+
+    def __init__(self, errors, merits=None, joints=1, blocks=20, scatter=0.0, half=None):
+        rng = np.random.default_rng(0)
+        drive = rng.uniform(0.5, 2.0, (blocks, joints))
+        errors = {(): 1.0, **errors}
+        self.currency = Currency(drive**2, tuple((j,) for j in range(joints)))
+
+        def squares(error):
+            wobble = 1 + scatter * rng.standard_normal((blocks, joints))
+            return (np.broadcast_to(error, joints) * drive * wobble) ** 2
+
+        self.validated = {
+            key: SimpleNamespace(
+                squares=drive**2 if key == () else squares(error),
+                half=squares((half or errors).get(key, error)),
+                thetas=np.ones((5, len(key))),
+            )
+            for key, error in errors.items()
+        }
+        self.tried = {
+            key: SimpleNamespace(merit=(merits or {}).get(key, float(np.mean(error))))
+            for key, error in errors.items()
+        }
+        self.unfit, self.refused = set(), {}
+        self.candidates = [SimpleNamespace(effect=e, label=str(e)) for e in EFFECTS]
+        self.simulator = PendulumEquation()
+        windows = Windows.cut([(0, 4 * i, 4 * i + 4) for i in range(blocks)])
+        self.fitter = SimpleNamespace(
+            blocks=Blocks(windows, np.arange(blocks), np.arange(blocks) % 5),
+            samples=SimpleNamespace(times=0.1 * np.arange(4.0 * blocks), names=("run",)),
+            tie=lambda nominal: 0.05,
+        )
+
+    def usable(self):
+        return [k for k in self.validated if k not in self.unfit and k not in self.refused]
+
+    def best(self):
+        return min(self.usable(), key=self.error)
+
+    def error(self, key):
+        return self.currency.error(self.validated[key].squares)
+
+    def numbers(self, key):
+        return len(key)
+
+    def contains(self, one, other):
+        return False
+
+    def same_motion(self, rest, one, other):
+        return False
+
+    def family(self, number):
+        effect = self.candidates[number].effect
+        family = effect.family_in(self.simulator)
+        return f"{family}@{effect.where}" if family else ""

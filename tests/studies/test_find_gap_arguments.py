@@ -1,0 +1,113 @@
+"""Wrong arguments and unusable logs: one line, exit code 2, nothing written."""
+
+import re
+
+import numpy as np
+import pytest
+
+from studies.find_gap import main
+from studies.make_log import write_logs
+
+EQUATION = "sims.pendulum_equation.PendulumEquation"
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    return [str(path) for path in write_logs(tmp_path_factory.mktemp("logs"), runs=1, steps=100)]
+
+
+def broken(text, old, new, count=1):
+    assert old in text
+    return text.replace(old, new, count)
+
+
+BAD = {
+    "empty": lambda text: "",
+    "no header": lambda text: text.split("\n", 1)[1],
+    "text in a number": lambda text: re.sub(r"\n0\.5,", "\n0.5,abc", text),
+    "missing column": lambda text: broken(text, "voltage", "current"),
+    "NaN everywhere": lambda text: re.sub(r"\n([\d.]+),[^,\n]*,[^,\n]*,", r"\n\1,nan,nan,", text),
+    "two rows": lambda text: "\n".join(text.split("\n")[:3]) + "\n",
+    "backwards": lambda text: re.sub(r"\n1,", "\n-7,", text),
+    "constant action": lambda text: re.sub(r",[^,\n]*\n(?=\d)", ",1.0\n", text),
+}
+
+
+@pytest.mark.parametrize("fault", BAD)
+def test_a_bad_log_gets_one_line_and_leaves_nothing(fault, logs, tmp_path, capsys):
+    path = tmp_path / "bad.csv"
+    with open(logs[0]) as file:
+        text = file.read()
+    head, rest = text.split("\n", 1)
+    path.write_text(BAD[fault](head + "\n" + rest))
+    with pytest.raises(SystemExit) as stopped:
+        main(["--simulator", EQUATION, "--logs", str(path), "--output", str(tmp_path / "out")])
+    assert stopped.value.code == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert len(said) == 1 and said[0].startswith("error: ") and "bad.csv" in said[0]
+    assert [p.name for p in tmp_path.iterdir()] == ["bad.csv"]
+
+
+def test_a_log_in_degrees_is_refused(logs, tmp_path, capsys):
+    table = np.loadtxt(logs[0], delimiter=",", skiprows=1)
+    table[:, 1] *= 57.2958
+    np.savetxt(tmp_path / "deg.csv", table, delimiter=",", header="time,angle,rate,voltage",
+               comments="")  # fmt: skip
+    with pytest.raises(SystemExit) as stopped:
+        main(["--simulator", EQUATION, "--logs", str(tmp_path / "deg.csv"), "--output",
+              str(tmp_path / "out")])  # fmt: skip
+    assert stopped.value.code == 2 and "deg" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        (["--simulator", "sims.pendulum.Nothing"], "Nothing"),
+        (["--simulator", "absent.yaml"], "absent.yaml"),
+        (["--simulator", EQUATION, "--effects", "frcition"], "frcition"),
+        (["--simulator", EQUATION, "--hold", "cubic"], "hold"),
+        (["--simulator", EQUATION, "--hold", "{torque: linear}"], "torque"),
+        (["--simulator", EQUATION, "--minutes", "0"], "minutes"),
+        (["--simulator", EQUATION, "--held-out", "absent.csv"], "absent.csv"),
+        (["--simulator", EQUATION, "--seed", "1"], "seed"),
+        (["--simulator", EQUATION, "--tolerance", "-1"], "tolerance"),
+        (["--simulator", EQUATION, "--columns.tme", "t"], "tme"),
+        (["--simulator", EQUATION, "--columns", "absent.yaml"], "absent.yaml"),
+        (["--simulator", EQUATION, "--output", __file__], "expected a folder"),
+        (["--simulator", EQUATION, "--output", f"{__file__}/gap"], "expected a folder"),
+        (["--simulator", EQUATION, "--output", "/proc/gap"], "cannot be written"),
+        ([], "simulator"),
+    ],
+)
+def test_a_wrong_argument_gets_one_line(arguments, names, logs, tmp_path, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(["--logs", *logs[:1], "--output", str(tmp_path / "out"), *arguments])
+    assert stopped.value.code == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert len(said) == 1 and names in said[0]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_simulator_that_hosts_nothing_is_told_what_to_derive_from(
+    logs, tmp_path, capsys, monkeypatch
+):
+    (tmp_path / "plain_arm.py").write_text(
+        "from sims.simulator import Simulator\n"
+        "class Arm(Simulator):\n"
+        "    def step(self, states, actions):\n"
+        "        return states\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SystemExit) as stopped:
+        main(["--simulator", "plain_arm.Arm", "--logs", logs[0], "--output", str(tmp_path / "o")])
+    assert stopped.value.code == 2 and "EquationOfMotion" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_file_is_used_or_set_aside_but_not_both(logs, tmp_path, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(["--simulator", EQUATION, "--output", str(tmp_path / "o"), "--logs", *logs,
+              "--held-out", *logs])  # fmt: skip
+    assert stopped.value.code == 2 and "run-01.csv is in --logs" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

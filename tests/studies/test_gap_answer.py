@@ -1,0 +1,130 @@
+"""The sentences of find_gap: by kind, share and fields, never by other sentences."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from residual.gap.result import ChannelGap, Gap, GapResult, Number, Span, Step, Verdict, Where
+from sims.effects import CoulombFriction, ParameterChange
+from sims.pendulum_equation import PendulumEquation
+from studies.gap.answer import headline, lead, notes
+from studies.gap.summary import summary
+from studies.gap.verdicts import banners
+from studies.reporting import Prose
+from studies.reporting import Verdict as Banner
+
+MASS = Verdict(
+    "confirmed", "mass", "mass", {"change": Number(0.035, 0.034, 0.036, "kg")},
+    ("length", "gravity"), "", "never parsed", Span(0.95, 0.9, 0.97),
+    same_motion=("length", "gravity"),
+)  # fmt: skip
+FRICTION = Verdict(
+    "confirmed", "coulomb_friction", "pivot", {"level": Number(2e-3, 1e-3, 3e-3, "N m")},
+    ("viscous_friction@pivot",), "dissipation", "never parsed", Span(0.03, 0.02, 0.04),
+    form=("viscous_friction@pivot",),
+)  # fmt: skip
+DELAY = Verdict(
+    "ambiguous", "delay", "voltage", {"time": Number(0.75, 0.75, 0.75, "s", True)},
+    ("actuator_lag@voltage",), "", "never parsed", Span(0.01, 0.0, 0.02), True,
+    doubts=("at_bound", "rivals"),
+)  # fmt: skip
+
+
+def rest(share):
+    return Verdict("unexplained", "", "", {}, (), "", "never parsed", Span(share, share, share))
+
+
+NO_GAP = Verdict("no_gap", "", "", {}, (), "", "never parsed", Span(0.0, 0.0, 0.0))
+MINOR = Verdict("minor", "cogging", "pivot", {}, (), "", "never parsed", Span(0.004, 0.001, 0.007))
+
+
+def result(*verdicts, share=0.98, effects=None, blocks=20):
+    """What find_gap would have returned with these verdicts."""
+    errors = [Span(x, 0.9 * x, 1.1 * x) for x in (1.0, 0.1, 0.09)]
+    table = Gap(
+        "angle", "rad", 1.0, *errors, (Step("", errors[0]), Step("mass", errors[1])),
+        {"angle": ChannelGap("rad", *errors)}, 80.0, 1.05, Span(share, share, share), blocks, 5,
+    )  # fmt: skip
+    there = [ParameterChange("mass", 0.035), CoulombFriction("pivot", 2e-3)]
+    effects = there if effects is None else effects
+    where = Where({"angle": 80.0}, (), np.zeros(0), {}, {})
+    return GapResult(
+        verdicts, table, None, where, (), (), tuple(effects),
+        PendulumEquation().with_effects(effects), (("angle", "rad"),), {"angle": (0.01, 0.001)},
+        (), (), True, {},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "first"),
+    [
+        ([MASS], "98 % of the gap is mass."),
+        ([MASS, FRICTION], "98 % of the gap is mass and dissipation."),
+        (
+            [MASS, dataclasses.replace(FRICTION, family="", form=())],
+            "98 % of the gap is mass and Coulomb friction.",
+        ),
+        ([DELAY], "98 % of the gap is delay at voltage or actuator lag at voltage."),
+        (
+            [MASS, dataclasses.replace(DELAY, alternatives=(), doubts=("unsteady",))],
+            "98 % of the gap is mass and perhaps delay at voltage.",
+        ),
+        ([rest(1.0)], "The gap has no name: the 1 s error of angle is 1 rad."),
+    ],
+)
+def test_the_first_sentence_is_the_share_that_has_a_name(verdicts, first):
+    assert lead(result(*verdicts)) == first
+    assert summary(result(*verdicts)).startswith(first)
+
+
+def test_no_gap_and_nothing_that_matters_are_different_answers():
+    nothing = result(NO_GAP, effects=[])
+    assert lead(nothing).startswith("No gap above the noise: ")
+    assert lead(nothing, tolerance=2.0).startswith("Nothing that matters: ")
+    assert lead(result(MASS), tolerance=0.5) == lead(result(MASS))
+
+
+def test_a_number_at_its_bound_pretends_no_interval_and_says_why_it_is_not_certain():
+    found = result(MASS, DELAY)
+    assert headline(DELAY, found) == "Delay at voltage: time 0.75 s (at its bound)."
+    said = "; ".join(notes(DELAY, found))
+    assert "its size lies at its bound" in said
+    assert "one of delay at voltage or actuator lag at voltage: these data cannot tell" in said
+
+
+def test_a_provisional_answer_says_how_much_more_data_would_do():
+    said = "; ".join(notes(DELAY, result(DELAY, blocks=5)))
+    assert "there are 5 blocks of data to confirm it, 8 would do (some 3 s more)" in said
+    assert "NOT CERTAIN, PROVISIONAL" in summary(result(DELAY, blocks=5))
+
+
+def test_what_moves_alike_is_told_apart_from_what_these_data_leave_open():
+    assert "no motion can tell it from length or gravity" in notes(MASS, result(MASS))
+    assert headline(FRICTION, result(MASS, FRICTION)).startswith(
+        "Dissipation, form undecided: as Coulomb friction at pivot, level "
+    )
+    said = notes(FRICTION, result(MASS, FRICTION))
+    assert "of the same family, viscous friction at pivot would do as well" in said
+
+
+@pytest.mark.parametrize(("share", "red"), [(0.01, False), (0.3, True)])
+def test_a_small_remainder_is_a_footnote_and_no_red_box(share, red):
+    sections = banners(result(MASS, rest(share)), None)
+    tones = [section.tone for section in sections if isinstance(section, Banner)]
+    assert ("bad" in tones) is red
+    text = " ".join(section.text for section in sections if isinstance(section, Prose))
+    assert ("has no name" in text) is not red
+    assert ("UNEXPLAINED" in summary(result(MASS, rest(share)))) is red
+
+
+def test_minor_effects_are_listed_small():
+    text = summary(result(MASS, MINOR))
+    assert line_of(text, "MINOR") == "Cogging at pivot: 0.4 % of the gap, not added."
+    kinds = [s.label for s in banners(result(MASS, MINOR), None) if isinstance(s, Banner)]
+    assert kinds == ["answer", "confirmed"]
+
+
+def line_of(text, kind):
+    (line,) = [line for line in text.splitlines() if line.startswith(kind)]
+    return line.removeprefix(kind).strip()

@@ -1,0 +1,49 @@
+"""What find_gap says: numbers and shares in words, and signs of life."""
+
+import re
+import time
+
+import pytest
+
+from residual.gap.result import Number
+from studies.gap.progress import Heartbeat
+from studies.gap.words import number_text, percent, rounded
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "text"),
+    [(0.0349736, 2.7e-5, "0.034974"), (14.23, 0.4, "14.23"), (6.2181, 0.0061, "6.2181"),
+     (1234.5, 60, "1234"), (0.0, 1.0, "0")],
+)  # fmt: skip
+def test_numbers_show_two_digits_of_their_uncertainty(value, half, text):
+    assert rounded(value, half) == text
+
+
+def test_an_interval_is_written_with_its_unit():
+    assert number_text(Number(-0.5, -0.6, -0.4, "1")) == "−0.50 (−0.60 to −0.40)"
+    assert number_text(Number(2.0, 1.9, 2.1, "kg"), sign=True) == "+2.00 kg (1.90 to 2.10)"
+
+
+def test_a_number_at_its_bound_has_no_interval():
+    assert number_text(Number(0.75, 0.75, 0.75, "N m", True)) == "0.75 N m (at its bound)"
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [(0.4567, "46 %"), (0.0123, "1.2 %"), (0.9951, "99.5 %"), (0.99999, "more than 99.9 %"),
+     (1.0, "100 %"), (0.0002, "less than 0.1 %"), (-0.1, "0 %"), (0.99, "99 %")],
+)  # fmt: skip
+def test_a_share_is_rounded_where_that_hides_nothing(share, text):
+    assert percent(share) == text
+
+
+def test_a_sign_of_life_comes_while_nothing_is_said():
+    lines = []
+    with Heartbeat(60, lines.append, quiet=0.04) as tell:
+        tell("mass: 3 % of the error")
+        end = time.monotonic() + 10
+        while len(lines) < 3 and time.monotonic() < end:
+            time.sleep(0.01)
+    assert len(lines) >= 3
+    assert all(re.match(r" *\d+\.\d s, \d+ s left  ", line) for line in lines)
+    assert lines[-1].endswith("still working; last: mass: 3 % of the error")
