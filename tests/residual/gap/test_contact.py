@@ -80,11 +80,11 @@ def test_what_imitates_an_effect_makes_way_for_it():
     logs = struggle(reference.TRUE, rows=4, steps=12, seed=2, rates=True)
     samples = Samples.join(logs, substeps_for(Leo(), logs), "zero")
     offered = [ParameterChange(n) for n in ("torso_mass", "friction", "supply")]
-    shots = lay_out(Leo(), samples, pieces(samples))
-    shots, aimed = quieten(Model(Leo()), np.zeros(0), shots, shots.guess, scales(Leo()), 2)
-    search = Search(Leo(), candidates(Leo(), offered, samples), shots, Rules(), lambda _: None)
-    search.begin((), np.zeros(0), aimed.starts, None)
-    search.refit(Proposal((0, 2), np.array([0.2, -0.07]), 0.0), search.tried[()].aimed)
+    data = lay_out(Leo(), samples, pieces(samples))
+    data, fitted = quieten(Model(Leo()), np.zeros(0), data, data.guess, scales(Leo()), 2)
+    search = Search(Leo(), candidates(Leo(), offered, samples), data, Rules(), lambda _: None)
+    search.begin((), np.zeros(0), fitted.starts, None)
+    search.refit(Proposal((0, 2), np.array([0.2, -0.07]), 0.0), search.tried[()].fitted)
     found, around = search.signatures((0, 2))
     owners = [column.candidate for column in found]
     assert abs(cosines(around)[owners.index(1), owners.index(2)]) > ALIKE
@@ -97,7 +97,7 @@ def test_what_imitates_an_effect_makes_way_for_it():
     right, wrong = search.tried[0, 1], search.tried[0, 2]
     search.tried[0, 2] = dataclasses.replace(wrong, loss=right.loss)
     assert not excluded(search, (0, 2), (0, 1))
-    beaten = duels(search, (0, 1), right, shots, 1)
+    beaten = duels(search, (0, 1), right, data, 1)
     assert beaten == {(0, 2)} and excluded(search, (0, 2), (0, 1), beaten)
 
 
