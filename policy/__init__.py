@@ -2,14 +2,17 @@
 
 from policy.config import DDPGConfig
 from policy.ddpg import DDPG, Progress
-from policy.evaluate import Policy, Rollout, collect, evaluate, rollout
+from policy.evaluate import Policy, Rollout, action_of, collect, evaluate, rollout
+from policy.learner import Algorithm, Learner, load_policy
 from policy.mlp import MlpPolicy
 from policy.noise import OrnsteinUhlenbeck
 from policy.selection import Point, Selection, learn_and_select, score
 
 __all__ = [
     "DDPG",
+    "Algorithm",
     "DDPGConfig",
+    "Learner",
     "MlpPolicy",
     "OrnsteinUhlenbeck",
     "Point",
@@ -17,9 +20,11 @@ __all__ = [
     "Progress",
     "Rollout",
     "Selection",
+    "action_of",
     "collect",
     "evaluate",
     "learn_and_select",
+    "load_policy",
     "rollout",
     "score",
 ]

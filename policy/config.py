@@ -8,7 +8,7 @@ import math
 
 @dataclasses.dataclass(frozen=True)
 class DDPGConfig:
-    """Settings of ``DDPG``; the defaults are the paper's, TD3's additions are off.
+    """Settings of ``DDPG``; the defaults are the paper's.
 
     Args:
         hidden: Widths of the two hidden layers of the actor and of the critic.
@@ -28,10 +28,6 @@ class DDPGConfig:
         warm_up: Transitions that must be in the replay before updates start; until then the
             current policy acts, with noise.
         updates_per_step: Updates after each step of the environment.
-        twin_critics: Learn two critics and use the smaller target value (TD3).
-        target_noise: Standard deviation of the noise on the target's action (TD3: 0.2).
-        target_noise_clip: Bound on that noise.
-        actor_delay: Critic updates per update of the actor and the targets (TD3: 2).
 
     Raises:
         ValueError: A value lies outside its range; the message says which.
@@ -51,10 +47,12 @@ class DDPGConfig:
     reward_scale: float = 0.1
     warm_up: int = 1000
     updates_per_step: int = 1
-    twin_critics: bool = False
-    target_noise: float = 0.0
-    target_noise_clip: float = 0.5
-    actor_delay: int = 1
+
+    def __repr__(self) -> str:
+        # What is as by default tells nothing.
+        values = ((f.name, getattr(self, f.name), f.default) for f in dataclasses.fields(self))
+        changed = ", ".join(f"{name}={now!r}" for name, now, usual in values if now != usual)
+        return f"{type(self).__name__}({changed})"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "hidden", tuple(self.hidden))
@@ -69,12 +67,9 @@ class DDPGConfig:
             ("critic_lr", 0, math.inf),
             ("critic_weight_decay", 0, math.inf),
             ("noise_sigma", 0, math.inf),
-            ("target_noise", 0, math.inf),
-            ("target_noise_clip", 0, math.inf),
             ("batch", 1, math.inf),
             ("warm_up", 0, math.inf),
             ("updates_per_step", 0, math.inf),
-            ("actor_delay", 1, math.inf),
             ("replay", self.batch, math.inf),
         ):
             value = getattr(self, name)

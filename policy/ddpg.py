@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -12,15 +11,13 @@ from typing import Any
 import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from safetensors.numpy import save
 
-from policy.adam import Adam
+from policy.actor_critic import ActorCritic
 from policy.config import DDPGConfig
-from policy.files import read_arrays, write_whole
+from policy.files import read_arrays, write_arrays
 from policy.mlp import MlpPolicy
-from policy.networks import Actor, Critic, FlatNetwork, Inputs
 from policy.noise import OrnsteinUhlenbeck
-from policy.replay import Batch, Replay
+from policy.replay import Replay
 
 FORMAT = "simgap.ddpg.1"
 
@@ -59,7 +56,6 @@ class DDPG:
     Attributes:
         policy: The current deterministic policy, a live view: it changes as the agent learns.
         replay: The transitions seen.
-        updates: Updates made so far.
 
     Raises:
         ValueError: A space is not a box as described.
@@ -79,28 +75,13 @@ class DDPG:
         n_a = box.shape[0]
         self.config = c = config or DDPGConfig()
         self._rng = rng = np.random.default_rng(seed)
-        sizes = (n_o, n_a, c.hidden, c.batch, rng)
-        self._actor, self._actor_target = Actor(*sizes), Actor(*sizes)
-        count = 2 if c.twin_critics else 1
-        self._critics = [Critic(*sizes, c.action_layer) for _ in range(count)]
-        self._critic_targets = [Critic(*sizes, c.action_layer) for _ in range(count)]
-        for network, target in self._pairs():
-            target.parameters[:] = network.parameters
-        self._actor_adam = _adam(self._actor, self._actor_target, c.actor_lr)
-        self._critic_adams = [
-            _adam(critic, target, c.critic_lr, c.critic_weight_decay)
-            for critic, target in zip(self._critics, self._critic_targets, strict=True)
-        ]
-        self._now, self._following = (Inputs(n_o, n_a, c.batch) for _ in range(2))
-        # Gradients of the batch's mean squared error and of minus its mean value, per column.
-        self._mean_square = np.float32(2 / c.batch)
-        self._mean_value = np.full((1, c.batch), -1 / c.batch, np.float32)
-        self._gamma = np.float32(c.gamma)
+        self._networks = ActorCritic(n_o, n_a, c, rng)
         self._noise = OrnsteinUhlenbeck(n_a, c.noise_sigma, c.noise_theta, rng)
         self.replay = Replay(c.replay, n_o, n_a)
-        self.updates = 0
         self.policy = MlpPolicy(
-            self._actor.layers(), np.asarray(box.low, np.float32), np.asarray(box.high, np.float32)
+            self._networks.actor.layers(),
+            np.asarray(box.low, np.float32),
+            np.asarray(box.high, np.float32),
         )
 
     @classmethod
@@ -109,6 +90,9 @@ class DDPG:
     ) -> DDPG:
         """An agent for the spaces of ``env``; errors as for the class."""
         return cls(env.observation_space, env.action_space, config, seed)
+
+    def __repr__(self) -> str:
+        return f"DDPG({self.policy!r}, {self.updates} updates, {len(self.replay)} transitions)"
 
     def act(self, observation: ArrayLike, noise: bool = False) -> NDArray[np.float32]:
         """The policy's action, within the bounds.
@@ -195,58 +179,39 @@ class DDPG:
             ):
                 return
 
+    @property
+    def updates(self) -> int:
+        """Updates made so far."""
+        return self._networks.updates
+
     def update(self) -> None:
-        """One update of the critic and the actor from one batch of the replay.
+        """One update of the critic and the actor from one batch of the replay."""
+        self._networks.update(self.replay.sample(self.config.batch, self._rng))
 
-        Both gradients are those of the networks as they are before the update; Algorithm 1 of
-        Lillicrap et al. (2016) takes the actor's one critic step of size ``critic_lr`` later.
+    def remember(
+        self,
+        observations: ArrayLike,
+        actions: ArrayLike,
+        rewards: ArrayLike,
+        next_observations: ArrayLike,
+        terminated: ArrayLike,
+    ) -> None:
+        """Add n transitions to the replay as if they had been seen in ``learn``.
+
+        Args:
+            observations, next_observations: shape (n, n_o).
+            actions: In the units of the action space, shape (n, n_a).
+            rewards: shape (n,).
+            terminated: Whether the episode ended there, and not by time, shape (n,).
         """
-        c = self.config
-        batch = self.replay.sample(c.batch, self._rng)
-        goal = self._goal(batch)
-        self.updates += 1
-        with_actor = self.updates % c.actor_delay == 0
-        now = self._now
-        now.observations[:] = batch.observations.T
-        now.actions[:] = batch.actions.T
-        for critic in self._critics:
-            error = critic.forward(now) - goal
-            critic.backward(now, error * self._mean_square)
-        if with_actor:
-            self._actor.forward(now)
-            self._critics[0].forward(now)
-            ascent = self._critics[0].d_actions(self._mean_value)
-        share = c.tau if with_actor else 0.0
-        for adam in self._critic_adams:
-            adam.step(share)
-        if with_actor:
-            self._actor.backward(now, ascent)
-            self._actor_adam.step(share)
-
-    def _goal(self, batch: Batch) -> NDArray[np.float32]:
-        """What the critics should say of the batch, shape (1, batch)."""
-        c, following = self.config, self._following
-        following.observations[:] = batch.next_observations.T
-        self._actor_target.forward(following)
-        if c.target_noise:
-            smoothing = self._rng.normal(0, c.target_noise, following.actions.T.shape).T
-            bounded = smoothing.clip(-c.target_noise_clip, c.target_noise_clip)
-            following.actions[:] = (following.actions + bounded).clip(-1, 1)
-        values = [target.forward(following) for target in self._critic_targets]
-        value = values[0] if len(values) == 1 else np.minimum(*values)
-        return batch.rewards.T + self._gamma * batch.alive.T * value
-
-    def forget(self, replay: bool = False, optimiser: bool = False) -> None:
-        """Drop the transitions seen, or the optimisers' moments, before learning elsewhere."""
-        if replay:
-            self.replay.clear()
-        if optimiser:
-            for adam in (self._actor_adam, *self._critic_adams):
-                adam.reset()
+        low, high = self.policy.low, self.policy.high
+        normalised = 2 * (np.asarray(actions, float) - low) / (high - low) - 1
+        scaled = self.config.reward_scale * np.asarray(rewards, float)
+        self.replay.extend(observations, normalised, scaled, next_observations, terminated)
 
     def networks(self) -> dict[str, NDArray[np.float32]]:
         """A copy of all networks, targets and optimiser moments by name, for ``restore``."""
-        return {name: array.copy() for name, array in self._arrays().items()}
+        return {name: array.copy() for name, array in self._networks.arrays().items()}
 
     def restore(self, networks: dict[str, NDArray[np.float32]]) -> None:
         """Return to a copy from ``networks``; replay and random state stay as they are.
@@ -254,16 +219,7 @@ class DDPG:
         Raises:
             ValueError: The copy is from an agent with other networks.
         """
-        own = self._arrays()
-        shapes = {name: array.shape for name, array in own.items()}
-        given = {name: array.shape for name, array in networks.items()}
-        if shapes != given:
-            raise ValueError(
-                f"the networks have arrays {given}, expected {shapes}: "
-                "the spaces and the config must be those they were learnt with"
-            )
-        for name, array in own.items():
-            array[...] = networks[name]
+        self._networks.restore(networks)
 
     def save(self, path: str | Path, replay: bool = True) -> None:
         """Write the whole agent to a safetensors file; learning on after ``load`` is the same.
@@ -272,19 +228,17 @@ class DDPG:
             path: File to write; it appears whole or not at all.
             replay: Include the transitions. Without them a loaded agent warms up again.
         """
-        arrays = {**self._arrays(), "low": self.policy.low, "high": self.policy.high}
+        arrays = {**self._networks.arrays(), "low": self.policy.low, "high": self.policy.high}
         if replay:
             arrays["replay"] = self.replay.stored()
         metadata = {
-            "format": FORMAT,
             "config": dataclasses.asdict(self.config),
             "observation_size": self.policy.observation_size,
             "position": self.replay.position,
             "updates": self.updates,
             "random": self._rng.bit_generator.state,
         }
-        texts = {key: json.dumps(value) for key, value in metadata.items()}
-        write_whole(path, save(arrays, texts))
+        write_arrays(path, FORMAT, arrays, metadata)
 
     @classmethod
     def load(cls, path: str | Path) -> DDPG:
@@ -297,15 +251,18 @@ class DDPG:
         arrays, metadata = read_arrays(path, FORMAT)
         low, high = arrays.pop("low"), arrays.pop("high")
         rows = arrays.pop("replay", None)
+        # Before version 0.2 there were settings of TD3 as well.
+        known = {field.name for field in dataclasses.fields(DDPGConfig)}
+        settings = {name: value for name, value in metadata["config"].items() if name in known}
         agent = cls(
             gymnasium.spaces.Box(-np.inf, np.inf, (metadata["observation_size"],)),
             gymnasium.spaces.Box(low, high),
-            DDPGConfig(**metadata["config"]),
+            DDPGConfig(**settings),
         )
         agent.restore(arrays)
         if rows is not None:
             agent.replay.restore(rows, metadata["position"])
-        agent.updates = metadata["updates"]
+        agent._networks.updates = metadata["updates"]
         agent._rng.bit_generator.state = metadata["random"]
         return agent
 
@@ -317,20 +274,6 @@ class DDPG:
             )
         return np.minimum(np.maximum(normalised + self._noise(), -1.0), 1.0)
 
-    def _pairs(self) -> list[tuple[Actor | Critic, Actor | Critic]]:
-        critics = zip(self._critics, self._critic_targets, strict=True)
-        return [(self._actor, self._actor_target), *critics]
-
-    def _arrays(self) -> dict[str, NDArray[np.float32]]:
-        arrays = {}
-        names = ["actor", *(f"critic{k}" for k in range(1, len(self._critics) + 1))]
-        adams = [self._actor_adam, *self._critic_adams]
-        for name, (network, target), adam in zip(names, self._pairs(), adams, strict=True):
-            arrays[name] = network.parameters
-            arrays[f"{name}.target"] = target.parameters
-            arrays |= {f"{name}.adam.{key}": value for key, value in adam.state().items()}
-        return arrays
-
     def _check_env(self, env: gymnasium.Env[Any, Any]) -> None:
         for name, space, size in (
             ("observation", env.observation_space, self.policy.observation_size),
@@ -341,13 +284,6 @@ class DDPG:
                     f"the environment's {name} space is {space}, but the agent was made for "
                     f"{size} {name}(s): make a new agent, or wrap the environment"
                 )
-
-
-def _adam(
-    network: FlatNetwork, target: FlatNetwork, learning_rate: float, weight_decay: float = 0.0
-) -> Adam:
-    flat = network.parameters, network.gradient, target.parameters
-    return Adam(*flat, learning_rate, weight_decay)
 
 
 def _box(name: str, space: gymnasium.Space[Any]) -> gymnasium.spaces.Box:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 from typing import Any, Protocol
 
 import gymnasium
@@ -14,11 +15,47 @@ from policy.noise import OrnsteinUhlenbeck
 Array = NDArray[np.float64]
 
 
-class Policy(Protocol):
+class Acting(Protocol):
     """Anything that maps an observation to an action of the environment."""
 
     def act(self, observation: ArrayLike) -> NDArray[Any]:
         """Action, shape (n_a,), for one observation, shape (n_o,)."""
+
+
+class Predicting(Protocol):
+    """The same as other libraries call it, such as Stable-Baselines3."""
+
+    def predict(self, observation: Any) -> Any:
+        """Action, shape (n_a,), or a tuple that begins with it."""
+
+
+Policy = Acting | Predicting
+
+
+def action_of(policy: Policy, observation: ArrayLike) -> NDArray[Any]:
+    """The action of a policy with ``act``, or with ``predict``; without noise if it can be told.
+
+    Args:
+        policy: With either method.
+        observation: shape (n_o,).
+
+    Returns:
+        shape (n_a,).
+
+    Raises:
+        TypeError: It has neither.
+    """
+    if act := getattr(policy, "act", None):
+        return act(observation)
+    predict = getattr(policy, "predict", None)
+    if predict is None:
+        raise TypeError(
+            f"a {type(policy).__name__} is no policy: give it act(observation), or "
+            "predict(observation) as in Stable-Baselines3"
+        )
+    quiet = "deterministic" in inspect.signature(predict).parameters
+    found = predict(observation, deterministic=True) if quiet else predict(observation)
+    return np.asarray(found[0] if isinstance(found, tuple) else found)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,6 +75,10 @@ class Rollout:
     rewards: Array
     states: Array | None
     terminated: bool
+
+    def __repr__(self) -> str:
+        end = "terminated" if self.terminated else "cut by time"
+        return f"Rollout({len(self.rewards)} steps, return {self.total:.5g}, {end})"
 
     @property
     def total(self) -> float:
@@ -73,7 +114,7 @@ def rollout(
     rewards: list[float] = []
     terminated = truncated = False
     while not (terminated or truncated or len(rewards) == max_steps):
-        action = policy.act(observation)
+        action = action_of(policy, observation)
         if noise:
             action = np.clip(action + half * noise(), box.low, box.high).astype(box.dtype)
         observation, reward, terminated, truncated, info = env.step(action)

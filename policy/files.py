@@ -1,25 +1,37 @@
-"""Reading and writing arrays safely: whole files only, and nothing in them is executed."""
+"""Arrays in files: the same content gives the same bytes, and nothing in them is executed."""
 
 from __future__ import annotations
 
 import json
-import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+
+from simgap_files import atomic_write_bytes
+
+_KEY = "simgap"
 
 
-def write_whole(path: str | Path, content: bytes) -> None:
-    """Write a file so that a reader, or a kill at any moment, never sees half of it."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        draft.write_bytes(content)
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
+def write_arrays(
+    path: str | Path, form: str, arrays: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]
+) -> None:
+    """Write a safetensors file, whole or not at all.
+
+    Args:
+        path: The file.
+        form: What kind of file it is, for ``read_arrays``.
+        arrays: By name.
+        metadata: Values that JSON knows, by name.
+    """
+    # All metadata under one key: safetensors writes several in any order.
+    text = json.dumps({"format": form, **metadata}, sort_keys=True)
+    contiguous = {name: np.array(value, order="C") for name, value in arrays.items()}
+    atomic_write_bytes(path, save(contiguous, {_KEY: text}))
 
 
 def read_arrays(path: str | Path, form: str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -38,8 +50,11 @@ def read_arrays(path: str | Path, form: str) -> tuple[dict[str, Any], dict[str, 
         raise FileNotFoundError(f"{path} is not a file")
     try:
         with safe_open(path, "np") as file:
-            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-            metadata = {key: json.loads(text) for key, text in (file.metadata() or {}).items()}
+            arrays = {name: file.get_tensor(name) for name in list(file.keys())}
+            texts = file.metadata() or {}
+        metadata = {key: json.loads(text) for key, text in texts.items()}
+        # Before version 0.2 every value had a key of its own.
+        metadata = metadata.get(_KEY, metadata)
     except (SafetensorError, json.JSONDecodeError) as error:
         raise ValueError(f"{path} is not a safetensors file of this toolkit: {error}") from error
     if metadata.get("format") != form:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from safetensors.numpy import save
 
-from policy.files import read_arrays, write_whole
+from policy.files import read_arrays, write_arrays
 
 FORMAT = "simgap.policy.1"
 
@@ -36,6 +34,10 @@ class MlpPolicy:
             self.weights[name] = (np.asfortranarray if name == "weight1" else np.ascontiguousarray)(
                 value
             )
+
+    def __repr__(self) -> str:
+        sizes = [self.observation_size, *(len(self.weights[f"bias{k}"]) for k in (1, 2, 3))]
+        return f"MlpPolicy({' -> '.join(map(str, sizes))})"
 
     @property
     def observation_size(self) -> int:
@@ -89,8 +91,7 @@ class MlpPolicy:
     def save(self, path: str | Path) -> None:
         """Write a safetensors file; it appears whole or not at all."""
         tensors = {**self.weights, "low": self.low, "high": self.high}
-        contiguous = {name: np.ascontiguousarray(value) for name, value in tensors.items()}
-        write_whole(path, save(contiguous, {"format": json.dumps(FORMAT)}))
+        write_arrays(path, FORMAT, tensors, {})
 
     @classmethod
     def load(cls, path: str | Path) -> MlpPolicy:

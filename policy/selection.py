@@ -18,9 +18,9 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from policy.ddpg import DDPG, Progress
+from policy.ddpg import Progress
 from policy.evaluate import Policy, evaluate
-from policy.mlp import MlpPolicy
+from policy.learner import Learner
 from policy.noise import OrnsteinUhlenbeck
 
 
@@ -44,28 +44,20 @@ class Selection:
     """The best policy of one call of ``learn_and_select``.
 
     Args:
-        policy: The policy with the highest score, a copy.
-        networks: The agent's networks at that moment, for ``DDPG.restore``.
-        best: Its evaluation.
+        networks: The learner's networks when its score was highest, for ``restore``.
+        best: The evaluation then.
         curve: All evaluations in order.
         final: Mean return of the policy in the final, if there was one: it was
             chosen among the finalists only, so it is hardly flattered by luck.
     """
 
-    policy: MlpPolicy
-    networks: dict[str, NDArray[np.float32]]
+    networks: dict[str, NDArray[Any]]
     best: Point
     curve: tuple[Point, ...]
     final: float | None = None
 
-
-@dataclasses.dataclass(frozen=True)
-class Candidate:
-    """A policy with the agent's networks and its evaluation."""
-
-    policy: MlpPolicy
-    networks: dict[str, NDArray[np.float32]]
-    point: Point
+    def __repr__(self) -> str:
+        return f"Selection({self.best}, of {len(self.curve)} evaluations)"
 
 
 def score(
@@ -91,7 +83,7 @@ def score(
 
 
 def learn_and_select(
-    agent: DDPG,
+    agent: Learner,
     env: gymnasium.Env[Any, Any],
     evaluation_env: gymnasium.Env[Any, Any],
     steps: int,
@@ -104,6 +96,7 @@ def learn_and_select(
     episodes: int = 1,
     finalists: int = 1,
     final_episodes: int = 0,
+    theta: float = 0.15,
 ) -> Selection:
     """Learn, score the policy now and then, and keep the best.
 
@@ -128,13 +121,13 @@ def learn_and_select(
         finalists: So many of the best policies are rolled out once more at the end.
         final_episodes: Rollouts of each finalist, without noise and from other starts; their mean
             decides. With 0 the best score does.
+        theta: As ``DDPGConfig.noise_theta``, of the noise of evaluations.
     """
     if env.unwrapped is evaluation_env.unwrapped:
         raise ValueError("env and evaluation_env are one object: make the environment twice")
-    c = agent.config
     curve: list[Point] = []
     most = finalists if final_episodes else 1
-    kept: list[Candidate] = []
+    kept: list[tuple[Point, dict[str, NDArray[Any]]]] = []
     scored_at = -1
 
     def consider(step: int) -> bool:
@@ -142,13 +135,13 @@ def learn_and_select(
         if agent.updates == scored_at:
             return False
         scored_at = agent.updates
-        scores = score(agent.policy, evaluation_env, noisy, sigma, c.noise_theta, seed, episodes)
+        scores = score(agent.policy, evaluation_env, noisy, sigma, theta, seed, episodes)
         point = Point(step, *scores)
         curve.append(point)
-        if len(kept) < most or point.score > kept[-1].point.score:
-            kept.append(Candidate(agent.policy.copy(), agent.networks(), point))
+        if len(kept) < most or point.score > kept[-1][0].score:
+            kept.append((point, agent.networks()))
             # Of equals the earlier one: the sort is stable.
-            kept[:] = sorted(kept, key=lambda one: -one.point.score)[:most]
+            kept[:] = sorted(kept, key=lambda one: -one[0].score)[:most]
         return bool(callback and callback(point))
 
     def on_progress(progress: Progress) -> bool:
@@ -156,14 +149,13 @@ def learn_and_select(
 
     if not consider(0):
         agent.learn(env, steps, on_progress, every, random_steps)
-    final: float | None = None
-    chosen = kept[0]
-    if final_episodes:
-        fresh = seed + episodes + noisy
-        means = [
-            float(evaluate(one.policy, evaluation_env, final_episodes, fresh).mean())
-            for one in kept
-        ]
-        final = max(means)
-        chosen = kept[means.index(final)]
-    return Selection(chosen.policy, chosen.networks, chosen.point, tuple(curve), final)
+    if not final_episodes:
+        best, networks = kept[0]
+        return Selection(networks, best, tuple(curve))
+    last, fresh, means = agent.networks(), seed + episodes + noisy, []
+    for _, networks in kept:
+        agent.restore(networks)
+        means.append(float(evaluate(agent.policy, evaluation_env, final_episodes, fresh).mean()))
+    agent.restore(last)
+    best, networks = kept[means.index(max(means))]
+    return Selection(networks, best, tuple(curve), max(means))

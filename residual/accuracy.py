@@ -37,6 +37,10 @@ class Accuracy:
     multi_step_error: dict[str, dict[str, float]]
     coverage90: float | None
 
+    def __repr__(self) -> str:
+        errors = ", ".join(f"{name} {error:.2g}" for name, error in self.one_step.items())
+        return f"Accuracy(one-step error as a share of the gap: {errors})"[:160]
+
 
 def accuracy_along(
     corrected: CorrectedSimulator,

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from residual.difference import DifferenceModel
 from sims.simulator import Array, Simulator
 
-# A residual far outside its data could throw the state anywhere; rates are kept within this
-# many typical magnitudes so that a bad model ends in a bad return and not in infinities.
-_RATE_LIMIT = 8.0
+# A difference far outside its data could throw the state anywhere; it is kept within this many
+# typical magnitudes so that a bad model ends in a bad return and not in infinities.
+_LIMIT = 8.0
 
 
 class CorrectedSimulator(Simulator):
     """A simulator plus the difference model learnt for it, itself a simulator.
 
+    It stays finite: rates are held within 8 times their scale, and other channels within so much
+    of where they were one step before. What is no number stays as it was.
+
     Args:
         simulator: The idealised simulator f.
         difference: The difference model d, fitted on this simulator's channels and period.
+
+    Attributes:
+        held: Rows stepped so far whose next state had to be held.
 
     Raises:
         ValueError: ``difference`` was fitted for another control period or other channels.
@@ -32,31 +39,40 @@ class CorrectedSimulator(Simulator):
         self.state_channels = simulator.state_channels
         self.action_channels = simulator.action_channels
         self.parameters = simulator.parameters
+        self.held = 0
         # An estimator of physics is a simulator itself, which saves two steps of three.
         estimator = difference.fitted()
         same = hasattr(estimator, "corrected") and estimator.simulator is simulator
         self._whole: Simulator | None = estimator.corrected() if same else None
-        self._limits = [
-            (column, _RATE_LIMIT * channel.scale)
-            for column, channel in enumerate(simulator.state_channels)
-            if channel.kind == "rate"
-        ]
+        channels = simulator.state_channels
+        self._limits = np.array(
+            [np.inf if c.kind == "memory" else _LIMIT * c.scale for c in channels]
+        )
+        self._rates = np.array([channel.kind == "rate" for channel in channels])
+
+    def __repr__(self) -> str:
+        return f"CorrectedSimulator({self.simulator.name} + {self.difference!r})"
 
     def step(self, states: ArrayLike, actions: ArrayLike) -> Array:
-        """f(s, a) + d(s, a) for every row; rates are kept within 8 times their scale."""
+        """f(s, a) + d(s, a) for every row, kept finite."""
         states, actions = self.check_rows(states, actions)
         if self._whole is not None:
-            return self._limited(self._whole.step(states, actions))
+            return self._bounded(states, self._whole.step(states, actions))
         return self.correct(states, actions, self.simulator.step(states, actions))
 
     def correct(self, states: Array, actions: Array, next_states: Array) -> Array:
         """What ``step`` makes of next states (n, n_s) that the idealised simulator gave."""
-        return self._limited(next_states + self.difference.predict(states, actions))
+        return self._bounded(states, next_states + self.difference.predict(states, actions))
 
-    def _limited(self, next_states: Array) -> Array:
-        for column, limit in self._limits:
-            next_states[:, column].clip(-limit, limit, out=next_states[:, column])
-        return next_states
+    def _bounded(self, states: Array, next_states: Array) -> Array:
+        middle = np.where(self._rates, 0.0, states)
+        moved = next_states - middle
+        # Not a comparison with the limit alone: it is false for what is no number.
+        if (np.abs(moved) <= self._limits).all():
+            return next_states
+        self.held += int((~(np.abs(moved) <= self._limits)).any(axis=1).sum())
+        known = np.where(np.isnan(next_states), states - middle, moved)
+        return middle + known.clip(-self._limits, self._limits)
 
     def augment(self, states: ArrayLike, actions: ArrayLike | None = None) -> Array:
         """As the simulator below fills its memory."""

@@ -123,6 +123,11 @@ class DifferenceModel:
         self.estimator_ = estimator.fit(X, (y - self.mean_) / self.scale_)
         return self
 
+    def __repr__(self) -> str:
+        channels = ", ".join(channel.name for channel in self.state_channels[:6])
+        channels = ", ".join(channel.name for channel in self.state_channels[:6])
+        return f"DifferenceModel({type(self.estimator).__name__} for {channels})"
+
     @property
     def name(self) -> str:
         """What was learnt and by what, for reports."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from safetensors.numpy import save as to_bytes
 
 from residual.difference import DifferenceModel
 from residual.estimator import Estimator
-from residual.named_effects import NamedEffects
+from simgap_files import atomic_write_bytes
 from sims.simulator import Channel, Simulator
 
 VERSION = 1
@@ -31,6 +30,8 @@ _CLASSES = {
     "Linear": "residual.linear",
     "NamedEffects": "residual.named_effects",
 }
+# Steps the simulator itself; not imported here, since it brings the whole search for effects.
+_OF_SIMULATOR = "NamedEffects"
 _KEY = "simgap"
 
 
@@ -73,13 +74,13 @@ def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
         for key, value in estimator.get_params(deep=False).items()
         if key != "simulator"
     }
-    if isinstance(estimator, NamedEffects):
+    if name == _OF_SIMULATOR:
         header["values"] = estimator.state_values()
     names = getattr(estimator, "feature_names_in_", None)
     header["feature_names"] = None if names is None else [str(name) for name in names]
     arrays = {key: np.array(value, order="C") for key, value in estimator.state_arrays().items()}
-    content = to_bytes(arrays, metadata={_KEY: json.dumps(header)})
-    _write(Path(path), content)
+    content = to_bytes(arrays, metadata={_KEY: json.dumps(header, sort_keys=True)})
+    atomic_write_bytes(path, content)
 
 
 def load(path: str | Path, simulator: Simulator | None = None) -> Any:
@@ -130,7 +131,7 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray]]:
             raise _Unusable(
                 "a safetensors file, but not of this project: give one of residual.save"
             )
-        arrays = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+        arrays = {key: file.get_tensor(key) for key in list(file.keys())}
     header = json.loads(metadata[_KEY])
     if header["version"] != VERSION:
         raise _Unusable(
@@ -151,7 +152,7 @@ def _restore(
     params = {key: _tuples(value) for key, value in header["params"].items()}
     kind: type[Estimator] = getattr(importlib.import_module(_CLASSES[name]), name)
     estimator = kind.from_state(params, arrays)
-    if isinstance(estimator, NamedEffects):
+    if name == _OF_SIMULATOR:
         if simulator is None:
             raise _Unusable("holds NamedEffects, which step the simulator: load(path, simulator)")
         estimator.restore(header["values"], simulator)
@@ -194,13 +195,3 @@ def _plain(name: str, value: Any) -> Any:
 
 def _tuples(value: Any) -> Any:
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
-
-
-def _write(path: Path, content: bytes) -> None:
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(content)
-        os.replace(part, path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise

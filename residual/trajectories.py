@@ -31,6 +31,10 @@ class Transitions:
     def __len__(self) -> int:
         return len(self.states)
 
+    def __repr__(self) -> str:
+        episodes = len(np.unique(self.episodes))
+        return f"Transitions({len(self)} rows of {episodes} episodes)"
+
     @classmethod
     def join(cls, parts: Sequence[Transitions]) -> Transitions:
         """All parts in order; episodes are renumbered so that they stay distinct."""
@@ -80,3 +84,7 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.actions)
+
+    def __repr__(self) -> str:
+        seconds = self.times[-1] - self.times[0] if len(self.times) else 0.0
+        return f"Trajectory({self.name!r}, {len(self)} steps, {seconds:.4g} s)"

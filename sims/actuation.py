@@ -98,7 +98,7 @@ def recorded_inputs(
             shape = (lag.rows or len(means), *means.shape[1:])
             means, rises = np.broadcast_to(means, shape), np.broadcast_to(rises, shape)
             start = np.broadcast_to(samples[:, 0], len(means))
-            means, rises, _ = path.lagged(means, rises, durations, lag.time_constant, start)
+            means, rises, _ = simulator.lagged(means, rises, durations, lag.time_constant, start)
         columns.append(np.stack([means, rises], axis=-1))
     if not columns:
         return np.empty((1, len(commands), substeps, 0, 2))
@@ -146,7 +146,7 @@ def next_inputs(
         )
         means, rises = means[:, kept : kept + 1], rises[:, kept : kept + 1]
         for lag in path.lags(effects):
-            means, rises, after[:, at] = path.lagged(
+            means, rises, after[:, at] = simulator.lagged(
                 means, rises, np.array([simulator.dt]), lag.time_constant, memory[:, at]
             )
             at += 1

@@ -36,8 +36,6 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             an observed channel.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
-
     def __init__(
         self,
         simulator: Simulator,
@@ -50,7 +48,8 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.simulator = simulator
         self.task = task
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": round(1 / simulator.dt)}
+        fps = round(1 / simulator.dt)
+        self.metadata = {"render_modes": ["rgb_array"], "render_fps": fps}
         self._renderer: Renderer | None = renderer_for(simulator) if render_mode else None
         low = np.array([channel.low for channel in simulator.action_channels])
         high = np.array([channel.high for channel in simulator.action_channels])

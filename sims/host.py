@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sims.actuation import memory_channels, next_inputs, recorded_inputs, with_memory
+from sims.drive import lagged
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
 from sims.effects.base import Effect, place
@@ -43,6 +44,7 @@ class HostSimulator(Simulator):
             short windows only (``residual.gap.contact``).
         advances_rows_at_once: True if ``integrate`` advances all rows together, each with its own
             values of effects and parameters, so that a batch costs little more than a row.
+        lagged: How an input with a lag acts in sub-steps, see ``sims.drive.lagged``.
     """
 
     effects: tuple[Effect, ...] = ()
@@ -51,6 +53,7 @@ class HostSimulator(Simulator):
     has_drive_force: bool = False
     has_contacts: bool = False
     advances_rows_at_once: bool = False
+    lagged = staticmethod(lagged)
 
     @abc.abstractmethod
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
@@ -84,6 +87,18 @@ class HostSimulator(Simulator):
         keeps away from them.
         """
         return np.stack([random_values(c, n, rng) for c in self.physical_channels], axis=1)
+
+    def offered_effects(self) -> tuple[Effect, ...] | None:
+        """What may be missing by default (``sims.effects.library``); None for all it can host."""
+        return None
+
+    def own_files(self) -> dict[str, bytes]:
+        """It as files of the format that it came from, by name, for tools that read that format."""
+        return {}
+
+    def not_in_own_files(self) -> tuple[str, ...]:
+        """What those files cannot hold, or hold a little differently, one line each."""
+        return ()
 
     # -- what it is made of ---------------------------------------------------------------
 

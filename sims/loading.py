@@ -21,13 +21,16 @@ from sims.simulator import Hold, Simulator
 #: In a list of effects: all that the simulator can host.
 LIBRARY = "library"
 
+#: Files that are a simulator by themselves, and the class that reads them.
+MODEL_FILES = {".xml": "sims.mujoco.MujocoSimulator", ".urdf": "sims.mujoco.MujocoSimulator"}
+
 
 def load_simulator(source: str | Path | Mapping[str, Any]) -> Simulator:
     """A simulator by its import path, its YAML file, or its ``class_path`` and ``init_args``.
 
     Args:
-        source: ``"sims.pendulum.Pendulum"``, a file such as ``"corrected.yaml"``, or what such a
-            file holds.
+        source: ``"sims.pendulum.Pendulum"``, a file such as ``"corrected.yaml"``, what such a
+            file holds, or a robot's ``.xml`` (MJCF) or ``.urdf``.
 
     Raises:
         ValueError: There is no such class or file, it is no simulator, or the settings are wrong.
@@ -39,6 +42,17 @@ def simulator_settings(source: str | Path | Mapping[str, Any]) -> dict[str, Any]
     """``class_path`` and ``init_args`` of what ``load_simulator`` makes, defaults filled in."""
     text = _parser().dump(_parsed(source), format="yaml", skip_unset=False)
     return yaml.safe_load(text)["simulator"]
+
+
+def model_settings(path: str | Path) -> dict[str, Any] | None:
+    """``class_path`` and ``init_args`` for a robot's model file; None for any other.
+
+    The path is made absolute, so that what is saved loads from any folder.
+    """
+    kind = MODEL_FILES.get(Path(path).suffix.lower())
+    if kind is None:
+        return None
+    return {"class_path": kind, "init_args": {"model": str(Path(path).expanduser().resolve())}}
 
 
 def with_effects(
@@ -195,7 +209,9 @@ def _parser() -> jsonargparse.ArgumentParser:
 
 def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
     # A copy, since the parser changes nested lists of what it is given.
-    value = copy.deepcopy(dict(source)) if isinstance(source, Mapping) else str(source)
+    value: Any = copy.deepcopy(dict(source)) if isinstance(source, Mapping) else str(source)
+    if isinstance(value, str):
+        value = model_settings(value) or value
     try:
         return _parser().parse_object({"simulator": value})
     except (jsonargparse.ArgumentError, TypeError) as error:

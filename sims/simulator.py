@@ -112,6 +112,13 @@ class Simulator(abc.ABC):
     action_channels: tuple[Channel, ...]
     parameters: Mapping[str, Parameter]
 
+    def __repr__(self) -> str:
+        states, actions = (
+            ", ".join(channel.name for channel in channels[:6])
+            for channels in (self.state_channels, self.action_channels)
+        )
+        return f"{type(self).__name__}({states}; {actions}; every {self.dt:g} s)"
+
     @abc.abstractmethod
     def step(self, states: ArrayLike, actions: ArrayLike) -> Array:
         """Advance every row by one control period ``dt``.

@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from simgap_files import atomic_write_json, atomic_write_text, read_json
 from studies.running.command import Parser, fail
-from studies.running.files import atomic_write_json, atomic_write_text, read_json
 from studies.timing.fit_scaling import write_figure
 from studies.timing.tables import SCALING, records, tables
 
@@ -66,6 +66,11 @@ def build_parser() -> Parser:
     parser.add_argument(
         "--quick", action="store_true",
         help="leave out what takes longest: many points, scikit-learn's Gaussian process at 3750",
+    )  # fmt: skip
+    parser.add_argument(
+        "--mujoco", action="store_true",
+        help="MuJoCo models instead: speed beside mujoco.rollout, and find_gap beside MuJoCo's own "
+        "system identification (extra mujoco[sysid])",
     )  # fmt: skip
     parser.add_argument("--read", type=str | None, help="tables of this JSON; measure nothing")
     parser.add_argument("--json", type=str | None, help="keep what was measured in this file")
@@ -127,6 +132,9 @@ def document(data: Mapping[str, Any], figure: bool = False) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command; its exit code is 1 if a benchmark failed."""
     given = build_parser().parse_args(arguments)
+    if given.mujoco:
+        robots(given.output)
+        return
     try:
         data, complete = measure(given.quick) if not given.read else (read_json(given.read), True)
         found = records(data)
@@ -144,6 +152,26 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not complete:
         sys.stderr.write("error: some benchmarks failed: the tables hold the others\n")
         raise SystemExit(1)
+
+
+def robots(output: str | None) -> None:
+    """Measure MuJoCo models and print the page; see ``studies.robots``."""
+    try:
+        from studies.robots import beside, speed
+
+        found = speed.table(speed.speeds())
+        rivals = beside.table(lambda text: print(text, file=sys.stderr, flush=True))
+    except ImportError as problem:
+        fail(f"{problem}; the comparison needs pip install 'simgap[mujoco]' 'mujoco[sysid]'")
+    page = (
+        "# MuJoCo models\n\nMeasured by `python -m studies.benchmarks --mujoco`.\n\n"
+        "Control steps per second, 1024 rows (own masses and dampings in each row, or alike):\n\n"
+        f"{found}\n\nOn the same logs (three records of 7.5 s at 100 Hz, encoders 0.5 mrad, no "
+        f"rates; errors over 0.3 s on a fourth):\n\n{rivals}\n"
+    )
+    print(page)
+    if output:
+        atomic_write_text(output, page)
 
 
 def measure(quick: bool) -> tuple[dict[str, Any], bool]:

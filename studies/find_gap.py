@@ -28,6 +28,7 @@ from jsonargparse.typing import PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
 from residual.logs import LogData, LogFormat, read_logs
+from residual.step_check import advice
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
@@ -43,8 +44,8 @@ class GapStudy:
     """What the answer depends on.
 
     Args:
-        simulator: The nominal simulator: an import path, or a YAML file with class_path and
-            init_args.
+        simulator: The nominal simulator: an import path, a robot's model (.xml, .urdf), or a YAML
+            file with class_path and init_args.
         columns: Which column of the logs holds what: settings, or a YAML file of them. By
             default columns are named like the simulator's channels.
         tolerance: Forecast error that does not matter, in the unit of the first measured
@@ -79,7 +80,7 @@ def build_parser() -> Parser:
         type=str,
         nargs="+",
         required=True,
-        help="Log files: CSV and other text, Parquet, NPZ.",
+        help="Logs: CSV and other text, Parquet, NPZ, MCAP, HDF5, folders of LeRobot or Minari.",
     )
     parser.add_argument(
         "--held-out",
@@ -148,6 +149,8 @@ def run(
     count = len(data.trajectories)
     tell(f"{count} {'trajectory' if count == 1 else 'trajectories'}, {rows} samples")
     for line in found_in_data([*data.findings, *(held.findings if held else ())]):
+        tell(line)
+    for line in advice(simulator, data.trajectories):
         tell(line)
     result = find_gap(
         simulator,
@@ -239,6 +242,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         fail(str(error))
     print(f"\n{summary(result, settings['tolerance'])}\n\nreport:              {output / REPORT}")
     print(f"corrected simulator: {output / CORRECTED}")
+    for name in result.corrected.own_files():
+        print(f"corrected model:     {output / name}")
+    for line in result.corrected.not_in_own_files():
+        print(f"  only in {CORRECTED}: {line}")
 
 
 _FIELDS = tuple(field.name for field in dataclasses.fields(GapStudy))

@@ -11,60 +11,29 @@ goes, and what as much training without a difference model brings.
   python -m studies.leo_gap --corrected results/leo_named/corrected.yaml --budget.iterations 0
   python -m studies.leo_gap --config studies/configs/leo_table.yaml --jobs 2
 
-A killed run continues where it stopped when the same command is given again.
+A killed run continues where it stopped when the same command is given again. A system of your
+own: python -m studies.learn --help.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-import numpy as np
+from collections.abc import Sequence
 
 from policy.config import DDPGConfig
-from policy.evaluate import Rollout
-from sims.leo import Leo, Walking, measure_walk
-from sims.leo.body import clearance
-from sims.simulator import Array, Simulator
+from sims.system import System
 from studies.learning.budget import Budget
 from studies.learning.command import run_command
-from studies.learning.earlier import ReplayRule
-from studies.learning.problem import PolicyTests, Problem
 from studies.learning.settings import build_parser as parser_of
-from studies.learning.steps import visited
-from studies.learning.study import GapStudy, GapTrial
-from studies.leo.report import policy_table, write_report
-from studies.leo.tables import write_grid_report
+from studies.learning.study import Study, Trial
+from studies.learning.warm_start import ReplayRule
 from studies.running.command import Parser
-
-# Learning curves jump by hundreds between tests, so every test is several walks, and of the three
-# policies that walked best on their own model the one is kept that walks best from other starts.
-TESTS = PolicyTests(
-    every=2500,
-    every_true=2500,
-    episodes=3,
-    noisy=2,
-    finalists=3,
-    final_episodes=8,
-    true_episodes=5,
-    visited_seconds=4.0,
-    visited_rollouts=5,
-    visited_stride=5,
-)
-
-# With the pendulum's 0.20 nothing walked within 60 000 steps (docs/deviations.md).
-COLD_SIGMA = 0.15
+from studies.systems.leo import SYSTEM
 
 
 @dataclasses.dataclass(frozen=True)
-class LeoTrial(GapTrial):
-    """One trial: everything that its result depends on.
-
-    Args:
-        simulator: The simulator at hand instead of the idealised Leo: a class path, or a YAML
-            file such as the corrected.yaml of find_gap.
-    """
+class LeoTrial(Trial):
+    """One trial: everything that its result depends on."""
 
     budget: Budget = dataclasses.field(
         default_factory=lambda: Budget(
@@ -81,72 +50,14 @@ class LeoTrial(GapTrial):
     ddpg: DDPGConfig = dataclasses.field(default_factory=lambda: DDPGConfig(action_layer=2))
     # With the paper's rule walks collapse at every update before they recover.
     replay: ReplayRule = "all"
-    simulator: Simulator | None = None
 
 
-def problem(trial: LeoTrial, description: Mapping[str, Any]) -> Problem:
-    """Walking with a heavier torso and friction in the joints."""
-    return Problem(
-        description={
-            **description,
-            "tests": dataclasses.asdict(TESTS),
-            "cold_sigma": COLD_SIGMA,
-        },
-        idealised=trial.simulator or Leo(),
-        true=Leo.true(),
-        task=Walking(start_at="around"),
-        tests=TESTS,
-        measures=walk_measures,
-        cold_sigma=COLD_SIGMA,
-        elsewhere=random_poses,
-    )
+def system_of(trial: LeoTrial) -> System:
+    """The system of a trial."""
+    return SYSTEM
 
 
-def random_poses(
-    rng: np.random.Generator, rollouts: int = 60, steps: int = 12
-) -> tuple[Array, Array]:
-    """Rollouts of the true Leo from random poses close above the ground, under random voltages.
-
-    Returns:
-        States (rollouts, steps + 1, 18) and actions (rollouts, steps, 6).
-    """
-    leo = Leo.true()
-    scales = np.array([channel.scale for channel in leo.state_channels])
-    starts = rng.uniform(-scales, scales, (rollouts, len(scales)))
-    starts[:, 0] = 0.0
-    starts[:, 5:7] = -np.abs(starts[:, 5:7])  # knees bend one way
-    starts[:, 1] = rng.uniform(0.0, 0.02, rollouts)
-    starts[:, 1] -= clearance(np.where(np.arange(9) == 1, 0.0, starts[:, :9])).min(axis=1)
-    volts = np.array([channel.high for channel in leo.action_channels])
-    actions = rng.uniform(-volts, volts, (rollouts, steps, len(volts)))
-    return leo.rollout(starts, actions), actions
-
-
-def walk_measures(run: Rollout) -> dict[str, float]:
-    """Distance in m, time in s, whether it fell, and both readings of the work in J/m.
-
-    A walk that leads nowhere has no work per metre: NaN.
-    """
-    walk = measure_walk(visited(run), run.actions)
-    metres = walk.distance if walk.distance > 0 else np.nan
-    return {
-        "distance": walk.distance,
-        "seconds": walk.time,
-        "fell": float(walk.fell),
-        "work_per_metre": walk.work / metres,
-        "bare_work_per_metre": walk.work_without_gear / metres,
-    }
-
-
-STUDY = GapStudy(
-    system="leo",
-    description=__doc__,
-    trial=LeoTrial,
-    problem=problem,
-    table=policy_table,
-    report=write_report,
-    grid_report=write_grid_report,
-)
+STUDY = Study("leo_gap", __doc__, LeoTrial, system_of)
 
 
 def build_parser() -> Parser:

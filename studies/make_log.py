@@ -24,9 +24,9 @@ from jsonargparse.typing import PositiveInt
 
 from sims.pendulum import IDEALISED_MASS, TRUE_MASS
 from studies.hidden.data import Truth, make_logs
-from studies.leo.logs import write_walks
 from studies.running.command import HelpFormatter, Parser, fail
 from studies.running.logs import write_log
+from studies.walks import write_walks
 
 HIDDEN = Truth(mass=TRUE_MASS / IDEALISED_MASS - 1)
 
@@ -40,7 +40,9 @@ def build_parser() -> Parser:
     parser.add_argument(
         "--system", choices=("pendulum", "leo"), default="pendulum", help="What is measured."
     )
-    parser.add_argument("--policy", type=Path, help="Leo: an agent that walks.")
+    parser.add_argument(
+        "--policy", type=str, help="Leo: a policy that walks, a file or an import path."
+    )
     parser.add_argument("--seed", type=int, default=0, help="Of motion and noise.")
     parser.add_function_arguments(write_logs, skip={"folder", "seed"})
     parser.add_function_arguments(write_walks, "walk", skip={"folder", "policy", "seed"})

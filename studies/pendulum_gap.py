@@ -12,61 +12,41 @@ policies and models in the output folder.
   python -m studies.pendulum_gap --config studies/configs/budgets.yaml --jobs 2
 
 Any scikit-learn regressor can be named by its import path, your own included. A killed run
-continues where it stopped when the same command is given again.
+continues where it stopped when the same command is given again. A system of your own:
+python -m studies.learn --help.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-from sims.pendulum import Pendulum
-from sims.simulator import Simulator
-from sims.tasks import SwingUp
+from sims.system import System
 from studies.learning.command import run_command
-from studies.learning.problem import Problem
 from studies.learning.settings import build_parser as parser_of
-from studies.learning.study import GapStudy, GapTrial
-from studies.pendulum.report import policy_table, write_report
-from studies.pendulum.tables import write_grid_report
+from studies.learning.study import Study, Trial
 from studies.running.command import Parser
+from studies.systems.pendulum import pendulum
 
 
 @dataclasses.dataclass(frozen=True)
-class PendulumTrial(GapTrial):
+class PendulumTrial(Trial):
     """One trial: everything that its result depends on.
 
     Args:
         inertia_follows_mass: Let the true pendulum's inertia grow with its mass; the authors'
             code, and the default here, keeps it.
-        simulator: The simulator at hand instead of the idealised pendulum: a class path, or a
-            YAML file such as the corrected.yaml of find_gap.
     """
 
     inertia_follows_mass: bool = False
-    simulator: Simulator | None = None
 
 
-def problem(trial: PendulumTrial, description: Mapping[str, Any]) -> Problem:
-    """Swing-up on a pendulum that is heavier than the idealised one."""
-    return Problem(
-        description=description,
-        idealised=trial.simulator or Pendulum(),
-        true=Pendulum.true(inertia_follows_mass=trial.inertia_follows_mass),
-        task=SwingUp(),
-    )
+def system_of(trial: PendulumTrial) -> System:
+    """The system of a trial."""
+    return pendulum(trial.inertia_follows_mass)
 
 
-STUDY = GapStudy(
-    system="pendulum",
-    description=__doc__,
-    trial=PendulumTrial,
-    problem=problem,
-    table=policy_table,
-    report=write_report,
-    grid_report=write_grid_report,
-)
+STUDY = Study("pendulum_gap", __doc__, PendulumTrial, system_of)
 
 
 def build_parser() -> Parser:

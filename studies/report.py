@@ -15,9 +15,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from simgap_files import read_json
 from studies.learning import command
 from studies.running.command import HelpFormatter, Parser, fail
-from studies.running.files import read_json
 from studies.running.trials import PLAN
 
 

@@ -16,11 +16,11 @@ from residual.gap.search import Key, Search
 #: Part of the remaining error that an effect must take off: over all joints, or at one of several.
 MATERIAL, AT_ONE = 0.2, 1 / 3
 #: And of the nominal error.
-TRIFLE = 0.02
+TRIFLE = 0.005
 #: Forecasts so many times as bad are not as good, whatever the chance is.
 NEAR = 1.5
-#: Differences of relative errors below this are none.
-SAME = 0.01
+#: Differences of relative errors below this are none, nor such below a part of the best error.
+SAME, ALIKE = 0.01, 0.1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,10 +83,10 @@ def _smaller(search: Search, key: Key, among: list[Key]) -> list[Key]:
 
 
 def as_good(search: Search, key: Key, best: Key) -> bool:
-    """Whether a set forecasts as well as the best: within a standard error, or a hundredth."""
+    """Whether a set forecasts as well as the best: within a standard error, or next to it."""
     squares = search.validated
     more, error = search.currency.difference(squares[key].squares, squares[best].squares)
-    return more <= max(error, SAME)
+    return more <= max(error, min(SAME, ALIKE * search.error(best)))
 
 
 def material(search: Search, smaller: Key, larger: Key) -> bool:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.beam import run
 from residual.gap.candidates import Candidate
 from residual.gap.choice import Choice, choose, reasons
 from residual.gap.fitting import Fit, Fitter, Left
@@ -92,11 +93,11 @@ def explain(
     key: Key = ()
     for _ in range(ROUNDS):
         search = Search(simulator, pool, fitter, effort, tell, until)
-        search.run(seeds)
+        run(search, seeds)
         key = _best_explained(search)
         fresh, floor = weigh(fitter, search.tried[key])
         ratio = fresh.sigma / fitter.sigma
-        if (ratio > 1 / WORTH).all() and (ratio < WORTH).all():
+        if search.late or ((ratio > 1 / WORTH).all() and (ratio < WORTH).all()):
             break
         best = sorted(search.usable(), key=search.error)[:SEEDS]
         seeds = {k: search.tried[k].theta for k in {*best, key} if k}

@@ -2,34 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.aliases import aliases, hidden
+from residual.gap.aliases import aliases
+from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
 from residual.gap.candidates import candidates
-from residual.gap.confirmation import Claim, claims, share
 from residual.gap.data import examine
-from residual.gap.explain import FOOTNOTE, Explanation, explain
-from residual.gap.forecasts import gap, held_out, noise_floor, rollouts
+from residual.gap.explain import Explanation, explain
 from residual.gap.horizon import usual_horizon
-from residual.gap.model import Model
-from residual.gap.numerics import better_hold, other_numerics
+from residual.gap.numerics import fits_better, forecast_error, held_as, held_otherwise, how_held
 from residual.gap.prepare import Prepared, prepare
-from residual.gap.result import Blind, Gap, GapResult, Rival, Verdict
-from residual.gap.search import Key
-from residual.gap.verdicts import (
-    blind_verdict,
-    dependent,
-    effect_verdict,
-    minor_verdict,
-    nameable,
-    no_gap_verdict,
-    remainder_verdict,
-)
+from residual.gap.result import GapResult
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
@@ -101,25 +88,39 @@ def find_gap(
     for says in quality:
         tell(says)
     horizon = horizon or usual_horizon(simulator, runs)
-    with workers(n_jobs):
-        simulator, held_how = better_hold(simulator, runs, horizon, hold)
-        quality += held_how
-        prepared = prepare(simulator, runs, horizon)
-        groups, sets = aliases(simulator, offered)
-        kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
-        pool = prepared.pool(candidates(simulator, kept, prepared.fitter.samples))
-        clock.lap("read")
+    kept = _asked(simulator, offered)
+
+    def explained(simulator: HostSimulator) -> tuple[Prepared, Explanation]:
+        ready = prepare(simulator, runs, horizon)
+        pool = ready.pool(candidates(simulator, kept, ready.fitter.samples))
         tell(
-            f"{len(prepared.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s, "
+            f"{len(ready.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s, "
             f"{len(pool)} candidate effects"
         )
-        found = explain(
-            simulator, pool, prepared.fitter, prepared.floor, prepared.weigh,
-            prepared.effort, tell, until,
-        )  # fmt: skip
+        return ready, explain(
+            simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, tell, until
+        )
+
+    with workers(n_jobs):
+        simulator = held_as(simulator, hold)
+        clock.lap("read")
+        prepared, found = explained(simulator)
+        other = held_otherwise(simulator) if hold is None else None
+        if other is not None and fits_better(found.search, found.key, other):
+            tell("inputs held the other way fit better: once more so")
+            again = explained(other)
+            if forecast_error(again[1].search, again[1].key) < forecast_error(
+                found.search, found.key
+            ):
+                prepared, found = again
+                quality.append(
+                    f"inputs were taken to {how_held(other)}: the data fit better so; set hold to "
+                    "say otherwise"
+                )
         clock.lap("search")
         tell("confirming")
-        answer = confirm(found, prepared, groups)
+        groups, sets = aliases(simulator, offered)
+        answer = confirm(found, groups, matters(found, tolerance))
         clock.lap("confirm")
         table = summed_up(answer)
         apart = None
@@ -127,6 +128,12 @@ def find_gap(
             apart = judged_apart(answer, prepared, examine(simulator, held).trajectories, table)
         clock.lap("forecast")
     return told(answer, table, apart, sets, tolerance, quality, clock.laps)
+
+
+def _asked(simulator: HostSimulator, offered: Sequence[Effect]) -> list[Effect]:
+    """The first of every group of effects that make the same motion."""
+    groups, _ = aliases(simulator, offered)
+    return [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
 
 
 class Clock:
@@ -141,146 +148,3 @@ class Clock:
         now = time.perf_counter()
         self.laps[stage] = now - self._last
         self._last = now
-
-
-@dataclasses.dataclass(frozen=True)
-class Answer:
-    """What stays after confirmation.
-
-    Attributes:
-        found: Search and choice.
-        key: What goes into the corrected simulator: chosen effects that can be named.
-        claims: What bears on each of them.
-        leads: Chosen effects that could be too many others.
-    """
-
-    found: Explanation
-    key: Key
-    claims: tuple[Claim, ...]
-    leads: tuple[str, ...]
-
-
-def confirm(found: Explanation, prepared: Prepared, groups: dict[str, tuple[str, ...]]) -> Answer:
-    """Claims of the chosen effects; what cannot be named is left out, and the rest asked again."""
-    search, key = found.search, found.key
-    leads: tuple[str, ...] = ()
-    while True:
-        fit = search.tried[key]
-        slack = search.fitter.tie(search.tried[()]) if found.adequate else OTHER_HOLD * fit.merit
-        numerics = other_numerics(search, key, slack) if key else []
-        made = claims(search, key, found.adequate, groups, numerics)
-        blocks = len(search.fitter.blocks)
-        lost = [claim for claim in made if not nameable(search, claim, blocks)]
-        if not lost:
-            return Answer(found, key, tuple(made), leads)
-        # The one that matters least goes first: what is left may have fewer rivals.
-        gone = lost[-1].number
-        leads = (search.candidates[gone].label, *leads)
-        key, theta = search.merged(key, (), drop=(gone,))
-        search.add({key: theta})
-        search.add_exchanged(key, 3)
-
-
-def summed_up(answer: Answer) -> Gap:
-    """The table of errors."""
-    found, search = answer.found, answer.found.search
-    floor = noise_floor(search.fitter, search.tried[answer.key], found.floor.sigma)
-    left = search.fitter.left(search.tried[answer.key], found.floor)
-    order = [claim.number for claim in answer.claims]
-    return gap(search, answer.key, order, floor, (found.nominal_left.ratio, left.ratio))
-
-
-def judged_apart(answer: Answer, prepared: Prepared, runs: Sequence[Trajectory], table: Gap) -> Gap:
-    """The same table for records that were set aside."""
-    search = answer.found.search
-    other = prepare(search.simulator, runs, prepared.horizon).fitter
-    other = other.weighed_like(search.fitter)
-    fits = []
-    for key in ((), answer.key):
-        model = Model(search.model(key).bind(search.tried[key].theta))
-        fits.append(other.fit(model, np.zeros(0)))
-    floor = noise_floor(other, fits[1], answer.found.floor.sigma)
-    return held_out(table, other, fits[0], fits[1], floor)
-
-
-def told(
-    answer: Answer, table: Gap, apart: Gap | None, sets: Sequence[tuple[str, ...]],
-    tolerance: float | None, quality: Sequence[str], seconds: dict[str, float],
-) -> GapResult:  # fmt: skip
-    """Everything as plain data."""
-    found, search, key = answer.found, answer.found.search, answer.key
-    fitter, simulator = search.fitter, search.simulator
-    fit = search.tried[key]
-    corrected = fit.model.bind(fit.theta)
-    measured = [simulator.physical_channels[c] for c in fitter.samples.measured]
-    blind: tuple[Blind, ...] = ()
-    if found.adequate:
-        blind = hidden(search.signatures(key), search.candidates, key, found.needed)
-    where = fitter.where(search.tried[()], found.floor)
-    return GapResult(
-        verdicts=tuple(verdicts(answer, table, sets, tolerance, blind)),
-        gap=table,
-        held_out=apart,
-        where=where,
-        evidence=evidence(answer),
-        rollouts=rollouts(search, search.validated[()], search.validated[key]),
-        effects=tuple(corrected.effects[len(simulator.effects) :]),
-        corrected=corrected,
-        channels=tuple((channel.name, channel.unit) for channel in measured),
-        noise={
-            channel.name: (float(s), float(e))
-            for channel, s, e in zip(measured, found.floor.sigma, found.floor.error, strict=True)
-        },
-        quality=tuple(quality),
-        blind=blind,
-        adequate=found.adequate,
-        seconds=seconds,
-    )
-
-
-def verdicts(
-    answer: Answer, table: Gap, sets: Sequence[tuple[str, ...]], tolerance: float | None,
-    blind: Sequence[Blind],
-) -> list[Verdict]:  # fmt: skip
-    """All verdicts, most important first."""
-    found, search = answer.found, answer.found.search
-    labels = [search.candidates[claim.number].label for claim in answer.claims]
-    blocks = len(search.fitter.blocks)
-    made: list[Verdict] = []
-    for claim, label in zip(answer.claims, labels, strict=True):
-        made.append(effect_verdict(search, claim, blocks, *dependent(label, labels, sets)))
-    left = search.fitter.left(search.tried[answer.key], found.floor)
-    if tolerance is not None and table.before.value <= tolerance:
-        made.insert(
-            0,
-            no_gap_verdict(
-                f"nothing that matters: the {table.horizon_s:.3g} s error is "
-                f"{table.before.value:.3g} {table.unit}, within the tolerance of {tolerance:.3g}"
-            ),
-        )
-    elif not answer.key and left.adequate:
-        made.append(no_gap_verdict("no gap above noise"))
-    elif not left.adequate and left.ratio > FOOTNOTE:
-        made.append(remainder_verdict(left, table, answer.leads))
-    for number, with_it in found.choice.minor.items():
-        if number not in answer.key:
-            made.append(minor_verdict(search, number, share(search, with_it, number)))
-    if blind:
-        made.append(blind_verdict(blind))
-    return made
-
-
-def evidence(answer: Answer) -> tuple[Rival, ...]:
-    """What was tried, the chosen set first, then by error."""
-    search, found = answer.found.search, answer.found
-    reasons = found.choice.reasons
-    if found.key != answer.key:
-        reasons = {**reasons, found.key: "holds effects that too many others could replace"}
-    rows = [
-        Rival(
-            search.labels(key), search.error(key), key == answer.key,
-            "" if key == answer.key else reasons.get(key, "tried against the chosen ones"),
-        )
-        for key in search.tried
-    ]  # fmt: skip
-    return tuple(sorted(rows, key=lambda row: (not row.chosen, row.error))[:EVIDENCE])

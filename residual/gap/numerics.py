@@ -79,38 +79,43 @@ def enough_substeps(
     return most
 
 
-def better_hold(
-    simulator: HostSimulator, trajectories: Sequence[Trajectory], horizon: float,
-    hold: Hold | Mapping[str, Hold] | None,
-) -> tuple[HostSimulator, list[str]]:  # fmt: skip
-    """The simulator with its inputs held as given, or as the nominal simulator fits better.
-
-    Returns:
-        The simulator, and what there is to say of it.
-    """
+def held_as(simulator: HostSimulator, hold: Hold | Mapping[str, Hold] | None) -> HostSimulator:
+    """The simulator with its inputs held as given, or as its channels say."""
+    if hold is None:
+        return simulator
     names = [channel.name for channel in simulator.action_channels]
-    if hold is not None:
-        wanted = hold if isinstance(hold, Mapping) else dict.fromkeys(names, hold)
-        return simulator.with_hold(wanted), []
-    if not names or simulator.has_contacts:
-        return simulator, []
-    from residual.gap.prepare import smooth_fitter
+    return simulator.with_hold(hold if isinstance(hold, Mapping) else dict.fromkeys(names, hold))
 
-    other = simulator.with_hold(
+
+def held_otherwise(simulator: HostSimulator) -> HostSimulator | None:
+    """The simulator with all inputs held the other way; None if that is no question."""
+    if not simulator.action_channels or simulator.has_contacts:
+        return None
+    return simulator.with_hold(
         {c.name: "zero" if c.hold == "linear" else "linear" for c in simulator.action_channels}
     )
-    fitter, _ = smooth_fitter(simulator, trajectories, horizon)
-    own, its = (fitter.fit(Model(s), np.zeros(0)).loss for s in (simulator, other))
-    gained = own - its
-    error = float(gained.std(ddof=1) * np.sqrt(len(gained))) if len(gained) > 1 else np.inf
-    if gained.sum() < max(CLEARER * own.sum(), 3 * error):
-        return simulator, []
-    kinds = {"linear": "run straight from sample to sample", "zero": "are held between samples"}
-    kind = kinds[other.action_channels[0].hold]
-    return other, [
-        f"inputs were taken to {kind}: the nominal simulator fits better so; set hold to say "
-        "otherwise"
-    ]
+
+
+def how_held(simulator: HostSimulator) -> str:
+    """How the inputs run between samples, in words."""
+    if simulator.action_channels[0].hold == "linear":
+        return "run straight from sample to sample"
+    return "be held between samples"
+
+
+def fits_better(search: Search, key: Key, other: HostSimulator) -> bool:
+    """Whether the chosen set fits clearly better on a simulator with inputs held otherwise."""
+    fitter, fit = search.fitter, search.tried[key]
+    again = fitter.fit(Model(other, fit.model.chosen), fit.theta)
+    gained = fit.merit - again.merit
+    return gained > max(CLEARER * fit.merit, fitter.tie(search.tried[()]))
+
+
+def forecast_error(search: Search, key: Key) -> float:
+    """Cross-validated forecast error in units of the spread of each channel, all averaged."""
+    samples = search.fitter.samples
+    spread = np.nanvar(samples.seen[:, samples.measured], axis=0)
+    return float(np.nanmean(search.validated[key].squares / np.maximum(spread, 1e-300)))
 
 
 def other_numerics(search: Search, key: Key, tie: float) -> list[Array]:
@@ -125,11 +130,8 @@ def other_numerics(search: Search, key: Key, tie: float) -> list[Array]:
     """
     fitter, fit = search.fitter, search.tried[key]
     found = [fitter.halved().fit(fit.model, fit.theta, fit).theta]
-    simulator = search.simulator
-    if simulator.action_channels and not simulator.has_contacts:
-        flipped = simulator.with_hold(
-            {c.name: "zero" if c.hold == "linear" else "linear" for c in simulator.action_channels}
-        )
+    flipped = held_otherwise(search.simulator)
+    if flipped is not None:
         other = fitter.fit(Model(flipped, fit.model.chosen), fit.theta)
         if other.merit - fit.merit < tie:
             found.append(other.theta)

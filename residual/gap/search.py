@@ -19,7 +19,7 @@ from residual.gap.currency import Currency, groups
 from residual.gap.fitting import Fit, Fitter
 from residual.gap.model import Model
 from residual.gap.plausible import absurd
-from residual.gap.screening import Gain, Signatures, gains, pair_gains, signatures, trials
+from residual.gap.screening import Signatures, gains, signatures, trials
 from residual.gap.validation import Validated, validate
 from sims.host import HostSimulator
 
@@ -120,6 +120,10 @@ class Search:
         """The set that forecasts best."""
         return min(self.usable(), key=self.error)
 
+    def sound(self, key: Key) -> bool:
+        """Whether a fitted set converged and may be right."""
+        return key not in self.unfit and key not in self.refused
+
     @property
     def late(self) -> bool:
         """Whether the time for searching is over."""
@@ -157,10 +161,11 @@ class Search:
         for key, theta in proposals.items():
             if key in self.tried:
                 continue
+            name = " + ".join(self.labels(key))
+            self.tell(f"  trying {name}")
             self.fit(key, theta)
             fresh.append(key)
-            error = 100 * self.error(key)
-            self.tell(f"  {' + '.join(self.labels(key))}: {error:.3g} % of the error")
+            self.tell(f"  {name}: {100 * self.error(key):.3g} % of the error")
         return fresh
 
     def fit(self, key: Key, theta: Array) -> None:
@@ -252,105 +257,3 @@ class Search:
     def place(self, number: int) -> str:
         """The joint, actuator, channel or parameter of a candidate."""
         return self.candidates[number].effect.where
-
-    # -- growing --------------------------------------------------------------------------
-
-    def run(self, seeds: Proposals | None = None) -> Key:
-        """Grow sets until one more effect no longer pays; returns the one that forecasts best."""
-        effort = self.effort
-        self.add(seeds or {})
-        frontier: list[Key] = [()]
-        reached = 1.0
-        for level in range(1, effort.most + 1):
-            fresh: list[Key] = []
-            for key in frontier:
-                grown = self.grow(key)
-                fresh += grown + self.together(key, grown)
-            if not fresh or self.late:
-                break
-            by_merit = sorted(fresh, key=lambda k: self.tried[k].merit)[: effort.beam]
-            by_error = sorted(fresh, key=self.error)[:1]
-            frontier = list(dict.fromkeys([*by_error, *by_merit]))
-            now = self.error(by_error[0])
-            if level > 1 and not self._pays(by_error[0], reached):
-                break
-            reached = min(reached, now)
-        return self.best()
-
-    def _pays(self, key: Key, reached: float) -> bool:
-        """Whether a set is clearly better than what was reached, in all or in one joint."""
-        if self.error(key) < (1 - self.effort.stale) * reached:
-            return True
-        before = min((k for k in self.usable() if len(k) < len(key)), key=self.error)
-        own = self.currency.by_group(self.validated[key].squares)
-        its = self.currency.by_group(self.validated[before].squares)
-        return bool((own < (1 - 2 * self.effort.stale) * its).any())
-
-    def grow(self, key: Key) -> list[Key]:
-        """Fit sets one effect larger than a fitted one, the best of the linear screen for each
-        joint; those that turn out absurd are replaced by the next."""
-        around = self.signatures(key)
-        places = self.currency.groups
-        total = self.effort.grown if key else self.effort.singles
-        wanted = max(2, -(-total // len(places)))
-        found: list[Key] = []
-        for group in places:
-            good = 0
-            for gain in self._by_gain(around, group)[: 3 * wanted]:
-                if self.late:
-                    break
-                number = around.variants[gain.variants[0]].candidate
-                fresh, theta = self.merged(key, [(number, gain.values[0])])
-                if number in key or gain.value <= 0 or not self.fits_in(fresh):
-                    continue
-                if fresh not in found:
-                    self.add({fresh: theta})
-                    if fresh in self.tried and self.usable_set(fresh):
-                        found.append(fresh)
-                good += fresh in found
-                if good >= wanted:
-                    break
-        if not key:
-            for pair in pair_gains(around, self.effort.pairs):
-                numbers = [around.variants[v].candidate for v in pair.variants]
-                fresh, theta = self.merged(key, zip(numbers, pair.values, strict=True))
-                self.add({fresh: theta})
-                if fresh in self.tried and self.usable_set(fresh):
-                    found.append(fresh)
-        return list(dict.fromkeys(found))
-
-    def usable_set(self, key: Key) -> bool:
-        """Whether a fitted set converged and may be right."""
-        return key not in self.unfit and key not in self.refused
-
-    def together(self, key: Key, grown: list[Key]) -> list[Key]:
-        """The set with the best addition for every joint at once, if several joints gain."""
-        if len(self.currency.groups) < 2:
-            return []
-        base = self.currency.by_group(self.validated[key].squares)
-        additions: dict[int, Array] = {}
-        for group in range(len(base)):
-            best, reached = None, (1 - 2 * self.effort.stale) * base[group]
-            for fresh in grown:
-                if len(fresh) != len(key) + 1:
-                    continue
-                error = self.currency.by_group(self.validated[fresh].squares)[group]
-                if error < reached:
-                    best, reached = fresh, error
-            if best is not None:
-                (number,) = set(best) - set(key)
-                fit = self.tried[best]
-                additions[number] = fit.theta[fit.model.owner == best.index(number)]
-        fresh, theta = self.merged(key, additions.items())
-        if len(additions) < 2 or not self.fits_in(fresh):
-            return []
-        self.add({fresh: theta})
-        return [fresh] if fresh in self.tried and self.usable_set(fresh) else []
-
-    def _by_gain(self, around: Signatures, group: tuple[int, ...]) -> list[Gain]:
-        """Gains counted on the channels of one joint."""
-        if len(self.currency.groups) < 2:
-            return gains(around)
-        measured = len(self.fitter.samples.measured)
-        rows = np.isin(np.arange(len(around.residual)) % measured, group)
-        return gains(around, around.residual[rows], around.matrix[rows])

@@ -25,7 +25,9 @@ def families(search: Search, claim: Claim) -> set[str]:
     """
     numbers = {candidate.label: i for i, candidate in enumerate(search.candidates)}
     own = search.family(claim.number) or search.candidates[claim.number].label
-    return {own} | {search.family(numbers[label]) or label for label in claim.rivals}
+    # A rival that was not offered has a label only.
+    known = [search.family(numbers[label]) if label in numbers else "" for label in claim.rivals]
+    return {own} | {family or label for family, label in zip(known, claim.rivals, strict=True)}
 
 
 def effect_verdict(

@@ -42,7 +42,7 @@ def read_table(
     if suffix not in TEXT + PARQUET + NPZ:
         raise LogError(
             f"unknown kind of file {path.suffix!r}, expected one of "
-            f"{', '.join(TEXT + PARQUET + NPZ)}",
+            f"{', '.join(TEXT + PARQUET + NPZ)}, .mcap, .h5, .hdf5",
             path,
         )
     try:

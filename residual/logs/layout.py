@@ -39,6 +39,7 @@ class LogFormat:
 
     Args:
         time: Column of the sample times, by default in s.
+        period: Seconds between samples of a log without times, such as a data set of episodes.
         states: Column by state channel; a channel that is left out was not measured. Empty: the
             columns that are named like channels.
         actions: Column by action channel. Empty: the columns that are named like the actions.
@@ -59,6 +60,7 @@ class LogFormat:
     """
 
     time: str | int | Column = "time"
+    period: float | None = None
     states: dict[str, str | int | Column] = dataclasses.field(default_factory=dict)
     actions: dict[str, str | int | Column] = dataclasses.field(default_factory=dict)
     trajectory: list[str | int] = dataclasses.field(default_factory=list)

@@ -1,17 +1,18 @@
-"""Measured logs (CSV and the like, Parquet, NPZ) as trajectories in SI units."""
+"""Measured logs of every kind as trajectories in SI units."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from residual.logs.checks import Finding, Signal, check_plausible, check_rate
-from residual.logs.files import read_table
 from residual.logs.layout import LogFormat, check_layout, named_column
 from residual.logs.runs import runs_of
+from residual.logs.sources import open_log
 from residual.logs.table import LogError
 from residual.logs.timing import Run, report_sampling, tidy
 from residual.trajectories import Trajectory
@@ -27,7 +28,7 @@ class LogData:
 
 
 def read_logs(
-    paths: Sequence[str | Path],
+    paths: Sequence[Any],
     state_channels: Sequence[Channel],
     action_channels: Sequence[Channel],
     columns: LogFormat | None = None,
@@ -39,7 +40,8 @@ def read_logs(
     smoothed.
 
     Args:
-        paths: The files: ``.csv .txt .tsv .dat .log``, ``.parquet .pq`` or ``.npz``.
+        paths: Files (``.csv .txt .tsv .dat .log``, ``.parquet .pq``, ``.npz``, ``.mcap``,
+            ``.h5 .hdf5``), folders of LeRobot and Minari data sets, data frames, or arrays by name.
         state_channels: Of the simulator; those of kind ``"memory"`` are never in a log.
         action_channels: Of the simulator.
         columns: The layout of the files.
@@ -59,12 +61,12 @@ def read_logs(
     runs: list[Run] = []
     # What a broken file makes of its numbers is caught by their checks, not by numpy's warnings.
     with np.errstate(all="ignore"):
-        for path in map(Path, paths):
-            table = read_table(path, columns.delimiter, columns.header, columns.comment)
+        for number, path in enumerate(paths, start=1):
+            table, layout = open_log(path, number, columns, channels, action_channels, findings)
             if table.cut_off:
                 says = "The last row is cut off and was left out."
                 findings.append(Finding("cut_off", str(path), says))
-            runs += runs_of(table, columns, channels, action_channels, findings)
+            runs += runs_of(table, layout, channels, action_channels, findings)
         runs = tidy(
             runs, columns.gap, columns.minimum_samples, findings, [c.name for c in channels]
         )

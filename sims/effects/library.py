@@ -58,7 +58,10 @@ SENSOR_EFFECTS = (SensorOffset, SensorScale)
 
 
 def library(simulator: HostSimulator) -> tuple[Effect, ...]:
-    """Every effect that the simulator can host, at zero strength and with typical shapes."""
+    """Every effect that the simulator offers, at zero strength and with typical shapes."""
+    own = simulator.offered_effects()
+    if own is not None:
+        return own
     places: list[tuple[type[Effect], str]] = []
     for joint in simulator.joints:
         places += [(effect, joint.name) for effect in JOINT_EFFECTS]

@@ -39,7 +39,7 @@ def shrinking(result: GapResult, path: Path) -> Drawing:
         axis.barh(place, span.value, height=0.6, color=ORANGE if place == 0 else BLUE)
         axis.hlines(place, span.low, span.high, color=INK, linewidth=1.3)
         times = span.value / max(gap.noise_floor.value, 1e-300)
-        text = f"{quantity_text(span.value, gap.unit)}, {times:.3g} × noise"
+        text = f"{quantity_text(span.value, gap.unit)}, {float(f'{times:.3g}'):g} × noise"
         inside = span.low > 0.5 * top
         axis.annotate(
             text, (0 if inside else span.high, place), xytext=(7, 0), textcoords="offset points",

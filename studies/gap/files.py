@@ -50,13 +50,12 @@ def write_gap(
     """
     record = gap_record(result, config, findings, seconds)
     with staged(Path(folder)) as stage:
-        inputs = result.corrected.action_channels
-        corrected = corrected_settings(
-            config["simulator"], result.effects, {channel.name: channel.hold for channel in inputs}
-        )
+        corrected = corrected_settings(config["simulator"], result.effects, record["hold"])
         about = "# The simulator with what find_gap added; loadable as --simulator corrected.yaml\n"
         text = yaml.safe_dump(corrected, sort_keys=False)
         atomic_write_text(stage / CORRECTED, about + text)
+        for name, content in result.corrected.own_files().items():
+            (stage / name).write_bytes(content)
         write_report(result, record, stage)
         atomic_write_json(stage / JSON, record)
     return Path(folder)
@@ -75,6 +74,7 @@ def gap_record(
         "verdicts": [dataclasses.asdict(verdict) for verdict in result.verdicts],
         "gap": dataclasses.asdict(result.gap),
         "held_out": dataclasses.asdict(result.held_out) if result.held_out else None,
+        "hold": {channel.name: channel.hold for channel in result.corrected.action_channels},
         "evidence": [dataclasses.asdict(rival) for rival in result.evidence],
         "noise": {
             name: {"value": sigma, "error": error} for name, (sigma, error) in result.noise.items()

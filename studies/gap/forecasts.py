@@ -23,7 +23,7 @@ def tiles(result: GapResult) -> KeyValues:
     gap = result.gap
     items: dict[str, Any] = {}
     if result.effects:
-        items["of the gap has a name"] = percent(gap.share.value)
+        items["of the gap has a name"] = percent(gap.share.value).replace("more than", ">")
     items[f"{ahead(gap)}, nominal"] = quantity_text(gap.before.value, gap.unit)
     if result.effects:
         items[f"{ahead(gap)}, corrected"] = quantity_text(gap.after.value, gap.unit)

@@ -14,6 +14,8 @@ from studies.gap.words import CROSS_VALIDATED, ahead, gap_rows, span_text, unit_
 
 #: Width of the text, and of the column of kinds.
 WIDTH, KIND = 100, 16
+#: Findings of the engine that are repeated below the answer.
+NOTES = 5
 
 
 def summary(result: GapResult, tolerance: float | None = None) -> str:
@@ -46,6 +48,12 @@ def summary(result: GapResult, tolerance: float | None = None) -> str:
     lines.append(f"  {gap.blocks} blocks of data, {gap.folds} groups of them left out in turn")
     if result.held_out:
         lines += ["", *held_out(result.held_out)]
+    if result.quality:
+        lines.append("")
+    for says in result.quality[:NOTES]:
+        lines += wrapped(says, "      ", "note:")
+    if len(result.quality) > NOTES:
+        lines.append(f"      and {len(result.quality) - NOTES} more in the report")
     return "\n".join(lines)
 
 

@@ -14,7 +14,7 @@ from scipy.stats import beta
 
 from studies.hidden.strengths import HIDDEN
 from studies.reporting.figures import new_figure, save_figure, styled
-from studies.reporting.report import Report
+from studies.reporting.page import Report
 from studies.reporting.sections import Code, Figure, Prose, Section, Table
 from studies.running.command import versions
 from studies.running.files import atomic_write_text

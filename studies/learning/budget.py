@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
+from policy.learner import Algorithm
+
 
 @dataclasses.dataclass(frozen=True)
 class Budget:
@@ -19,6 +21,9 @@ class Budget:
         control_steps: Simulated steps of the control for each update; 0 skips it.
         corrected_steps: Simulated steps on the simulator that was corrected by name, if there is
             one.
+
+    Raises:
+        ValueError: A number is too small.
     """
 
     true_samples: int = 3750
@@ -35,3 +40,23 @@ class Budget:
             least = 2 if field.name == "true_samples" else 0
             if (value := getattr(self, field.name)) < least:
                 raise ValueError(f"{field.name} is {value}, expected at least {least}")
+
+    def check(self, algorithm: Algorithm, replay_is_filled: bool, corrected: bool = False) -> None:
+        """Raise ``ValueError`` if a training would end before anything is learnt in it.
+
+        Args:
+            algorithm: Learns nothing before its warm-up is over.
+            replay_is_filled: Whether trainings after the first begin with a full replay.
+            corrected: Whether there is a simulator that was corrected by name.
+        """
+        empty = ["idealised_steps", "true_steps", "baseline_steps"]
+        if not replay_is_filled:
+            empty += ["difference_steps"] if self.iterations else []
+            empty += ["control_steps"] + ["corrected_steps"] * corrected
+        for name in empty:
+            if 0 < getattr(self, name) < algorithm.warm_up:
+                raise ValueError(
+                    f"budget.{name} is {getattr(self, name)}, but the first {algorithm.warm_up} "
+                    "steps only fill the replay and teach nothing: give more steps, or a smaller "
+                    + ("ddpg.warm_up" if algorithm.path == "policy.DDPG" else "learning_starts")
+                )

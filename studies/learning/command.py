@@ -13,24 +13,21 @@ from typing import Any
 
 import yaml
 
-from studies.learning.settings import build_parser, instantiate, resolve, trial_label
-from studies.learning.stages import Stages
-from studies.learning.study import Config, GapStudy
-from studies.learning.trial import run_trial
+from simgap_files import atomic_write_json, atomic_write_text, read_json, remove_partial_files
+from studies.learning.settings import ALIASES, build_parser, instantiate, resolve, trial_label
+from studies.learning.study import Config, Study
+from studies.learning.trial import code_of_trial, run_trial
+from studies.learnt.films import write_films
+from studies.learnt.many_trials import write_grid_report
+from studies.learnt.one_trial import policy_table, read_episodes, write_report
 from studies.running.command import expand_grid, fail
 from studies.running.curves import Curves
-from studies.running.files import (
-    atomic_write_json,
-    atomic_write_text,
-    read_json,
-    remove_partial_files,
-)
 from studies.running.progress import Bars, Progress, Several
 from studies.running.trials import Execution, Failures, read_trials, run_trials, trial_folder
 from studies.running.workers import WorkersError
 
 
-def run_command(study: GapStudy, arguments: Sequence[str] | None = None) -> None:
+def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
     """The command of a study: one trial, or the grid of a config file."""
     parser = build_parser(study)
     given = parser.parse_args(arguments)
@@ -43,20 +40,20 @@ def run_command(study: GapStudy, arguments: Sequence[str] | None = None) -> None
     settings.pop("config", None)
     home = Path("results", study.name)
     # Runs in the default place share their finished steps; a folder given holds all of its own.
-    stages = (Path(output) if output else home) / "stages"
+    kept = (Path(output) if output else home) / "stages"
     # A wrong value is reported before anything is written.
     try:
-        instantiate(study, settings)
+        study.system_of(instantiate(study, settings)).check()
     except ValueError as error:
         fail(str(error))
     if grid:
         name = Path(str(given.config[0])).stem if given.config else "grid"
         target = Path(output) if output else home / name
-        run_grid(study, settings, grid, target, stages, execution)
+        run_grid(study, settings, grid, target, kept, execution)
     else:
         folder = trial_folder(home, trial_label(settings), settings)
         target = Path(output) if output else folder
-        run_single(study, settings, target, stages, execution)
+        run_single(study, settings, target, kept, execution)
 
 
 def _curves_folder(folder: str | None) -> Path | None:
@@ -66,40 +63,50 @@ def _curves_folder(folder: str | None) -> Path | None:
 
 
 def run_single(
-    study: GapStudy, settings: dict[str, Any], output: Path, stages: Path, execution: Execution
+    study: Study, settings: dict[str, Any], output: Path, kept: Path, execution: Execution
 ) -> None:
     """One trial in this process with progress bars, a table on the terminal and a report."""
     begin = time.perf_counter()
     remove_partial_files(output)
     curves = [Curves(execution.tensorboard / output.name)] if execution.tensorboard else []
-    results = run_trial(study, settings, output, Stages(stages), Several(Bars(), *curves))
+    results = run_trial(study, settings, output, kept, Several(Bars(), *curves))
     results["seconds"] = time.perf_counter() - begin
     atomic_write_text(output / "config.yaml", yaml.safe_dump(settings, sort_keys=False))
-    study.report(results, output)
+    write_films(results, output, study.system_of(instantiate(study, settings)).nominal)
     atomic_write_json(output / "results.json", results)
-    print(f"\n{study.table(results)}\n\nreport: {output / 'report.html'}")
+    report_single(results, output)
+
+
+def report_single(results: dict[str, Any], folder: Path) -> None:
+    """Table and report of one trial from what it left in its folder."""
+    films = {path.stem: path for path in sorted((folder / "films").glob("*.gif"))}
+    page = write_report(results, folder, read_episodes(results, folder), films)
+    print(f"\n{policy_table(results)}\n\nreport: {page}")
 
 
 def run_grid(
-    study: GapStudy,
+    study: Study,
     settings: dict[str, Any],
     grid: list[dict[str, list[Any]]],
     output: Path,
-    stages: Path,
+    kept: Path,
     execution: Execution,
 ) -> None:
     """Many trials, a table over all of them and a report."""
     try:
-        configs = [resolve(study, config) for config in expand_grid(settings, grid)]
+        blocks = [{ALIASES.get(name, name): block[name] for name in block} for block in grid]
+        configs = [resolve(study, config) for config in expand_grid(settings, blocks)]
+        made_by = {}
         for config in configs:
-            instantiate(study, config)
+            folder = trial_folder(output, trial_label(config), config)
+            made_by[folder] = code_of_trial(study, config)
     except ValueError as error:
         fail(str(error))
     remove_partial_files(output)
     trials = {trial_folder(output, trial_label(config), config): config for config in configs}
-    work = functools.partial(grid_trial, study, stages.resolve())
+    work = functools.partial(grid_trial, study, kept.resolve())
     try:
-        run_trials(study.name, trials, work, execution)
+        run_trials(study.name, trials, work, execution, made_by)
     except WorkersError as error:
         fail(str(error))
     failures = report_grid(study, output)
@@ -107,11 +114,12 @@ def run_grid(
         raise SystemExit(1)
 
 
-def report_grid(study: GapStudy, folder: Path) -> Failures:
+def report_grid(study: Study, folder: Path) -> Failures:
     """Tables and report of a grid from the trials in its folder; returns the failed ones."""
     results, failures = read_trials(folder)
     if results:
-        print(f"\n{study.grid_report(results, failures, folder)}")
+        best = study.system(instantiate(study, results[0]["config"])).best
+        print(f"\n{write_grid_report(results, failures, folder, best() if best else None)}")
         print(f"\nreport: {folder / 'report.html'}")
     for path, failure in failures.items():
         reason = failure.strip().splitlines()[-1]
@@ -119,7 +127,7 @@ def report_grid(study: GapStudy, folder: Path) -> Failures:
     return failures
 
 
-def rebuild(study: GapStudy, folder: Path) -> None:
+def rebuild(study: Study, folder: Path) -> None:
     """Tables, figures and report of a finished or unfinished run, without computing trials.
 
     Raises:
@@ -128,8 +136,7 @@ def rebuild(study: GapStudy, folder: Path) -> None:
     path = folder / "results.json"
     results = read_json(path) if path.exists() else {}
     if "policies" in results:
-        study.report(results, folder)
-        print(f"\n{study.table(results)}\n\nreport: {folder / 'report.html'}")
+        report_single(results, folder)
     elif not read_trials(folder)[0]:
         raise FileNotFoundError(f"{folder}: no trial in it is finished")
     else:
@@ -137,7 +144,7 @@ def rebuild(study: GapStudy, folder: Path) -> None:
 
 
 def grid_trial(
-    study: GapStudy, stages: Path, config: Config, folder: Path, progress: Progress
+    study: Study, kept: Path, config: Config, folder: Path, progress: Progress
 ) -> dict[str, Any]:
     """``run_trial`` as one of many."""
-    return run_trial(study, config, folder, Stages(stages), progress)
+    return run_trial(study, config, folder, kept, progress)

@@ -3,212 +3,148 @@
     idealised policy                                       trained on f
     repeat:  collect   true transitions with the last policy and exploration noise
              fit       d(s, a) = s'_true - s'_idl on all transitions so far
-             train     DDPG on f + d, from the last policy, with the first update's replay
+             train     on f + d, from the last policy, with the first update's replay
              measure   on the true system: the return, and d's accuracy where the policy goes
 
 (paper, section III-B and figure 2). The control trains on as long without d: what it gains is
 not the difference model's doing. The baselines learn on the true system itself: from
 nothing (cold) or from the idealised policy (warm); a cold start with a generous budget is the
 reference (true).
-
-Every step is a stage: a pure function of its settings and of earlier stages, kept on disk.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
-from functools import partial
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from sklearn.base import BaseEstimator
 
 from policy.config import DDPGConfig
+from policy.learner import OURS, Algorithm
+from sims.simulator import Simulator
+from sims.system import EvaluationProtocol, System
+from sims.tasks import Task
 from studies.learning.budget import Budget
-from studies.learning.earlier import Earlier, ReplayRule
-from studies.learning.outcome import Outcome, policy_record, record_key
-from studies.learning.problem import Problem
-from studies.learning.seeds import describe, seeded
-from studies.learning.stages import Stages
-from studies.learning.steps import LearningSteps
-from studies.running.files import read_json
-from studies.running.progress import Progress
+from studies.learning.kept import InMemory, OnDisk
+from studies.learning.outcome import Learnt
+from studies.learning.steps import Steps
+from studies.learning.warm_start import ReplayRule, WarmStart
+from studies.running.progress import Bars, Progress
+
+
+def run_loop(do: Steps, budget: Budget, corrected: Simulator | None = None) -> Learnt:
+    """The loop, then the control and the baselines that the budget asks for.
+
+    Args:
+        do: The steps.
+        budget: Samples and steps.
+        corrected: The simulator with what it lacked: a policy is trained on it as well, from the
+            idealised one, without a true sample.
+    """
+    learnt, samples = Learnt.of(do.system), []
+    policy = idealised = do.train("idealised", budget.idealised_steps)
+    learnt.add_policy("idealised", idealised)
+    start = begin = WarmStart.begin(idealised, do.replay)
+    for update in range(1, budget.iterations + 1):
+        samples.append(do.collect(policy, budget.true_samples, update))
+        model = do.fit(samples)
+        policy = do.train("difference", budget.difference_steps, start, on=model, update=update)
+        accuracy = do.measure(model, policy, update)
+        learnt.add_update(update, update * budget.true_samples, policy, model, accuracy)
+        start = start.then(policy)
+
+    start = begin
+    for update in range(1, budget.iterations + 1 if budget.control_steps else 1):
+        control = do.train("control", budget.control_steps, start, update=update)
+        learnt.add_policy("control", control, iteration=update)
+        start = start.then(control)
+    if corrected is not None:
+        named = do.train("corrected", budget.corrected_steps, begin, on=corrected)
+        learnt.add_policy("corrected", named)
+    # The reference and the cold start are one experiment, read at two budgets.
+    if longest := max(budget.true_steps, budget.baseline_steps):
+        cold = do.train("cold", longest)
+        learnt.add_on_truth("true", cold, budget.true_steps)
+        learnt.add_on_truth("cold", cold, budget.baseline_steps)
+    if budget.baseline_steps:
+        warm = do.train("warm", budget.baseline_steps, idealised)
+        learnt.add_on_truth("warm", warm, budget.baseline_steps)
+    return learnt
 
 
 def learn_by_difference(
-    problem: Problem,
-    estimator: BaseEstimator,
-    budget: Budget,
-    ddpg: DDPGConfig,
-    seed: int,
-    stages: Stages,
-    progress: Progress,
-    caution: float = 0.0,
+    nominal: Simulator,
+    true: Any,
+    task: Task,
+    *,
+    estimator: BaseEstimator | None = None,
+    samples: int = 450,
+    updates: int = 2,
+    steps: int = 20_000,
+    seed: int = 0,
+    learner: str | type = OURS,
+    learner_options: Mapping[str, Any] | None = None,
+    ddpg: DDPGConfig | None = None,
     replay: ReplayRule = "first",
-    corrected: Mapping[str, Any] | None = None,
-) -> Outcome:
-    """The loop of the paper, then the baselines that the budget asks for.
+    uncertainty_penalty: float = 0.0,
+    evaluation: EvaluationProtocol | None = None,
+    state_of: Callable[[Any, Any], Any] | None = None,
+    budget: Budget | None = None,
+    keep: str | Path | None = None,
+    progress: Progress | None = None,
+    name: str = "system",
+) -> Learnt:
+    """Learn to control a system from few samples of it: the loop of the commands, in memory.
 
     Args:
-        problem: What to control.
-        estimator: Learns the difference; cloned, never changed.
-        budget: Samples and steps.
-        ddpg: Settings of every DDPG agent, the baselines' included.
-        seed: Everything follows from it.
-        stages: Where finished steps are kept and found again.
-        progress: Told what is going on.
-        caution: Reward lost per step for each multiple of the typical spread of the difference
-            model; 0 learns as in the paper.
-        replay: What a training after an update learns from beside its own transitions, see
-            ``Earlier``; the control learns from its own in the same way.
-        corrected: Settings (``sims.loading.load_simulator``) of a simulator with what the
-            idealised one lacked: a policy is trained on it as well, without a true sample.
+        nominal: The simulator that one has.
+        true: The system that one wants to control, see ``System``.
+        task: Reward, termination, start states, horizon.
+        estimator: Learns the difference, any scikit-learn regressor; by default
+            ``residual.GaussianProcess()``.
+        samples: True transitions for each update.
+        updates: Updates of the difference model.
+        steps: Simulated steps of training, at first and after each update.
+        seed: Everything random follows from it.
+        learner: ``"policy.DDPG"``, or an off-policy algorithm of Stable-Baselines3, the class
+            or its import path.
+        learner_options: Keyword arguments of that class.
+        ddpg: Settings of ``policy.DDPG``.
+        replay: What a training after an update learns from again, see ``WarmStart``.
+        uncertainty_penalty: Reward lost per step for each multiple of the typical spread of the
+            difference model; 0 learns as in the paper.
+        evaluation: How policies are tested.
+        state_of: Reads the state of ``true``, see ``System``.
+        budget: In place of ``samples``, ``updates`` and ``steps``, with baselines if wanted.
+        keep: Folder in which finished steps are kept and found again; by default nothing is.
+        progress: Told what is going on; by default bars on stderr or in the notebook.
+        name: Of the system, for the report.
 
     Returns:
-        Records, and the folders that hold the policies and the models.
+        Policies, difference models and their accuracy, with ``report`` and ``plot``.
+
+    Raises:
+        ValueError: The parts do not fit together, or a budget is too small to learn anything.
     """
-    steps = LearningSteps(problem, seeded(estimator, seed), ddpg, seed, progress, replay)
-    loop = Loop(steps, budget, stages)
-    loop.idealised()
-    loop.updates(caution)
-    loop.control()
-    if corrected is not None:
-        loop.corrected(corrected)
-    loop.on_the_true_system()
-    return loop.outcome
+    from residual.gaussian_process import GaussianProcess
 
-
-class Loop:
-    """The loop in its stages.
-
-    Attributes:
-        outcome: What they have left so far.
-    """
-
-    def __init__(self, steps: LearningSteps, budget: Budget, stages: Stages) -> None:
-        self.steps, self.budget, self.stages = steps, budget, stages
-        self.outcome = Outcome([], [], {}, [])
-        # What every training depends on.
-        self._common = {
-            "problem": steps.problem.description,
-            "ddpg": dataclasses.asdict(steps.ddpg),
-            "seed": steps.seed,
-            "replay": steps.replay,
-        }
-
-    def idealised(self) -> None:
-        """The policy that all others begin with."""
-        count = self.budget.idealised_steps
-        folder = self.stages.run(
-            "idealised",
-            {**self._common, "steps": count},
-            lambda folder: self.steps.train_idealised(folder, count),
-        )
-        self._keep(folder, "idealised")
-
-    def updates(self, caution: float) -> None:
-        """Collect, fit, train and measure, as often as the budget says."""
-        earlier, samples = self._begin(), list[Path]()
-        for iteration in range(1, self.budget.iterations + 1):
-            samples.append(self._collected(earlier.policy, iteration))
-            model = self._fitted(samples)
-            policy = self._trained(model, earlier, caution)
-            accuracy = self.stages.run(
-                "measure",
-                {"model": model, "policy": policy, "seed": self.steps.seed},
-                partial(self.steps.measure, model=model, policy=policy),
-            )
-            seen = {"iteration": iteration, "true_samples": iteration * self.budget.true_samples}
-            self._keep(policy, "difference", **seen)
-            self.outcome.models.append(model)
-            self.outcome.accuracy.append(
-                seen | read_json(accuracy / "accuracy.json") | read_json(model / "fit.json")
-            )
-            earlier = earlier.then(policy)
-
-    def control(self) -> None:
-        """As much training after each update, on the idealised simulator as it is."""
-        earlier, count = self._begin(), self.budget.control_steps
-        for iteration in range(1, self.budget.iterations + 1 if count else 1):
-            policy = self.stages.run(
-                "control",
-                {**self._common, **earlier.settings(), "round": iteration, "steps": count},
-                partial(self.steps.train_control, earlier=earlier, steps=count),
-            )
-            self._keep(policy, "control", iteration=iteration)
-            earlier = earlier.then(policy)
-
-    def corrected(self, settings: Mapping[str, Any]) -> None:
-        """A policy that learns on a simulator that was corrected by name."""
-        earlier, count = self._begin(), self.budget.corrected_steps
-        policy = self.stages.run(
-            "corrected",
-            {**self._common, **earlier.settings(), "corrected": settings, "steps": count},
-            lambda folder: self.steps.train_named(folder, settings, earlier, count),
-        )
-        self._keep(policy, "corrected")
-
-    def on_the_true_system(self) -> None:
-        """The reference and the baselines."""
-        reference, baseline = self.budget.true_steps, self.budget.baseline_steps
-        # The reference and the cold start are one experiment, read at two budgets.
-        if longest := max(reference, baseline):
-            cold = self.stages.run(
-                "cold",
-                {**self._common, "steps": longest},
-                lambda folder: self.steps.train_on_true(folder, None, longest),
-            )
-            if reference:
-                self.outcome.policies.append(policy_record(cold, "true", reference))
-                self.outcome.folders["true"] = cold
-            if baseline:
-                self.outcome.policies.append(policy_record(cold, "cold", baseline))
-        if baseline:
-            start = self.outcome.folders["idealised"]
-            warm = self.stages.run(
-                "warm",
-                {**self._common, "policy": start, "steps": baseline},
-                lambda folder: self.steps.train_on_true(folder, start, baseline),
-            )
-            self.outcome.policies.append(policy_record(warm, "warm", baseline))
-            self.outcome.folders["warm"] = warm
-
-    def _collected(self, policy: Path, iteration: int) -> Path:
-        count = self.budget.true_samples
-        return self.stages.run(
-            "collect",
-            {**self._common, "policy": policy, "samples": count, "round": iteration},
-            lambda folder: self.steps.collect(folder, policy, count, iteration),
-        )
-
-    def _fitted(self, samples: list[Path]) -> Path:
-        return self.stages.run(
-            "fit",
-            {
-                "problem": self.steps.problem.description,
-                "estimator": describe(self.steps.estimator),
-                "samples": list(samples),
-            },
-            lambda folder: self.steps.fit(folder, samples),
-        )
-
-    def _trained(self, model: Path, earlier: Earlier, caution: float) -> Path:
-        count = self.budget.difference_steps
-        settings = {**self._common, **earlier.settings(), "model": model, "steps": count}
-        if caution:
-            settings["caution"] = caution
-        return self.stages.run(
-            "train",
-            settings,
-            lambda folder: self.steps.train_corrected(folder, model, earlier, count, caution),
-        )
-
-    def _begin(self) -> Earlier:
-        return Earlier.begin(self.outcome.folders["idealised"], self.steps.replay)
-
-    def _keep(self, folder: Path, name: str, **more: int) -> None:
-        """Record a policy that was learnt on a simulator."""
-        record = policy_record(folder, name) | more
-        self.outcome.policies.append(record)
-        self.outcome.folders[record_key(record)] = folder
+    path = learner if isinstance(learner, str) else f"{learner.__module__}.{learner.__qualname__}"
+    system = System(
+        name, nominal, true, task, evaluation or EvaluationProtocol(), state_of=state_of
+    )
+    algorithm = Algorithm(path, ddpg or DDPGConfig(), learner_options or {})
+    budget = budget or Budget(samples, updates, steps, steps)
+    budget.check(algorithm, replay == "all")
+    system.check()
+    do = Steps(
+        system,
+        estimator or GaussianProcess(),
+        algorithm,
+        seed,
+        OnDisk(keep) if keep else InMemory(),
+        progress or Bars(),
+        replay,
+        uncertainty_penalty,
+    )
+    return run_loop(do, budget)

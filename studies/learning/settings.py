@@ -7,14 +7,17 @@ import json
 from pathlib import Path
 from typing import Any
 
-from jsonargparse.typing import PositiveInt
+from jsonargparse.typing import NonNegativeFloat, PositiveInt
 
-from studies.learning.study import Config, GapStudy, GapTrial
+from studies.learning.study import Config, Study, Trial
 from studies.running.command import HelpFormatter, Parser
 from studies.running.workers import Backend
 
+#: Settings under their earlier names.
+ALIASES = {"caution": "uncertainty_penalty"}
 
-def build_parser(study: GapStudy) -> Parser:
+
+def build_parser(study: Study) -> Parser:
     """The command line of a study."""
     parser = Parser(
         prog=f"python -m studies.{study.name}",
@@ -54,23 +57,29 @@ def build_parser(study: GapStudy) -> Parser:
         help="For config files: blocks of settings and the values they take; one trial for each "
         "combination within a block.",
     )
-    parser.add_class_arguments(study.trial, sub_configs=True)
+    penalty = "uncertainty_penalty"
+    parser.add_class_arguments(study.trial, sub_configs=True, skip={penalty})
+    parser.add_argument(
+        f"--{penalty}",
+        "--caution",
+        type=NonNegativeFloat,
+        default=0.0,
+        help="Reward lost per step, on the corrected simulator, for each multiple of the "
+        "difference model's typical standard deviation; 0 learns as in the paper.",
+    )
     parser.set_defaults(estimator={"class_path": study.estimator})
     return parser
 
 
-def instantiate(study: GapStudy, config: Config) -> GapTrial:
+def instantiate(study: Study, config: Config) -> Trial:
     """The trial that plain settings describe; exits with one line if they are wrong."""
     parser = build_parser(study)
     # The parser changes nested lists of what it is given.
     chosen = parser.instantiate(parser.parse_object(copy.deepcopy(dict(config))))
-    trial = study.trial(**{name: chosen[name] for name in study.settings})
-    if trial.corrected is not None:
-        study.problem(trial, {}).check_corrected(trial.corrected)
-    return trial
+    return study.trial(**{name: chosen[name] for name in study.settings})
 
 
-def resolve(study: GapStudy, config: Config) -> dict[str, Any]:
+def resolve(study: Study, config: Config) -> dict[str, Any]:
     """``config`` with every default filled in, checked by the parser."""
     parser = build_parser(study)
     chosen = parser.parse_object(copy.deepcopy(dict(config)))
@@ -81,4 +90,6 @@ def resolve(study: GapStudy, config: Config) -> dict[str, Any]:
 def trial_label(config: Config) -> str:
     """A readable name for a trial's folder."""
     estimator = config["estimator"]["class_path"].rsplit(".", 1)[-1]
-    return f"{estimator}-{config['budget']['true_samples']}-seed{config['seed']}"
+    name = f"{estimator}-{config['budget']['true_samples']}-seed{config['seed']}"
+    system = str(config.get("system", "")).rsplit(".", 2)
+    return f"{system[0]}-{name}" if len(system) > 1 else name

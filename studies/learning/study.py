@@ -1,44 +1,48 @@
-"""What sets one study of learning across the gap apart from another.
+"""A command of the loop: the settings of a trial, and the system that they mean.
 
-A study file says what is its own: the settings of a trial, the systems and the task, and how
-its results are reported (``studies/pendulum_gap.py``). Everything else is beside this file.
+``studies/learn.py`` is the command for any system; ``pendulum_gap.py`` and ``leo_gap.py`` are the
+same with a system of their own.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from jsonargparse.typing import NonNegativeFloat
 from sklearn.base import BaseEstimator
 
 from policy.config import DDPGConfig
+from policy.learner import OURS, Algorithm
 from residual import DropoutNet
 from sims.simulator import Simulator
+from sims.system import System
 from studies.learning.budget import Budget
-from studies.learning.earlier import ReplayRule
-from studies.learning.problem import Problem
+from studies.learning.warm_start import ReplayRule
 
 Config = Mapping[str, Any]
-Results = Mapping[str, Any]
 
 
 @dataclasses.dataclass(frozen=True)
-class GapTrial:
-    """One trial: everything that its result depends on. A study adds its own settings.
+class Trial:
+    """One trial: everything that its result depends on. A command adds its own settings.
 
     Args:
         estimator: Learns the difference; any scikit-learn regressor by import path.
         seed: Everything random follows from it.
         budget: Samples and training steps.
-        ddpg: Settings of DDPG, the same for every policy.
-        caution: Reward lost per step, on the corrected simulator, for each multiple of the
-            difference model's typical standard deviation; 0 learns as in the paper.
+        learner: What learns the policies: policy.DDPG, or an off-policy algorithm of
+            Stable-Baselines3 such as stable_baselines3.SAC.
+        learner_options: Settings of an algorithm other than policy.DDPG.
+        ddpg: Settings of policy.DDPG, the same for every policy; its exploration noise is also
+            that of collecting.
+        uncertainty_penalty: Reward lost per step, on the corrected simulator, for each multiple
+            of the difference model's typical standard deviation; 0 learns as in the paper.
         replay: What a training after an update learns from beside its own transitions: "first",
             as in the paper, from the second update on those of the first; "all", those of all
             trainings on the simulator so far, relabelled with the newest difference model.
+        simulator: The simulator at hand instead of the system's: a class path, or a YAML file
+            such as the corrected.yaml of find_gap.
         corrected: A simulator with what it lacked, such as the corrected.yaml of find_gap: a
             policy is trained on it too, from the idealised one, without a true sample.
     """
@@ -46,53 +50,90 @@ class GapTrial:
     estimator: BaseEstimator = dataclasses.field(default_factory=DropoutNet)
     seed: int = 0
     budget: Budget = dataclasses.field(default_factory=Budget)
+    learner: str = OURS
+    learner_options: dict[str, Any] = dataclasses.field(default_factory=dict)
     ddpg: DDPGConfig = dataclasses.field(default_factory=DDPGConfig)
-    caution: NonNegativeFloat = 0.0
+    uncertainty_penalty: float = 0.0
     replay: ReplayRule = "first"
+    simulator: Simulator | None = None
     corrected: Simulator | None = None
+
+    @property
+    def algorithm(self) -> Algorithm:
+        """What learns the policies."""
+        return Algorithm(self.learner, self.ddpg, self.learner_options)
 
 
 @dataclasses.dataclass(frozen=True)
-class GapStudy:
-    """What sets one study apart from another.
+class Study:
+    """A command of the loop.
 
-    Its functions must be importable by name, since worker processes run them.
+    Its function must be importable by name, since worker processes run it.
 
     Attributes:
-        system: Its name in ``results.json`` and in the hashes of stages; the study's file is
-            ``studies/<system>_gap.py``.
-        description: Help text of the command.
-        trial: Settings of one trial, a dataclass that extends ``GapTrial``.
-        problem: The systems and the task of a trial; its second argument is the description to
-            give the problem: the system's name and the settings that are the study's own.
-        table: The results of one trial as text.
-        report: Writes the report of one trial into its folder.
-        grid_report: Writes the report of all finished trials, given the tracebacks of those
-            that failed by folder; returns the main table as text.
+        name: Of its file in ``studies/`` and of its folder of results.
+        description: Help text.
+        trial: Settings of one trial, a dataclass that extends ``Trial``.
+        system: The system of a trial.
         estimator: Class path of the default estimator.
     """
 
-    system: str
+    name: str
     description: str | None
-    trial: type[GapTrial]
-    problem: Callable[[Any, Mapping[str, Any]], Problem]
-    table: Callable[[Results], str]
-    report: Callable[[Results, Path], object]
-    grid_report: Callable[[Sequence[Results], Mapping[Path, str], Path], str]
+    trial: type[Trial]
+    system: Callable[[Any], System]
     estimator: str = "residual.DropoutNet"
-
-    @property
-    def name(self) -> str:
-        """Of the study's file and of its folder of results."""
-        return f"{self.system}_gap"
 
     @property
     def settings(self) -> list[str]:
         """Names of a trial's settings."""
         return [field.name for field in dataclasses.fields(self.trial)]
 
+    def system_of(self, trial: Trial) -> System:
+        """The system of a trial, checked against its other settings.
+
+        Raises:
+            ValueError: They do not fit together, or a budget is too small to learn anything.
+        """
+        system = self.system(trial)
+        if trial.simulator is not None:
+            system = system.with_nominal(trial.simulator)
+        trial.budget.check(trial.algorithm, trial.replay == "all", trial.corrected is not None)
+        if trial.corrected is not None:
+            _check_corrected(system.nominal, trial.corrected)
+        memory = [c.name for c in system.nominal.state_channels if c.kind == "memory"]
+        if memory and trial.budget.iterations:
+            raise ValueError(
+                f"{system.nominal.name} has hidden memory ({', '.join(memory)}), which no true "
+                "sample tells a difference model: give --budget.iterations 0"
+            )
+        on_truth = trial.budget.true_steps or trial.budget.baseline_steps
+        if on_truth and not system.can_learn_on_truth:
+            raise ValueError(
+                f"system {system.name}: learning on the true system needs two of it, one to be "
+                "tested in: give a function that makes the environment as true"
+            )
+        return system
+
     def describe(self, config: Config) -> dict[str, Any]:
-        """What identifies the problem of a trial, in plain values."""
-        shared = {field.name for field in dataclasses.fields(GapTrial)}
-        own = {name: config[name] for name in self.settings if name not in shared}
-        return {"system": self.system, **own}
+        """Plain settings behind the system of a trial."""
+        shared = {field.name for field in dataclasses.fields(Trial)} - {"simulator"}
+        return {name: config.get(name) for name in self.settings if name not in shared}
+
+
+def _check_corrected(nominal: Simulator, corrected: Simulator) -> None:
+    """Delay, lag and play have a memory, which is more state than the nominal simulator has."""
+    for what in ("state_channels", "action_channels"):
+        own, others = (
+            [channel.name for channel in getattr(one, what)] for one in (nominal, corrected)
+        )
+        if own != others:
+            raise ValueError(
+                f"corrected: {corrected.name} has {what.replace('_', ' ')} {', '.join(others)}, "
+                f"expected {', '.join(own)} as {nominal.name}; --simulator trains on any simulator"
+            )
+    if nominal.dt != corrected.dt:
+        raise ValueError(
+            f"corrected: {corrected.name} has dt {corrected.dt:g} s, expected {nominal.dt:g} s as "
+            f"{nominal.name}; --simulator trains on any simulator"
+        )

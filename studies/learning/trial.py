@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import threadpoolctl
 import torch
 
-from studies.learning.loop import learn_by_difference
+from residual.persistence import save
+from simgap_files import atomic_path
+from studies.learning.fingerprint import code_of
+from studies.learning.kept import OnDisk
+from studies.learning.loop import run_loop
 from studies.learning.settings import instantiate
-from studies.learning.stages import Stages
-from studies.learning.study import Config, GapStudy
+from studies.learning.steps import Steps
+from studies.learning.study import Config, Study
 from studies.running.command import class_label, versions
-from studies.running.files import copy_file
 from studies.running.progress import Progress
 
 
 def run_trial(
-    study: GapStudy, config: Config, folder: Path, stages: Stages, progress: Progress
+    study: Study, config: Config, folder: Path, kept: Path, progress: Progress
 ) -> dict[str, Any]:
     """One trial of a study.
 
@@ -26,7 +32,7 @@ def run_trial(
         study: Which one.
         config: The settings of the study's trial as plain values, as the parser dumps them.
         folder: For policies, models and rollouts.
-        stages: Where finished steps are kept and found again.
+        kept: Where finished steps are kept and found again.
         progress: Told of every step.
 
     Returns:
@@ -36,31 +42,47 @@ def run_trial(
     torch.set_num_threads(1)
     threadpoolctl.threadpool_limits(1)
     trial = instantiate(study, config)
-    outcome = learn_by_difference(
-        study.problem(trial, study.describe(config)),
+    steps = Steps(
+        study.system_of(trial),
         trial.estimator,
-        trial.budget,
-        trial.ddpg,
+        trial.algorithm,
         trial.seed,
-        stages,
+        OnDisk(kept),
         progress,
-        trial.caution,
         trial.replay,
-        config["corrected"],
+        trial.uncertainty_penalty,
+        study.describe(config),
     )
-    for name, source in outcome.folders.items():
-        copy_file(source / "agent.safetensors", folder / "policies" / f"{name}.safetensors")
-        copy_file(source / "rollout.npz", folder / "rollouts" / f"{name}.npz")
-    for number, source in enumerate(outcome.models, start=1):
-        if (saved := source / "difference.safetensors").exists():
-            copy_file(saved, folder / "models" / f"difference-{number}.safetensors")
+    learnt = run_loop(steps, trial.budget, trial.corrected)
+    for name, training in learnt.trainings.items():
+        training.learner.save(folder / "policies" / f"{name}.safetensors")
+        with atomic_path(folder / "rollouts" / f"{name}.npz") as path:
+            arrays: dict[str, Any] = training.episode
+            np.savez_compressed(path, **arrays)
+    for number, model in enumerate(learnt.models, start=1):
+        # Other libraries' estimators have no file format but pickle.
+        if type(model.estimator).__module__.startswith("residual."):
+            save(model, folder / "models" / f"difference-{number}.safetensors")
     return {
-        "system": study.system,
+        "study": study.name,
+        **learnt.results(),
         "estimator": config["estimator"]["class_path"],
         "label": class_label(config["estimator"]),
         "seed": trial.seed,
-        "policies": outcome.policies,
-        "accuracy": outcome.accuracy,
         "config": config,
         "versions": versions(),
+        "made_by": code_of_trial(study, config),
     }
+
+
+def code_of_trial(study: Study, config: Config) -> str:
+    """A hash of the code behind a trial's result: when it changes, the result is not right."""
+    trial = instantiate(study, config)
+    system = study.system_of(trial)
+    given = [system.true, system.state_of, system.measures, system.elsewhere, trial.corrected]
+    parts = [part for part in given if part is not None]
+    code = code_of(
+        run_trial, study.trial, study.system, system.nominal, system.task, trial.estimator,
+        trial.algorithm.kind(), *parts,
+    )  # fmt: skip
+    return hashlib.sha256(json.dumps(code).encode()).hexdigest()

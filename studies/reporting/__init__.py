@@ -3,7 +3,7 @@
 ``Report("Pendulum", "One update.", [Verdict("It works.", tone="good")]).write(path)``
 """
 
-from studies.reporting.report import Report
+from studies.reporting.page import Report
 from studies.reporting.sections import (
     Animation,
     Code,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from studies.running.files import atomic_path, atomic_write_text
+from simgap_files import atomic_path, atomic_write_text
 
 INK, MUTED, GRID = "#24292f", "#6e7781", "#d8dee4"
 
@@ -99,52 +99,19 @@ def new_figure(
     return figure, axes
 
 
-@styled()
-def lines(
-    series: Mapping[str, tuple[ArrayLike, ArrayLike]],
-    x_label: str,
-    y_label: str,
-    *,
-    bands: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
-    log_x: bool = False,
-    log_y: bool = False,
-    title: str = "",
-    width: float = 6.4,
-    height: float = 3.2,
-) -> Figure:
-    """Curves with a legend, and a shaded band around those that have one.
-
-    Args:
-        series: x and y by name, each of shape (n,); a NaN makes a gap.
-        x_label: Name and unit.
-        y_label: Name and unit.
-        bands: Lower and upper y by name, for some or all of ``series``.
-        log_x: Logarithmic x.
-        log_y: Logarithmic y.
-        title: Above the axes.
-        width: In inches.
-        height: In inches.
-    """
-    figure, axes = new_figure(width=width, height=height)
-    draw_lines(axes[0, 0], series, bands=bands)
-    axis: Axes = axes[0, 0]
-    axis.set(xlabel=x_label, ylabel=y_label, title=title)
-    if log_x:
-        axis.set_xscale("log")
-    if log_y:
-        axis.set_yscale("log")
-    if len(series) > 1:
-        figure.legend(loc="outside upper left", ncols=min(len(series), 4), handlelength=1.4)
-    return figure
-
-
 def draw_lines(
     axis: Axes,
     series: Mapping[str, tuple[ArrayLike, ArrayLike]],
     *,
     bands: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
 ) -> None:
-    """Draw the curves of ``lines`` into one axis of a figure of your own."""
+    """Draw curves, and a shaded band around those that have one, into one axis.
+
+    Args:
+        axis: Of a figure of ours.
+        series: x and y by name, each of shape (n,); a NaN makes a gap.
+        bands: Lower and upper y by name, for some or all of ``series``.
+    """
     for name, (x, y) in series.items():
         x, y = np.asarray(x, float), np.asarray(y, float)
         few = len(x) <= 12
@@ -170,50 +137,6 @@ def draw_over_time(
     figure.legend(
         *axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.4
     )
-
-
-@styled()
-def intervals(
-    rows: Mapping[str, tuple[float, float, float]],
-    label: str,
-    *,
-    reference: Mapping[str, float] | None = None,
-    log: bool = False,
-    title: str = "",
-    width: float = 6.4,
-) -> Figure:
-    """One dot with its interval per row, first row on top: bars without the ink.
-
-    Args:
-        rows: Value, low and high by name.
-        label: Name and unit of the common axis.
-        reference: Values by name, drawn as dashed lines across (a noise floor, the paper's).
-        log: Logarithmic axis.
-        title: Above the axes.
-        width: In inches; the height follows from the number of rows.
-    """
-    figure, axes = new_figure(width=width, height=1.1 + 0.36 * len(rows))
-    axis: Axes = axes[0, 0]
-    places = np.arange(len(rows))
-    value, low, high = np.asarray(list(rows.values()), float).reshape(-1, 3).T
-    axis.hlines(places, low, high, color=BLUE, linewidth=5, alpha=0.3)
-    axis.plot(value, places, "o", color=BLUE, markersize=7)
-    for number, (name, at) in enumerate((reference or {}).items()):
-        colour = PALETTE[1 + number % (len(PALETTE) - 1)]
-        axis.axvline(at, color=colour, linestyle=(0, (4, 3)), linewidth=1.4, label=name)
-    axis.set_yticks(places, list(rows))
-    axis.set_ylim(len(rows) - 0.5, -0.5)
-    axis.grid(axis="y", visible=False)
-    axis.tick_params(axis="y", length=0)
-    axis.set(xlabel=label, title=title)
-    if log:
-        axis.set_xscale("log")
-    elif np.nanmin([*low, *(reference or {}).values()]) >= 0:
-        # The length from zero is what the eye compares.
-        axis.set_xlim(left=0)
-    if reference:
-        figure.legend(loc="outside upper right", ncols=3, handlelength=1.6)
-    return figure
 
 
 def save_figure(
@@ -265,12 +188,3 @@ def _printed(figure: Figure, form: str, **options: Any) -> bytes:
     buffer = io.BytesIO()
     figure.savefig(buffer, format=form, **options)
     return buffer.getvalue()
-
-
-def series_data(series: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> dict[str, Sequence[float]]:
-    """The columns of ``lines``, for ``save_figure``: two per curve, ``name x`` and ``name y``."""
-    columns: dict[str, Sequence[float]] = {}
-    for name, (x, y) in series.items():
-        columns[f"{name} x"] = np.asarray(x, float).tolist()
-        columns[f"{name} y"] = np.asarray(y, float).tolist()
-    return columns

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import copy
+import functools
 import importlib
 import inspect
 import itertools
 import json
 import platform
 import re
+import subprocess
 import sys
 from argparse import RawDescriptionHelpFormatter
 from collections.abc import Mapping, Sequence
 from importlib import metadata
+from pathlib import Path
 from typing import Any, NoReturn
 
 import jsonargparse
+
+from sims.loading import model_settings
 
 _PACKAGES = ("torch", "scikit-learn", "gpytorch", "pymunk", "numpy", "scipy", "gymnasium")
 
@@ -27,11 +32,36 @@ class HelpFormatter(jsonargparse.DefaultHelpFormatter, RawDescriptionHelpFormatt
 class Parser(jsonargparse.ArgumentParser):
     """An argument parser whose errors are one line on stderr, with exit code 2."""
 
+    def parse_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, *rest: Any, **options: Any
+    ) -> Any:
+        """As usual; a robot's model file may stand where a simulator is expected."""
+        given = list(sys.argv[1:] if args is None else args)
+        for i, text in enumerate(given):
+            name, equals, value = text.partition("=")
+            if name == "--simulator" and equals:
+                given[i] = f"--simulator={_simulator(value)}"
+            elif name == "--simulator" and i + 1 < len(given):
+                given[i + 1] = _simulator(given[i + 1])
+        return super().parse_args(given, *rest, **options)
+
+    def parse_object(self, cfg_obj: Any, *rest: Any, **options: Any) -> Any:
+        """As usual; a robot's model file may stand where a simulator is expected."""
+        value = cfg_obj.get("simulator") if isinstance(cfg_obj, Mapping) else None
+        if isinstance(value, str) and (settings := model_settings(value)):
+            cfg_obj = {**cfg_obj, "simulator": settings}
+        return super().parse_object(cfg_obj, *rest, **options)
+
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
         """Say what is wrong and how to learn more, in one line."""
         reason = re.sub(r"\s*\n\s*-?\s*", " ", str(message).strip())
         sys.stderr.write(f"error: {reason} (see --help)\n")
         raise SystemExit(2)
+
+
+def _simulator(value: str) -> str:
+    settings = model_settings(value)
+    return json.dumps(settings) if settings else value
 
 
 def fail(message: str) -> NoReturn:
@@ -99,5 +129,19 @@ def class_label(chosen: Mapping[str, Any]) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of Python, of this package and of what the numbers depend on."""
-    found = {"python": platform.python_version(), "simgap": metadata.version("simgap")}
+    found = {"python": platform.python_version(), "simgap": own_version()}
     return found | {package: metadata.version(package) for package in _PACKAGES}
+
+
+@functools.cache
+def own_version() -> str:
+    """The version of this package, and in a checkout the commit, with a plus if files differ."""
+    version, root = metadata.version("simgap"), Path(__file__).parents[2]
+    if not (root / ".git").exists():
+        return version
+    command = ["git", "-C", str(root), "describe", "--always", "--dirty=+", "--exclude=*"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return version
+    return f"{version} ({done.stdout.strip()})"

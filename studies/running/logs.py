@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.running.files import atomic_write_text
+from simgap_files import atomic_write_text
 
 Array = NDArray[np.floating[Any]]
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Protocol
 
-from tqdm import tqdm
+from tqdm.auto import tqdm
 
 
 class Advance(Protocol):
@@ -35,7 +35,7 @@ class Progress(Protocol):
 
 
 class Bars:
-    """Progress bars on stderr, one line per step; quiet lines where there is no terminal."""
+    """Progress bars: in a notebook its own, else on stderr; quiet lines without a terminal."""
 
     @contextmanager
     def task(self, title: str, total: int) -> Iterator[Advance]:

@@ -11,14 +11,15 @@ import dataclasses
 import functools
 import hashlib
 import json
+import logging
 import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from simgap_files import atomic_write_json, atomic_write_text, jsonable, read_json
 from studies.running.curves import Curves
-from studies.running.files import atomic_write_json, atomic_write_text, read_json
 from studies.running.progress import Progress, Several
 from studies.running.watching import STATUS, StatusFile, TrialsView
 from studies.running.workers import Backend, Config, workers
@@ -26,6 +27,8 @@ from studies.running.workers import Backend, Config, workers
 Work = Callable[[Config, Path, Progress], dict[str, Any]]
 Failures = dict[Path, str]
 PLAN = "study.json"
+RESULTS = "results.json"
+_log = logging.getLogger("simgap")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +55,11 @@ def trial_folder(root: Path, label: str, config: Config) -> Path:
 
 
 def run_trials(
-    study: str, trials: Mapping[Path, Config], work: Work, execution: Execution
+    study: str,
+    trials: Mapping[Path, Config],
+    work: Work,
+    execution: Execution,
+    made_by: Mapping[Path, str] | None = None,
 ) -> tuple[list[dict[str, Any]], Failures]:
     """Run what is not finished yet.
 
@@ -61,6 +68,8 @@ def run_trials(
         trials: Configuration by folder, all in one folder.
         work: Computes one trial into its folder and returns its results; importable by name.
         execution: Where to run them.
+        made_by: By folder, what its result should say under ``made_by``; one of other code does
+            not count as finished.
 
     Returns:
         See ``read_trials``.
@@ -70,7 +79,16 @@ def run_trials(
     """
     # Workers of a cluster may have another working directory.
     trials = {folder.resolve(): config for folder, config in trials.items()}
-    waiting = {folder: config for folder, config in trials.items() if not _finished(folder)}
+    codes = {folder.resolve(): code for folder, code in (made_by or {}).items()}
+    for folder in trials:
+        _set_aside_damaged(folder)
+    waiting = {
+        folder: config
+        for folder, config in trials.items()
+        if not _finished(folder, codes.get(folder))
+    }
+    for folder in waiting:
+        (folder / RESULTS).unlink(missing_ok=True)
     root = next(iter(trials)).parent
     attempt = functools.partial(attempt_trial, work, execution.tensorboard)
     with workers(execution.backend, execution.jobs, execution.scheduler) as run:
@@ -106,11 +124,16 @@ def read_trials(root: Path) -> tuple[list[dict[str, Any]], Failures]:
     if not (root / PLAN).exists():
         return read_json(root / "results.json")["trials"], {}
     folders = [root / name for name in read_json(root / PLAN)["trials"]]
-    results = [read_json(folder / "results.json") for folder in folders if _finished(folder)]
+    results = [_unsealed(folder) for folder in folders if _finished(folder)]
     failures = {
+        folder: f"{folder / RESULTS} is damaged: give the command of the study again\n"
+        for folder in folders
+        if (folder / RESULTS).exists() and not _finished(folder)
+    }
+    failures |= {
         folder: (folder / "error.txt").read_text(encoding="utf-8")
         for folder in folders
-        if not _finished(folder) and (folder / "error.txt").exists()
+        if not (folder / RESULTS).exists() and (folder / "error.txt").exists()
     }
     return results, failures
 
@@ -127,7 +150,7 @@ def attempt_trial(work: Work, tensorboard: Path | None, config: Config, folder: 
     curves = [Curves(tensorboard / folder.name)] if tensorboard else []
     try:
         results = work(config, folder, Several(status, *curves))
-        atomic_write_json(folder / "results.json", results)
+        _seal(folder, results)
     except (Exception, SystemExit):  # SystemExit would take a cluster's worker with it
         atomic_write_text(folder / "error.txt", failure := traceback.format_exc())
         return failure
@@ -150,5 +173,42 @@ def spread_seeds(trials: Mapping[Path, Config]) -> dict[Path, Config]:
     return {folder: trials[folder] for folder in sorted(trials, key=turns.__getitem__)}
 
 
-def _finished(folder: Path) -> bool:
-    return (folder / "results.json").exists()
+def _seal(folder: Path, results: Mapping[str, Any]) -> None:
+    """Write the results of a trial with their checksum."""
+    plain = jsonable(results)
+    atomic_write_json(folder / RESULTS, {**plain, "checksum": _checksum(plain)})
+
+
+def _checksum(results: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(results, sort_keys=True).encode()).hexdigest()
+
+
+def _unsealed(folder: Path) -> dict[str, Any]:
+    """The results of a trial.
+
+    Raises:
+        ValueError: They are not as they were written.
+    """
+    results = read_json(folder / RESULTS)
+    # Before version 0.2 there was none.
+    checksum = results.pop("checksum", None)
+    if checksum is not None and checksum != _checksum(results):
+        raise ValueError(f"{folder / RESULTS} is damaged")
+    return results
+
+
+def _finished(folder: Path, code: str | None = None) -> bool:
+    """Whether results are there, whole and, if a hash is given, of this code."""
+    try:
+        made_by = _unsealed(folder).get("made_by")
+    except (OSError, ValueError, TypeError, AttributeError):
+        return False
+    return not code or made_by == code
+
+
+def _set_aside_damaged(folder: Path) -> None:
+    path = folder / RESULTS
+    if path.exists() and not _finished(folder):
+        aside = path.with_suffix(".damaged")
+        path.replace(aside)
+        _log.warning("%s is damaged: set aside as %s, computed anew", path, aside)

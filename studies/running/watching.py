@@ -18,7 +18,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from studies.running.files import atomic_write_json, read_json
+from simgap_files import atomic_write_json, read_json
 from studies.running.progress import Advance
 
 STATUS = "status.json"

@@ -49,6 +49,32 @@ def test_rates_stay_finite_under_a_wrong_difference():
     assert reached[0, 1] == 80.0
 
 
+@pytest.mark.parametrize("wrong", [1e6, -1e200, np.inf, np.nan])
+def test_a_wrong_difference_never_leaves_the_numbers(wrong):
+    class Absurd(Linear):
+        def predict(self, X, return_std=False):
+            return np.full((len(X), 2), wrong)
+
+    model = DifferenceModel(Absurd(), Pendulum()).fit(sampled(Pendulum.true(), 50))
+    simulator = CorrectedSimulator(Pendulum(), model)
+    states = simulator.rollout(np.zeros((3, 2)), np.ones((3, 400, 1)))
+    assert np.isfinite(states).all()
+    # Positions, too, do not run faster than eight of their scales a step.
+    assert np.abs(np.diff(states[:, :, 0], axis=1)).max() <= 8.0
+    assert simulator.held == 3 * 400
+
+
+def test_a_good_difference_is_never_held(corrected):
+    before = corrected.held
+    corrected.step(*uniform_rows(100))
+    assert corrected.held == before
+
+
+def uniform_rows(n):
+    rows = sampled(Pendulum(), n, seed=7)
+    return rows.states, rows.actions
+
+
 class TestAccuracy:
     def test_no_error_for_a_model_that_is_the_truth(self, corrected):
         """Data made by the corrected simulator itself leave it without any error."""

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 
 from sims.pendulum import Pendulum
 from sims.simulator import Simulator
+from sims.system import System
 from sims.tasks import SwingUp
 from studies import pendulum_gap
 from studies.learning.command import run_command
-from studies.learning.problem import Problem
-from studies.learning.tables import write_tables
 
 
 class EulerPendulum(Simulator):
@@ -37,21 +35,11 @@ class EulerPendulum(Simulator):
         return np.stack([states[:, 0] + self.dt * rate, rate], axis=1)
 
 
-def problem(trial, description) -> Problem:
-    return Problem(
-        description=description,
-        idealised=EulerPendulum(),
-        true=EulerPendulum(gravity=14.0),
-        task=SwingUp(horizon=50),
-    )
+def system_of(trial) -> System:
+    return System("quick", EulerPendulum(), EulerPendulum(gravity=14.0), SwingUp(horizon=50))
 
 
-def table(results: Sequence[Mapping], failures: Mapping[Path, str], folder: Path) -> str:
-    rows, _ = write_tables(results, folder)
-    return rows.to_string()
-
-
-STUDY = dataclasses.replace(pendulum_gap.STUDY, problem=problem, grid_report=table)
+STUDY = dataclasses.replace(pendulum_gap.STUDY, system=system_of)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

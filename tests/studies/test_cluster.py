@@ -16,7 +16,7 @@ from safetensors.numpy import load_file
 # budgets.yaml with tiny steps, budgets and networks.
 GRID = """
 budget: {iterations: 1, idealised_steps: 1050, difference_steps: 400}
-ddpg: {hidden: [16, 16]}
+ddpg: {hidden: [16, 16], warm_up: 300}
 grid:
 - seed: [0, 1]
   budget.true_samples: [40, 60]
@@ -48,10 +48,17 @@ def numbers(folder):
         return [timeless(item) for item in value] if isinstance(value, list) else value
 
     trials = {path.parent.name: path.parent for path in finished(folder)}
+
+    def results(trial):
+        found = json.loads((trial / "results.json").read_text())
+        for name in ("checksum", "versions", "made_by"):  # of the clock and the commit
+            del found[name]
+        return timeless(found)
+
     assert len(trials) == TRIALS
     return {
         name: (
-            timeless(json.loads((trial / "results.json").read_text())),
+            results(trial),
             {str(path.relative_to(trial)): tensors(path) for path in trial.rglob("*.safetensors")},
         )
         for name, trial in trials.items()

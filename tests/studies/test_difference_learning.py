@@ -1,54 +1,55 @@
 """The loop itself: the control arm, tests from several starts, and what is reported of them."""
 
+import itertools
+
 import numpy as np
 import pytest
 
-from policy.config import DDPGConfig
-from policy.ddpg import DDPG
+from policy import Algorithm, DDPGConfig
 from residual import Linear
+from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
+from sims.system import EvaluationProtocol, System
 from sims.tasks import SwingUp
+from studies.learning import steps as steps_module
+from studies.learning import streams, training
 from studies.learning.budget import Budget
-from studies.learning.loop import learn_by_difference
-from studies.learning.problem import PolicyTests, Problem
-from studies.learning.simulated import FILE
-from studies.learning.stages import Stages
+from studies.learning.kept import InMemory, OnDisk
+from studies.learning.loop import learn_by_difference, run_loop
+from studies.learning.steps import Steps
 from studies.running.progress import Silent
 
-CORRECTED = {
-    "class_path": "sims.pendulum_equation.PendulumEquation",
-    "init_args": {"mass": 0.089974, "dt": 0.05},
-}
+BUDGET = Budget(
+    true_samples=40,
+    iterations=2,
+    idealised_steps=120,
+    difference_steps=60,
+    true_steps=120,
+    baseline_steps=60,
+    control_steps=60,
+    corrected_steps=60,
+)
+DDPG = DDPGConfig(hidden=(8, 8), warm_up=50, batch=8)
+SYSTEM = System(
+    name="short pendulum",
+    nominal=PendulumEquation(),
+    true=PendulumEquation.true(),
+    task=SwingUp(horizon=30, start_at="anywhere"),
+    evaluation=EvaluationProtocol(
+        every=60, every_true=60, episodes=3, true_episodes=3, noisy=1, visited_seconds=1.0
+    ),
+    measures=lambda states, actions: {"turned": float(np.ptp(states[:, 0]))},
+)
+
+
+def learnt_with(keeper, rule="first"):
+    do = Steps(SYSTEM, Linear(), Algorithm(ddpg=DDPG), 0, keeper, Silent(), rule)
+    return run_loop(do, BUDGET, PendulumEquation(0.089974))
 
 
 @pytest.fixture(scope="module", params=["first", "all"])
 def learnt(tmp_path_factory, request):
-    problem = Problem(
-        description={"system": "short pendulum"},
-        idealised=PendulumEquation(),
-        true=PendulumEquation.true(),
-        task=SwingUp(horizon=30, start_at="anywhere"),
-        tests=PolicyTests(
-            every=60, every_true=60, episodes=3, true_episodes=3, noisy=1, visited_seconds=1.0
-        ),
-        measures=lambda run: {"turned": float(np.ptp(run.states[:, 0]))},
-    )
-    budget = Budget(
-        true_samples=40,
-        iterations=2,
-        idealised_steps=120,
-        difference_steps=60,
-        true_steps=120,
-        baseline_steps=60,
-        control_steps=60,
-        corrected_steps=60,
-    )
-    ddpg = DDPGConfig(hidden=(8, 8), warm_up=50, batch=8)
-    stages = Stages(tmp_path_factory.mktemp("stages"))
-    found = learn_by_difference(
-        problem, Linear(), budget, ddpg, 0, stages, Silent(), 0.0, request.param, CORRECTED
-    )
-    return request.param, found
+    return request.param, learnt_with(OnDisk(tmp_path_factory.mktemp("kept")), request.param)
 
 
 @pytest.fixture
@@ -56,23 +57,11 @@ def outcome(learnt):
     return learnt[1]
 
 
-def test_what_was_simulated_is_kept_once_and_learnt_from_again(learnt):
+def test_what_is_to_be_learnt_again_is_kept(learnt):
     rule, outcome = learnt
-    sizes = {
-        name: len(DDPG.load(folder / "agent.safetensors").replay)
-        for name, folder in outcome.folders.items()
-    }
-    kept = {name for name, folder in outcome.folders.items() if (folder / FILE).exists()}
-    if rule == "all":
-        assert set(sizes.values()) == {0}
-        assert kept == {
-            n for n in sizes if n.startswith(("idealised", "difference", "control", "corrected"))
-        }
-    else:
-        assert not kept
-        # The second update learns from the first one's 60 transitions again, and so the control.
-        assert sizes["difference-1"] == sizes["control-1"] == 60
-        assert sizes["difference-2"] == sizes["control-2"] == 120
+    kept = {name: len(t.simulated) for name, t in outcome.trainings.items() if t.simulated}
+    loop = {f"{kind}-{k}": 60 for kind in ("difference", "control") for k in (1, 2)}
+    assert kept == (loop if rule == "first" else loop | {"idealised": 120, "corrected": 60})
 
 
 def test_the_control_gets_the_same_training_and_no_true_samples(outcome):
@@ -82,7 +71,7 @@ def test_the_control_gets_the_same_training_and_no_true_samples(outcome):
         assert control["simulated_steps"] == difference["simulated_steps"] == 60
         assert control["true_samples"] == 0
         assert difference["true_samples"] == 40 * iteration
-        assert f"control-{iteration}" in outcome.folders
+        assert f"control-{iteration}" in outcome.trainings
 
 
 def test_a_policy_is_learnt_on_a_simulator_corrected_by_name(learnt):
@@ -90,9 +79,9 @@ def test_a_policy_is_learnt_on_a_simulator_corrected_by_name(learnt):
     (named,) = (p for p in outcome.policies if p["name"] == "corrected")
     assert named["true_samples"] == 0 and named["simulated_steps"] == 60
     if rule == "all":
-        simulated = np.load(outcome.folders["corrected"] / FILE)
-        steps = PendulumEquation(0.089974).step(simulated["states"], simulated["actions"])
-        np.testing.assert_allclose(simulated["next_states"], steps, atol=1e-4)
+        simulated = outcome.trainings["corrected"].simulated
+        steps = PendulumEquation(0.089974).step(simulated.states, simulated.actions)
+        np.testing.assert_allclose(simulated.next_states, steps, atol=1e-4)
 
 
 def test_policies_are_tested_from_several_starts_with_the_measures_asked_for(outcome):
@@ -107,3 +96,85 @@ def test_policies_are_tested_from_several_starts_with_the_measures_asked_for(out
 def test_the_reference_read_at_a_smaller_budget_is_the_cold_start(outcome):
     cold = next(p for p in outcome.policies if p["name"] == "cold")
     assert cold["true_samples"] == 60 and max(step for step, _ in cold["curve"]) <= 60
+
+
+def timeless(records):
+    return [{k: v for k, v in record.items() if "seconds" not in k} for record in records]
+
+
+def test_in_memory_is_the_same_as_kept_on_disk(learnt):
+    rule, outcome = learnt
+    memory = learnt_with(InMemory(), rule)
+    assert timeless(memory.policies) == timeless(outcome.policies)
+    assert timeless(memory.accuracy) == timeless(outcome.accuracy)
+    for name, kept in outcome.trainings.items():
+        ours, theirs = memory.trainings[name].learner.networks(), kept.learner.networks()
+        for array in theirs:
+            np.testing.assert_array_equal(ours[array], theirs[array])
+
+
+def test_no_two_steps_share_a_random_stream(monkeypatch):
+    drawn = []
+
+    def watched(seed, *purpose):
+        found = streams.stream(seed, *purpose)
+        drawn.append((found, (seed, *purpose)))
+        return found
+
+    for module in (steps_module, training):
+        monkeypatch.setattr(module, "stream", watched)
+    learnt_with(InMemory())
+    purposes = {purpose for _, purpose in drawn}
+    # Nothing is drawn twice, and no two purposes begin within reach of each other.
+    assert len(drawn) == len(purposes) >= 30
+    begins = sorted(found for found, _ in drawn)
+    assert all(b - a >= 2**20 for a, b in itertools.pairwise(begins))
+    trainings = {p[2:] for p in purposes if p[1] == "train"}
+    assert {("difference", 1), ("difference", 2), ("control", 1), ("cold", 0)} <= trainings
+
+
+def test_the_python_call_is_the_loop(tmp_path):
+    arguments = dict(
+        estimator=Linear(), samples=40, updates=1, steps=120, ddpg=DDPG, progress=Silent()
+    )
+    system = SYSTEM.nominal, SYSTEM.true, SYSTEM.task
+    found = learn_by_difference(*system, **arguments, evaluation=SYSTEM.evaluation, seed=3)
+    assert [p["name"] for p in found.policies] == ["idealised", "difference"]
+    assert found.policy.act(np.zeros(3)).shape == (1,)
+    assert found.model.predict(np.zeros((1, 2)), np.zeros((1, 1))).shape == (1, 2)
+    assert len(repr(found)) < 200 and "<table" in found._repr_html_()
+    assert list(found.to_dataframe()["name"]) == ["idealised", "difference"]
+    assert found.plot().axes
+    page = found.report(tmp_path / "page.html")
+    assert page == tmp_path / "page.html" and "closing the simulation gap" in page.read_text()
+
+
+def test_a_budget_that_teaches_nothing_is_refused():
+    with pytest.raises(ValueError, match=r"budget.difference_steps is 40.*warm_up"):
+        learn_by_difference(
+            SYSTEM.nominal, SYSTEM.true, SYSTEM.task,
+            budget=Budget(40, 1, 120, 40), ddpg=DDPG, progress=Silent(),
+        )  # fmt: skip
+
+
+def true_return(seed, budget, **options):
+    found = learn_by_difference(
+        Pendulum(), Pendulum.true(), SwingUp(), estimator=Linear(), budget=budget, seed=seed,
+        progress=Silent(), **options,
+    )  # fmt: skip
+    before, after = found.policies
+    assert (before["name"], after["name"]) == ("idealised", "difference")
+    return before["return_true"], after["return_true"]
+
+
+def test_one_update_beats_the_idealised_policy():
+    quick = EvaluationProtocol(every=1000, noisy=1)
+    small = DDPGConfig(hidden=(64, 48), actor_lr=3e-4)
+    before, after = true_return(0, Budget(400, 1, 10_000, 4000), ddpg=small, evaluation=quick)
+    assert after > before
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_one_update_with_400_samples_swings_the_true_pendulum_up(seed):
+    assert true_return(seed, Budget(400, 1))[1] > -700

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from studies import leo_gap
-from studies.learning.statistics import mean
-from studies.leo.groups import grouped
-from studies.leo.tables import write_grid_report
+from studies.learnt.many_trials import write_grid_report
+from studies.learnt.statistics import mean
+from studies.learnt.words import grouped
+from studies.systems.leo import EVALUATION, GROUPS
 
 TINY = [
     "--estimator", "residual.Linear",
@@ -44,7 +45,7 @@ def test_every_policy_is_walked_on_the_true_leo_from_several_starts(results):
     }  # fmt: skip
     for key in (("idealised", 0), ("difference", 1), ("control", 1), ("true", 0)):
         tests = named[key]["tests"]
-        assert len(tests) == leo_gap.TESTS.true_episodes
+        assert len(tests) == EVALUATION.true_episodes
         assert named[key]["return_true"] == pytest.approx(np.mean([t["return"] for t in tests]))
         for test in tests:
             assert test["fell"] == (test["seconds"] < 20.0)
@@ -55,7 +56,7 @@ def test_every_policy_is_walked_on_the_true_leo_from_several_starts(results):
 
 def test_accuracy_is_told_by_group(results):
     (accuracy,) = results["accuracy"]
-    assert set(grouped(accuracy["visited"]["one_step"])) == {
+    assert set(grouped(accuracy["visited"]["one_step"], GROUPS)) == {
         "base", "joint angles", "base rates", "joint rates",
     }  # fmt: skip
 
@@ -64,7 +65,7 @@ def test_the_report_shows_it_walking_and_carries_everything(folder):
     page = (folder / "report.html").read_text()
     assert page.count("data:image/gif") == 3
     assert "http://" not in page.replace("http://www.w3.org", "")
-    for name in ("torso", "updates", "curves"):
+    for name in ("trajectories", "returns", "curves"):
         assert (folder / "figures" / f"{name}.png").stat().st_size > 1000
 
 
@@ -79,10 +80,10 @@ def test_a_table_over_trials(results, tmp_path):
     assert str(pairs) in text
     assert "Linear, update 1" in text and "no difference model, update 1" in text
     page = (tmp_path / "report.html").read_text()
-    for words in ("Table III", "309 766", "update Linear returns"):
+    for words in ("309 766", "Samples to a return", "Linear returns"):
         assert words in page
-    errors = grouped(results["accuracy"][0]["visited"]["one_step"])
-    assert "Accuracy where the policies go" in page and f"{errors['base']:.2f}" in page
+    errors = grouped(results["accuracy"][0]["visited"]["one_step"], GROUPS)
+    assert "Accuracy where the policies go" in page and f"{errors['base']:.3f}" in page
 
 
 def test_a_wrong_budget_is_one_line(capsys, tmp_path):

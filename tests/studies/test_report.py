@@ -13,7 +13,7 @@ from studies.report import main, study_of
 
 TINY = (
     "budget: {iterations: 1, true_samples: 40, idealised_steps: 1050, difference_steps: 300}\n"
-    "ddpg: {hidden: [16, 16]}\n"
+    "ddpg: {hidden: [16, 16], warm_up: 200}\n"
     "estimator: {class_path: residual.Linear}\n"
 )
 
@@ -39,7 +39,7 @@ def test_tables_come_back_from_the_trials_alone(finished, monkeypatch):
     before = {name: (finished / name).read_bytes() for name in tables}
     for name in tables:
         (finished / name).unlink()
-    monkeypatch.setattr("studies.learning.trial.learn_by_difference", None)
+    monkeypatch.setattr("studies.learning.trial.run_loop", None)
     rebuild(quick_gap.STUDY, finished)
     assert {name: (finished / name).read_bytes() for name in tables} == before
 

@@ -17,17 +17,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from studies import reporting
-from studies.reporting import figures
-from studies.reporting.media import encode_gif, load_media
-from studies.reporting.render import inline, number, paragraphs
-from studies.running.files import (
+from simgap_files import (
     atomic_path,
     atomic_write_bytes,
     atomic_write_json,
     atomic_write_text,
     remove_partial_files,
 )
+from studies import reporting
+from studies.reporting import figures
+from studies.reporting.media import encode_gif, load_media
+from studies.reporting.render import inline, number, paragraphs
 
 VOID = {"meta", "link", "img", "source", "br", "hr"}
 
@@ -63,13 +63,22 @@ def wave():
     return {"measured": (t, np.sin(t)), "nominal": (t, np.cos(t))}
 
 
+def drawn(series, width=6.4, **more):
+    with figures.styled():
+        figure, axes = figures.new_figure(width=width)
+        figures.draw_lines(axes[0, 0], series, **more)
+        axes[0, 0].set(xlabel="time (s)", ylabel="angle (rad)")
+        figure.legend(loc="outside upper left", ncols=4)
+    return figure
+
+
 def film():
     frames = [np.full((20, 30, 3), shade, np.uint8) for shade in (0, 120, 240)]
     return encode_gif(frames, seconds_per_frame=0.1)
 
 
 def full_report():
-    figure = figures.lines(wave(), "time (s)", "angle (rad)")
+    figure = drawn(wave())
     return reporting.Report(
         "Pendulum & friends",
         "Two runs of `sims.Pendulum`.",
@@ -140,7 +149,7 @@ def test_pictures_arrive_whole():
 
 
 def test_figure_is_laid_out_anew_for_a_phone_and_keeps_its_size():
-    figure = figures.lines(wave(), "time (s)", "angle (rad)", width=6.4)
+    figure = drawn(wave())
     section = reporting.Figure(figure, alt="x")
     narrow, wide = (
         float(re.search(rb'<svg[^>]* width="([\d.]+)pt"', picture.data)[1])
@@ -152,7 +161,7 @@ def test_figure_is_laid_out_anew_for_a_phone_and_keeps_its_size():
 
 def test_figure_that_does_not_fit_a_phone_is_not_cut():
     names = {f"a rather long name of a curve, number {n}": c for n, c in enumerate(wave().values())}
-    figure = figures.lines(names, "x", "y", width=8)
+    figure = drawn(names, width=8)
     assert reporting.Figure(figure, alt="x").narrow_picture is None
     side_by_side, _ = figures.new_figure(1, 2)
     assert reporting.Figure(side_by_side, alt="x").narrow_picture is None
@@ -237,8 +246,11 @@ def test_links_lead_to_web_pages_only():
 
 def test_saved_figure_has_its_numbers_beside_it(tmp_path):
     series = {"short": ([0.0, 1.0], [0.1, 1 / 3]), "long": ([0.0, 1.0, 2.0], [1.0, 2.0, 3.0])}
-    figure = figures.lines(series, "x", "y", log_x=False)
-    path = figures.save_figure(figure, tmp_path / "a" / "curve.png", figures.series_data(series))
+    columns = {
+        f"{name} {c}": v for name, xy in series.items() for c, v in zip("xy", xy, strict=False)
+    }
+    figure = drawn(series)
+    path = figures.save_figure(figure, tmp_path / "a" / "curve.png", columns)
     with Image.open(path) as image:
         assert image.size[0] > 1000
     table = pd.read_csv(path.with_suffix(".csv"))
@@ -251,19 +263,10 @@ def test_saved_figure_has_its_numbers_beside_it(tmp_path):
 
 def test_drawing_leaves_no_global_state_behind():
     before = dict(matplotlib.rcParams)
-    figures.intervals({"a": (1, 0.5, 2), "b": (3, 2, 5)}, "error", reference={"floor": 0.7})
-    figures.lines(wave(), "x", "y", bands={"nominal": (np.zeros(50), np.ones(50))}, log_y=True)
+    drawn(wave(), bands={"nominal": (np.zeros(50), np.ones(50))})
     assert dict(matplotlib.rcParams) == before
     if "matplotlib.pyplot" in sys.modules:
         assert not sys.modules["matplotlib.pyplot"].get_fignums()
-
-
-def test_intervals_are_drawn_in_order_from_zero():
-    figure = figures.intervals({"first": (1, 0.5, 2), "second": (3, 2, 5)}, "error (rad)")
-    (axis,) = figure.axes
-    assert [label.get_text() for label in axis.get_yticklabels()] == ["first", "second"]
-    assert axis.yaxis_inverted()
-    assert axis.get_xlim()[0] == 0
 
 
 def test_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):

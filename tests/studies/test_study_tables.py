@@ -1,10 +1,10 @@
 """Tables keep apart what differs."""
 
-from studies.learning.tables import apart, policy_rows
+from studies.learnt.tables import apart, policy_rows
 
 
 def trial(seed, label="Linear", **settings):
-    config = {"seed": seed, "estimator": {"class_path": label}, "caution": 0.0}
+    config = {"seed": seed, "estimator": {"class_path": label}, "uncertainty_penalty": 0.0}
     config |= {"budget": {"true_samples": 40, "iterations": 1}, "ddpg": {"gamma": 0.99}}
     policy = {"name": "idealised", "return_true": -1.0}
     return {"label": label, "seed": seed, "config": config | settings, "policies": [policy]}
@@ -33,5 +33,8 @@ def test_what_has_a_column_is_no_part_of_the_label():
 
 def test_settings_that_older_trials_lack_keep_them_apart():
     old = trial(0)
-    del old["config"]["caution"]
-    assert labels(old, trial(0)) == ["Linear, caution=None", "Linear, caution=0.0"]
+    del old["config"]["uncertainty_penalty"]
+    assert labels(old, trial(0)) == [
+        "Linear, uncertainty_penalty=None",
+        "Linear, uncertainty_penalty=0.0",
+    ]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.running.files import read_json
+from simgap_files import read_json
 from studies.running.progress import Silent
 from studies.running.trials import (
     Execution,

@@ -5,7 +5,7 @@ import pytest
 
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
-from studies.pendulum.value_iteration import episode_return, value_iteration
+from studies.systems.value_iteration import episode_return, value_iteration
 
 
 @pytest.fixture(scope="module")

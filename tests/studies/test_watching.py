@@ -2,8 +2,8 @@
 
 import pytest
 
+from simgap_files import read_json
 from studies.running.curves import Curves
-from studies.running.files import read_json
 from studies.running.progress import Bars, Several
 from studies.running.watching import StatusFile, TrialsView, running
 

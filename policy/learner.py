@@ -1,0 +1,173 @@
+"""What the studies ask of an algorithm, and how one is named: DDPG, or one of another library."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+import gymnasium
+from numpy.typing import ArrayLike, NDArray
+
+from policy.config import DDPGConfig
+from policy.ddpg import DDPG, Progress
+from policy.evaluate import Policy
+from policy.files import read_arrays
+
+OURS = "policy.DDPG"
+
+
+class Learner(Protocol):
+    """An off-policy algorithm on its way; methods as those of ``policy.DDPG``."""
+
+    @property
+    def policy(self) -> Policy:
+        """The current policy without noise; it changes as the learner learns."""
+        ...
+
+    @property
+    def updates(self) -> int:
+        """Updates of the networks so far."""
+        ...
+
+    def learn(
+        self,
+        env: gymnasium.Env[Any, Any],
+        steps: int,
+        callback: Callable[[Progress], bool | None] | None = None,
+        every: int = 1000,
+        random_steps: int = 0,
+    ) -> None:
+        """Act in ``env`` and learn."""
+        ...
+
+    def remember(
+        self,
+        observations: ArrayLike,
+        actions: ArrayLike,
+        rewards: ArrayLike,
+        next_observations: ArrayLike,
+        terminated: ArrayLike,
+    ) -> None:
+        """Add transitions to the replay."""
+        ...
+
+    def networks(self) -> dict[str, NDArray[Any]]:
+        """A copy of what was learnt, by name."""
+        ...
+
+    def restore(self, networks: dict[str, NDArray[Any]]) -> None:
+        """Return to such a copy."""
+        ...
+
+    def save(self, path: str | Path, replay: bool = False) -> None:
+        """Write what was learnt to a file."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True)
+class Algorithm:
+    """Which algorithm learns, and its settings.
+
+    Args:
+        path: ``"policy.DDPG"``, or the import path of an off-policy algorithm of
+            Stable-Baselines3, such as ``"stable_baselines3.SAC"``.
+        ddpg: Settings of ``policy.DDPG``.
+        options: Settings of any other algorithm: keyword arguments of its class.
+
+    Raises:
+        ValueError: There is no such class, it is not off-policy, or its library is not installed.
+    """
+
+    path: str = OURS
+    ddpg: DDPGConfig = dataclasses.field(default_factory=DDPGConfig)
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.path == OURS and self.options:
+            raise ValueError(f"the options of {OURS} are those of ddpg, not {dict(self.options)}")
+        self.kind()
+
+    def kind(self) -> type[Any]:
+        """The class."""
+        if self.path == OURS:
+            return DDPG
+        from policy.stable_baselines import off_policy_class
+
+        return off_policy_class(self.path)
+
+    def make(
+        self, env: gymnasium.Env[Any, Any], seed: int, noise_sigma: float | None = None
+    ) -> Learner:
+        """A learner that knows nothing yet.
+
+        Args:
+            env: For its spaces.
+            seed: Everything random follows from it.
+            noise_sigma: Exploration noise of DDPG, if not that of its settings; other algorithms
+                explore in their own way.
+        """
+        if self.path != OURS:
+            from policy.stable_baselines import StableBaselines
+
+            return StableBaselines(self.kind(), self.options, env, seed)
+        config = self.ddpg
+        if noise_sigma is not None:
+            config = dataclasses.replace(config, noise_sigma=noise_sigma)
+        return DDPG.for_env(env, config, seed)
+
+    def load(self, path: Path, env: gymnasium.Env[Any, Any]) -> Learner:
+        """A learner with what another one of this algorithm has saved; errors as ``DDPG.load``."""
+        if self.path == OURS:
+            return DDPG.load(path)
+        from policy.stable_baselines import FORMAT
+
+        learner = self.make(env, 0)
+        learner.restore(read_arrays(path, FORMAT)[0])
+        return learner
+
+    @property
+    def warm_up(self) -> int:
+        """Transitions that an empty replay needs before anything is learnt."""
+        if self.path == OURS:
+            return self.ddpg.warm_up
+        return int(self.options.get("learning_starts", 100))
+
+
+def imported(path: str, what: str) -> Any:
+    """What an import path names.
+
+    Args:
+        path: ``"package.module.Name"``.
+        what: In words, for the error.
+
+    Raises:
+        ValueError: There is no such thing.
+    """
+    module, _, name = path.rpartition(".")
+    if not module:
+        raise ValueError(f"{what} {path!r} is no import path: write my_file.NAME")
+    try:
+        return getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"no {what} {path!r}: {error}") from None
+
+
+def load_policy(path: str | Path) -> Policy:
+    """A policy from a file of ``DDPG.save`` or ``MlpPolicy.save``, or by its import path.
+
+    Raises:
+        FileNotFoundError: There is no such file.
+        ValueError: The file holds something else, or there is nothing at the import path.
+    """
+    from policy.mlp import MlpPolicy
+
+    if not Path(path).exists() and not str(path).endswith(".safetensors") and "/" not in str(path):
+        found = imported(str(path), "policy")
+        return found() if isinstance(found, type) else found
+    try:
+        return MlpPolicy.load(path)
+    except ValueError:
+        return DDPG.load(path).policy

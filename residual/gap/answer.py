@@ -1,0 +1,197 @@
+"""From a choice to the answer: confirmation, the table of errors, and everything as plain data."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from residual.gap.aliases import hidden
+from residual.gap.confirmation import Claim, claims, share
+from residual.gap.explain import FOOTNOTE, Explanation
+from residual.gap.forecasts import gap, held_out, main_channel, noise_floor, rollouts
+from residual.gap.imitation import imitated
+from residual.gap.model import Model
+from residual.gap.numerics import other_numerics
+from residual.gap.prepare import Prepared, prepare
+from residual.gap.result import Blind, Gap, GapResult, Rival, Verdict
+from residual.gap.search import Key
+from residual.gap.verdicts import (
+    blind_verdict,
+    dependent,
+    effect_verdict,
+    minor_verdict,
+    nameable,
+    no_gap_verdict,
+    remainder_verdict,
+)
+from residual.trajectories import Trajectory
+
+#: Sets listed as evidence.
+EVIDENCE = 40
+#: Rise of the loss with inputs held the other way, as a share of it, that rules that out.
+OTHER_HOLD = 0.5
+
+
+@dataclasses.dataclass(frozen=True)
+class Answer:
+    """What stays after confirmation.
+
+    Attributes:
+        found: Search and choice.
+        key: What goes into the corrected simulator: chosen effects that can be named.
+        claims: What bears on each of them.
+        leads: Chosen effects that could be too many others.
+    """
+
+    found: Explanation
+    key: Key
+    claims: tuple[Claim, ...]
+    leads: tuple[str, ...]
+
+
+def matters(found: Explanation, tolerance: float | None) -> bool:
+    """Whether the nominal simulator errs by more than a tolerance."""
+    if tolerance is None:
+        return True
+    search = found.search
+    floor = noise_floor(search.fitter, search.tried[()], found.floor.sigma)
+    squares = search.validated[()].squares
+    main = main_channel(search.simulator, search.fitter.samples.measured, squares, floor)
+    return bool(np.sqrt(np.nanmean(squares[:, main])) > tolerance)
+
+
+def confirm(found: Explanation, groups: dict[str, tuple[str, ...]], asked: bool = True) -> Answer:
+    """Claims of the chosen effects; what cannot be named is left out, and the rest asked again.
+
+    Args:
+        found: The choice.
+        groups: Exact twins by label.
+        asked: False if the gap does not matter, so that nothing is named.
+    """
+    search, key = found.search, found.key if asked else ()
+    leads: tuple[str, ...] = ()
+    while True:
+        fit = search.tried[key]
+        slack = search.fitter.tie(search.tried[()]) if found.adequate else OTHER_HOLD * fit.merit
+        numerics = other_numerics(search, key, slack) if key else []
+        made = claims(search, key, found.adequate, groups, numerics)
+        if found.adequate and len(key) == 2:
+            alone = imitated(search, key)
+            made = [dataclasses.replace(c, rivals=(*c.rivals, *alone)) for c in made]
+        blocks = len(search.fitter.blocks)
+        lost = [claim for claim in made if not nameable(search, claim, blocks)]
+        if not lost:
+            return Answer(found, key, tuple(made), leads)
+        # The one that matters least goes first: what is left may have fewer rivals.
+        gone = lost[-1].number
+        leads = (search.candidates[gone].label, *leads)
+        key, theta = search.merged(key, (), drop=(gone,))
+        search.add({key: theta})
+        search.add_exchanged(key, 3)
+
+
+def summed_up(answer: Answer) -> Gap:
+    """The table of errors."""
+    found, search = answer.found, answer.found.search
+    floor = noise_floor(search.fitter, search.tried[answer.key], found.floor.sigma)
+    left = search.fitter.left(search.tried[answer.key], found.floor)
+    order = [claim.number for claim in answer.claims]
+    return gap(search, answer.key, order, floor, (found.nominal_left.ratio, left.ratio))
+
+
+def judged_apart(answer: Answer, prepared: Prepared, runs: Sequence[Trajectory], table: Gap) -> Gap:
+    """The same table for records that were set aside."""
+    search = answer.found.search
+    other = prepare(search.simulator, runs, prepared.horizon).fitter
+    other = other.weighed_like(search.fitter)
+    fits = []
+    for key in ((), answer.key):
+        model = Model(search.model(key).bind(search.tried[key].theta))
+        fits.append(other.fit(model, np.zeros(0)))
+    floor = noise_floor(other, fits[1], answer.found.floor.sigma)
+    return held_out(table, other, fits[0], fits[1], floor)
+
+
+def told(
+    answer: Answer, table: Gap, apart: Gap | None, sets: Sequence[tuple[str, ...]],
+    tolerance: float | None, quality: Sequence[str], seconds: dict[str, float],
+) -> GapResult:  # fmt: skip
+    """Everything as plain data."""
+    found, search, key = answer.found, answer.found.search, answer.key
+    fitter, simulator = search.fitter, search.simulator
+    fit = search.tried[key]
+    corrected = fit.model.bind(fit.theta)
+    measured = [simulator.physical_channels[c] for c in fitter.samples.measured]
+    blind: tuple[Blind, ...] = ()
+    if found.adequate:
+        blind = hidden(search.signatures(key), search.candidates, key, found.needed)
+    where = fitter.where(search.tried[()], found.floor)
+    return GapResult(
+        verdicts=tuple(verdicts(answer, table, sets, tolerance, blind)),
+        gap=table,
+        held_out=apart,
+        where=where,
+        evidence=evidence(answer),
+        rollouts=rollouts(search, search.validated[()], search.validated[key]),
+        effects=tuple(corrected.effects[len(simulator.effects) :]),
+        corrected=corrected,
+        channels=tuple((channel.name, channel.unit) for channel in measured),
+        noise={
+            channel.name: (float(s), float(e))
+            for channel, s, e in zip(measured, found.floor.sigma, found.floor.error, strict=True)
+        },
+        quality=tuple(quality),
+        blind=blind,
+        adequate=found.adequate,
+        seconds=seconds,
+    )
+
+
+def verdicts(
+    answer: Answer, table: Gap, sets: Sequence[tuple[str, ...]], tolerance: float | None,
+    blind: Sequence[Blind],
+) -> list[Verdict]:  # fmt: skip
+    """All verdicts, most important first."""
+    found, search = answer.found, answer.found.search
+    labels = [search.candidates[claim.number].label for claim in answer.claims]
+    blocks = len(search.fitter.blocks)
+    made: list[Verdict] = []
+    for claim, label in zip(answer.claims, labels, strict=True):
+        made.append(effect_verdict(search, claim, blocks, *dependent(label, labels, sets)))
+    left = search.fitter.left(search.tried[answer.key], found.floor)
+    if tolerance is not None and table.before.value <= tolerance:
+        made.insert(
+            0,
+            no_gap_verdict(
+                f"nothing that matters: the {table.horizon_s:.3g} s error is "
+                f"{table.before.value:.3g} {table.unit}, within the tolerance of {tolerance:.3g}"
+            ),
+        )
+    elif not answer.key and left.adequate:
+        made.append(no_gap_verdict("no gap above noise"))
+    elif not left.adequate and left.ratio > FOOTNOTE:
+        made.append(remainder_verdict(left, table, answer.leads))
+    for number, with_it in found.choice.minor.items():
+        if number not in answer.key:
+            made.append(minor_verdict(search, number, share(search, with_it, number)))
+    if blind:
+        made.append(blind_verdict(blind))
+    return made
+
+
+def evidence(answer: Answer) -> tuple[Rival, ...]:
+    """What was tried, the chosen set first, then by error."""
+    search, found = answer.found.search, answer.found
+    reasons = found.choice.reasons
+    if found.key != answer.key:
+        reasons = {**reasons, found.key: "holds effects that too many others could replace"}
+    rows = [
+        Rival(
+            search.labels(key), search.error(key), key == answer.key,
+            "" if key == answer.key else reasons.get(key, "tried against the chosen ones"),
+        )
+        for key in search.tried
+    ]  # fmt: skip
+    return tuple(sorted(rows, key=lambda row: (not row.chosen, row.error))[:EVIDENCE])

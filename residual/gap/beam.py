@@ -1,0 +1,112 @@
+"""A beam search: sets of effects grown by one until one more no longer pays."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.screening import Gain, Signatures, gains, pair_gains
+from residual.gap.search import Key, Proposals, Search
+
+Array = NDArray[np.float64]
+
+
+def run(search: Search, seeds: Proposals | None = None) -> Key:
+    """Grow sets until one more effect no longer pays; returns the one that forecasts best."""
+    effort = search.effort
+    search.add(seeds or {})
+    frontier: list[Key] = [()]
+    reached = 1.0
+    for level in range(1, effort.most + 1):
+        fresh: list[Key] = []
+        for key in frontier:
+            grown = grow(search, key)
+            fresh += grown + together(search, key, grown)
+        if not fresh or search.late:
+            break
+        by_merit = sorted(fresh, key=lambda k: search.tried[k].merit)[: effort.beam]
+        by_error = sorted(fresh, key=search.error)[:1]
+        frontier = list(dict.fromkeys([*by_error, *by_merit]))
+        now = search.error(by_error[0])
+        if level > 1 and not _pays(search, by_error[0], reached):
+            break
+        reached = min(reached, now)
+    return search.best()
+
+
+def _pays(search: Search, key: Key, reached: float) -> bool:
+    """Whether a set is clearly better than what was reached, in all or in one joint."""
+    if search.error(key) < (1 - search.effort.stale) * reached:
+        return True
+    before = min((k for k in search.usable() if len(k) < len(key)), key=search.error)
+    own = search.currency.by_group(search.validated[key].squares)
+    its = search.currency.by_group(search.validated[before].squares)
+    return bool((own < (1 - 2 * search.effort.stale) * its).any())
+
+
+def grow(search: Search, key: Key) -> list[Key]:
+    """Fit sets one effect larger than a fitted one, the best of the linear screen for each
+    joint; those that turn out absurd are replaced by the next."""
+    around = search.signatures(key)
+    places = search.currency.groups
+    total = search.effort.grown if key else search.effort.singles
+    wanted = max(2, -(-total // len(places)))
+    found: list[Key] = []
+    for group in places:
+        good = 0
+        for gain in _by_gain(search, around, group)[: 3 * wanted]:
+            if search.late:
+                break
+            number = around.variants[gain.variants[0]].candidate
+            fresh, theta = search.merged(key, [(number, gain.values[0])])
+            if number in key or gain.value <= 0 or not search.fits_in(fresh):
+                continue
+            if fresh not in found:
+                search.add({fresh: theta})
+                if fresh in search.tried and search.sound(fresh):
+                    found.append(fresh)
+            good += fresh in found
+            if good >= wanted:
+                break
+    if not key:
+        for pair in pair_gains(around, search.effort.pairs):
+            numbers = [around.variants[v].candidate for v in pair.variants]
+            fresh, theta = search.merged(key, zip(numbers, pair.values, strict=True))
+            search.add({fresh: theta})
+            if fresh in search.tried and search.sound(fresh):
+                found.append(fresh)
+    return list(dict.fromkeys(found))
+
+
+def together(search: Search, key: Key, grown: list[Key]) -> list[Key]:
+    """The set with the best addition for every joint at once, if several joints gain."""
+    if len(search.currency.groups) < 2:
+        return []
+    base = search.currency.by_group(search.validated[key].squares)
+    additions: dict[int, Array] = {}
+    for group in range(len(base)):
+        best, reached = None, (1 - 2 * search.effort.stale) * base[group]
+        for fresh in grown:
+            if len(fresh) != len(key) + 1:
+                continue
+            error = search.currency.by_group(search.validated[fresh].squares)[group]
+            if error < reached:
+                best, reached = fresh, error
+        if best is not None:
+            (number,) = set(best) - set(key)
+            fit = search.tried[best]
+            additions[number] = fit.theta[fit.model.owner == best.index(number)]
+    fresh, theta = search.merged(key, additions.items())
+    if len(additions) < 2 or not search.fits_in(fresh):
+        return []
+    search.add({fresh: theta})
+    return [fresh] if fresh in search.tried and search.sound(fresh) else []
+
+
+def _by_gain(search: Search, around: Signatures, group: tuple[int, ...]) -> list[Gain]:
+    """Gains counted on the channels of one joint."""
+    if len(search.currency.groups) < 2:
+        return gains(around)
+    measured = len(search.fitter.samples.measured)
+    rows = np.isin(np.arange(len(around.residual)) % measured, group)
+    return gains(around, around.residual[rows], around.matrix[rows])

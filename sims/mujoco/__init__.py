@@ -1,0 +1,4 @@
+"""MuJoCo models (MJCF, URDF) as simulators that host effects; needs ``simgap[mujoco]``."""
+
+from sims.mujoco.effects import AttributeChange as AttributeChange
+from sims.mujoco.simulator import MujocoSimulator as MujocoSimulator

@@ -1,0 +1,194 @@
+"""A model file, compiled as a nominal: what is refused, and what is set so that rows are pure."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+import numpy as np
+
+try:
+    import mujoco
+    import mujoco.batch
+except ImportError as missing:  # pragma: no cover - depends on what is installed
+    raise ImportError(
+        "MuJoCo models need the package mujoco, 3.17 or newer: pip install 'simgap[mujoco]'"
+    ) from missing
+
+#: Dry friction in MuJoCo is soft: held, a joint creeps. With these impedances it creeps ten times
+#: less than by default; they count only where frictionloss is above zero.
+HARD_FRICTION = (0.99, 0.999, 0.001)
+DEFAULT_FRICTION = (0.9, 0.95, 0.001)
+
+INTEGRATORS = {
+    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "RK4": mujoco.mjtIntegrator.mjINT_RK4,
+    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """A model file and what is changed in it before it is compiled.
+
+    Args:
+        path: MJCF (``.xml``) or URDF (``.urdf``); includes and meshes are looked up beside it.
+        timestep: In s, if not the file's own.
+        integrator: ``"Euler"``, ``"RK4"``, ``"implicit"`` or ``"implicitfast"``, likewise.
+        motors: Joints that get a torque motor, or ``("all",)``: for URDF, which has no actuators.
+    """
+
+    path: Path
+    timestep: float | None = None
+    integrator: str | None = None
+    motors: tuple[str, ...] | None = None
+
+    @property
+    def urdf(self) -> bool:
+        """Whether it is a URDF."""
+        return self.path.suffix == ".urdf"
+
+
+def specification(source: Source) -> Any:
+    """The ``mujoco.MjSpec`` of a source, with its changes.
+
+    Raises:
+        ValueError: The file is missing, broken, or lacks a mesh; the message is one line.
+    """
+    text = model_text(source)
+    spec = _read(source.path) if text is None else mujoco.MjSpec.from_string(text.decode())
+    if source.timestep is not None:
+        spec.option.timestep = source.timestep
+    if source.integrator is not None:
+        if source.integrator not in INTEGRATORS:
+            known = ", ".join(INTEGRATORS)
+            raise ValueError(f"there is no integrator {source.integrator!r}; give one of {known}")
+        spec.option.integrator = INTEGRATORS[source.integrator]
+    return spec
+
+
+def model_text(source: Source) -> bytes | None:
+    """MJCF that MuJoCo writes for a URDF or a model with added motors; None if the file is used.
+
+    Raises:
+        ValueError: The file cannot be used, has no joint of a given name, or is a URDF without
+            motors.
+    """
+    if not source.urdf and source.motors is None:
+        return None
+    spec = _read(source.path)
+    if source.motors is not None:
+        _add_motors(spec, source.motors, source.path)
+    elif not spec.actuators:
+        raise ValueError(
+            f"{source.path}: a URDF has no actuators: say which joints have a torque motor, "
+            "in a YAML file with class_path: sims.mujoco.MujocoSimulator and init_args: "
+            f"{{model: {source.path.name}, motors: [all]}}; motors: [] for none. "
+            f"Its joints: {', '.join(joint.name for joint in spec.joints) or 'none'}"
+        )
+    # MuJoCo writes six digits, so what it wrote is the nominal, not what it read.
+    folder = source.path.parent.resolve()
+    spec.compiler.meshdir = str(folder / spec.compiler.meshdir)
+    spec.compiler.texturedir = str(folder / spec.compiler.texturedir)
+    try:
+        spec.compile()
+    except ValueError as error:
+        raise ValueError(f"{source.path}: {_one_line(error)}") from None
+    return str(spec.to_xml()).encode()
+
+
+def _read(path: Path) -> Any:
+    if not path.is_file():
+        raise ValueError(f"there is no model file {path}")
+    try:
+        expat.ParserCreate().Parse(path.read_bytes(), True)
+    except expat.ExpatError as error:
+        raise ValueError(f"{path}: not well-formed XML: {error}") from None
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise ValueError(f"{path}: {_one_line(error)}") from None
+
+
+def compiled(source: Source) -> Any:
+    """The ``mujoco.MjModel`` that is stepped.
+
+    It differs from the file in four ways that leave the motion alone: a diverged state is not
+    reset, controls are not clamped (the simulator has clipped them to the same range, and effects
+    come after that), friction that is not there yet would be hard, and no body takes the short
+    cut that forbids its centre of mass to move.
+
+    Raises:
+        ValueError: The file cannot be compiled, or has hidden state that no row carries.
+    """
+    model = plain(source, simple=False)
+    _refuse_hidden_state(model, source.path)
+    flags = mujoco.mjtDisableBit
+    model.opt.disableflags |= int(flags.mjDSBL_AUTORESET) | int(flags.mjDSBL_CLAMPCTRL)
+    soft = np.isclose(model.dof_solimp[:, :3], DEFAULT_FRICTION).all(axis=1)
+    model.dof_solimp[soft & (model.dof_frictionloss == 0), :3] = HARD_FRICTION
+    return model
+
+
+def plain(source: Source, simple: bool = True) -> Any:
+    """The model as MuJoCo compiles it.
+
+    Args:
+        source: The file.
+        simple: Whether bodies may be compiled as "simple", which is a little faster.
+    """
+    spec = specification(source)
+    if not simple:
+        for body in spec.bodies:
+            body.simple = False
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise ValueError(f"{source.path}: {_one_line(error)}") from None
+
+
+def _add_motors(spec: Any, motors: Sequence[str], path: Path) -> None:
+    joints = {joint.name: joint for joint in spec.joints}
+    moving = [mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE]
+    if list(motors) == ["all"]:
+        motors = [name for name, joint in joints.items() if joint.type in moving]
+    for name in motors:
+        if name not in joints:
+            raise ValueError(f"{path}: there is no joint {name!r}; it has: {', '.join(joints)}")
+        actuator = spec.add_actuator(name=name, target=name)
+        actuator.trntype = mujoco.mjtTrn.mjTRN_JOINT
+        actuator.set_to_motor()
+        effort = np.asarray(joints[name].actfrcrange, float)
+        if effort[1] > effort[0]:
+            actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
+            actuator.ctrlrange = effort
+
+
+def _refuse_hidden_state(model: Any, path: Path) -> None:
+    """What would make a step depend on more than its row."""
+    hidden = {
+        "sleep (option flag sleep)": model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP),
+        "engine plugins": model.nplugin,
+        "actuators or sensors with a delay (nsample)": model.nhistory,
+        "flexible bodies (flex)": model.nflex,
+        "mocap bodies": model.nmocap,
+    }
+    for what, count in hidden.items():
+        if count:
+            raise ValueError(
+                f"{path}: the model has {what}, whose state is not part of positions, velocities "
+                "and activations: remove it to use the model as a simulator here"
+            )
+    if not model.nv:
+        raise ValueError(f"{path}: no joint moves in this model")
+
+
+def _one_line(error: Exception) -> str:
+    """MuJoCo's message without its line breaks."""
+    text = re.sub(r"\s+", " ", str(error)).strip()
+    return re.sub(r"^(XML )?Error: ", "", text)

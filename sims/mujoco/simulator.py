@@ -1,0 +1,296 @@
+"""A MuJoCo model as a simulator that hosts effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from sims.drive import lagged
+from sims.effects.actuator import (
+    ActuatorBias,
+    ActuatorLag,
+    DeadZone,
+    Delay,
+    Saturation,
+)
+from sims.effects.base import Effect
+from sims.effects.joint import ConstantLoad, LinearSpring
+from sims.effects.sensor import SensorOffset
+from sims.host import HostSimulator
+from sims.mujoco import elements
+from sims.mujoco.attributes import Attribute, attributes, row_fields
+from sims.mujoco.compiled import INTEGRATORS, Source, compiled
+from sims.mujoco.contacts import touching_geoms
+from sims.mujoco.corrected import corrected_files
+from sims.mujoco.effects import AttributeChange
+from sims.mujoco.forces import Placed, place
+from sims.mujoco.lag import lagged_at_ends
+from sims.mujoco.render import MujocoRenderer
+from sims.mujoco.rows import BLOCK, Rows
+from sims.simulator import Array, random_values
+
+#: A sub-step this near to the model's own is the model's own: times in logs are rounded.
+SAME = 1e-6
+
+
+class MujocoSimulator(HostSimulator):
+    """A robot described by an MJCF or URDF file, stepped by MuJoCo itself.
+
+    The state is what MuJoCo integrates: positions (``elbow_qpos``) and velocities
+    (``elbow_qvel``) of hinge, slide, ball and free joints, then activations. Actions are the
+    controls, by actuator. Integrator, solver and contacts are those of the file.
+
+    Every attribute that may be wrong is a parameter by its MJCF name ("frictionloss of joint
+    elbow", "mass of body forearm"); rows of a batch may differ in all of them at no cost. A row
+    that diverges is NaN.
+
+    Args:
+        model: The ``.xml`` or ``.urdf`` file; includes and meshes are looked up beside it.
+        dt: Control period in s, a multiple of the time step; by default the multiple nearest to
+            10 ms.
+        timestep: Time step in s, if not the file's.
+        integrator: ``"Euler"``, ``"RK4"``, ``"implicit"`` or ``"implicitfast"``, if not the file's.
+        motors: For a URDF: joints with a torque motor, or ``["all"]``.
+        effects: What acts beside the model.
+
+    Raises:
+        ValueError: The file cannot be used, or ``dt`` is no multiple of the time step.
+    """
+
+    #: One call of ``integrate`` with many rows is efficient, each with its own numbers.
+    advances_rows_at_once = True
+
+    def __init__(
+        self,
+        model: str,
+        dt: float | None = None,
+        timestep: float | None = None,
+        integrator: str | None = None,
+        motors: list[str] | None = None,
+        effects: Sequence[Effect] = (),
+    ) -> None:
+        path = Path(model).expanduser()
+        self.source = Source(path, timestep, integrator, None if motors is None else tuple(motors))
+        self.model = compiled(self.source)
+        self.name = path.stem
+        self.substeps, self.dt = _period(self.model, dt, path)
+        self.attributes: dict[str, Attribute] = attributes(self.model)
+        self.parameters = {name: known.parameter for name, known in self.attributes.items()}
+        self.joints = elements.joints(self.model)
+        self.state_channels = elements.state_channels(self.model)
+        self.action_channels = elements.action_channels(self.model)
+        self.has_contacts = bool(touching_geoms(self.model))
+        # Within a step only Runge-Kutta asks again what the actuators do.
+        self.lagged = lagged if self.runge_kutta else lagged_at_ends
+        self._rows = Rows(self.model)
+        self._dofs = {
+            joint.name: (j, int(self.model.jnt_dofadr[j]))
+            for joint in self.joints
+            for j in range(self.model.njnt)
+            if elements.name_of("joint", self.model, j) == joint.name
+        }
+        self.effects = ()
+        self._forget_what_shows_nowhere()
+        if effects:
+            hosted = self.with_effects(effects)
+            self.effects, self.state_channels = hosted.effects, hosted.state_channels
+
+    def offered_effects(self) -> tuple[Effect, ...]:
+        """What may be missing in a robot: the default library of ``sims.effects.library``.
+
+        Attributes by joint, body, actuator and contact, a load and a spring on each joint, bias,
+        delay and lag of each actuator (and dead zone and saturation of motors), and offsets of
+        the encoders.
+        """
+        found: list[Effect] = [
+            AttributeChange(name) for name, known in self.attributes.items() if known.offered
+        ]
+        for joint in self.joints:
+            j, _ = self._dofs[joint.name]
+            found.append(ConstantLoad(joint.name))
+            if not self.model.jnt_stiffness[j]:
+                found.append(LinearSpring(joint.name))
+        for column, drive in enumerate(elements.drives(self.model)):
+            name = self.action_channels[column].name
+            found += [ActuatorBias(name), Delay(name), ActuatorLag(name)]
+            if not elements.is_servo(self.model, drive.actuator):
+                found += [DeadZone(name), Saturation(name)]
+        found += [SensorOffset(joint.position) for joint in self.joints]
+        hosted = []
+        for effect in found:
+            try:
+                effect.quantities(self)
+            except ValueError:
+                continue
+            hosted.append(effect)
+        return tuple(hosted)
+
+    def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
+        """See ``HostSimulator.integrate``; an input is held at its mean over every sub-step."""
+        states, inputs = np.asarray(states, float), np.asarray(inputs, float)
+        durations = np.asarray(durations, float)
+        if len(states) > BLOCK:
+            blocks = [slice(i, i + BLOCK) for i in range(0, len(states), BLOCK)]
+            return np.concatenate(
+                [self.take(b).integrate(states[b], inputs[b], durations[b]) for b in blocks]
+            )
+        controls = inputs[..., 0] if inputs.ndim == 4 else inputs
+        n, steps = controls.shape[:2]
+        if n == 0:
+            return states.copy()
+        fields = row_fields(self.model, self.attributes, self.parameter_values(), n)
+        applied, law = place(self.model, self._placed(), fields, n)
+        own = float(self.model.opt.timestep)
+        h = durations / steps
+        h = np.where(np.abs(h - own) < SAME * own, own, h)
+        if (h != own).any():
+            fields["opt.timestep"] = h
+        return self._rows.advance(states, controls, fields, applied, law)
+
+    def _forget_what_shows_nowhere(self) -> None:
+        """Attributes that no motion depends on are no parameters.
+
+        Such as the centre of mass along the axis of a single joint. Friction of contacts stays:
+        random poses have none.
+        """
+        rng, n = np.random.default_rng(0), 12
+        names = [name for name in self.attributes if "friction of" not in name]
+        poses = self.smooth_states(n, rng)
+        inputs = np.empty((n, len(self.action_channels)))
+        for column, channel in enumerate(self.action_channels):
+            inputs[:, column] = random_values(channel, n, rng)
+        # Half of the rows stay near the reference pose, where servos are within their forces.
+        nq = self.model.nq
+        poses[::2, :nq] = self.model.qpos0 + 0.05 * (poses[::2, :nq] - self.model.qpos0)
+        poses[::2, nq:] *= 0.05
+        inputs[::2] *= 0.05
+        states = np.tile(poses, (len(names) + 1, 1))
+        controls = np.repeat(np.tile(inputs, (len(names) + 1, 1))[:, None], 2, axis=1)
+        values = {}
+        for i, name in enumerate(names):
+            known = self.parameters[name]
+            values[name] = np.full(len(states), float(known.value))
+            values[name][n * (i + 1) : n * (i + 2)] += 0.1 * known.scale
+        changed = self.with_parameters(**values)
+        durations = np.full(len(states), 2 * float(self.model.opt.timestep))
+        after = changed.integrate(states, controls, durations).reshape(len(names) + 1, n, -1)
+        size = np.maximum(np.nanmax(np.abs(after[0]), axis=0, initial=0.0), 1e-9)
+        for name, moved in zip(names, after[1:], strict=True):
+            # A row that diverges with an attribute and not without it shows it, too.
+            if (np.abs(moved - after[0]) < 1e-12 * size).all():
+                del self.attributes[name], self.parameters[name]
+
+    @property
+    def timestep(self) -> float:
+        """Time step in s."""
+        own, step = float(self.model.opt.timestep), self.dt / self.substeps
+        return own if abs(step - own) < SAME * own else step
+
+    def finer(self) -> Iterator[tuple[str, HostSimulator]]:
+        """The same model with RK4, then with shorter steps too, cheapest first.
+
+        Yields:
+            The option that makes it, as on the command line, and the simulator.
+        """
+        settings = self.source
+        for parts in (1, 2, 4):
+            step = float(self.model.opt.timestep) / parts
+            if parts == 1 and self.runge_kutta:
+                continue
+            option = "--simulator.integrator RK4"
+            if parts > 1:
+                option += f" --simulator.timestep {step:g}"
+            yield (
+                option,
+                type(self)(
+                    str(settings.path),
+                    self.dt,
+                    step,
+                    "RK4",
+                    None if settings.motors is None else list(settings.motors),
+                    self.effects,
+                ),
+            )
+
+    @property
+    def runge_kutta(self) -> bool:
+        """Whether the model is integrated by RK4, which is of fourth order; all others of first."""
+        return int(self.model.opt.integrator) == int(INTEGRATORS["RK4"])
+
+    def renderer(self) -> MujocoRenderer:
+        """Draws states; see ``sims.render``."""
+        return MujocoRenderer(self.model)
+
+    def joint_index(self, name: str) -> int:
+        """Index of a joint in the model."""
+        return self._dofs[name][0]
+
+    def own_files(self) -> dict[str, bytes]:
+        """``corrected.xml`` and what it includes; see ``sims.mujoco.corrected``."""
+        return corrected_files(self).files
+
+    def not_in_own_files(self) -> tuple[str, ...]:
+        """Effects that MJCF cannot express, or not exactly."""
+        corrected = corrected_files(self)
+        return (*corrected.missing, *(f"{line} (nearly)" for line in corrected.rough))
+
+    def row_fields(self, rows: int) -> dict[str, Array]:
+        """Fields of the model that attributes and effects on joints change, (rows, ...)."""
+        fields = row_fields(self.model, self.attributes, self.parameter_values(), rows)
+        place(self.model, self._placed(), fields, rows)
+        return fields
+
+    def _placed(self) -> list[Placed]:
+        return [(effect, *self._dofs[effect.joint]) for effect in self.joint_effects()]
+
+    def smooth_states(self, n: int, rng: np.random.Generator) -> Array:
+        """Random physical states without contact, (n, n_physical), about the reference pose."""
+        data = mujoco.MjData(self.model)
+        found = np.empty((n, len(self.physical_channels)))
+        nq, nv = self.model.nq, self.model.nv
+        for i in range(n):
+            for reach in (1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.0):
+                mujoco.mj_resetData(self.model, data)
+                data.qvel[:] = [
+                    reach * c.scale * rng.uniform(-1, 1)
+                    for c in self.physical_channels[nq : nq + nv]
+                ]
+                self._pose(data, reach, rng)
+                mujoco.mj_fwdPosition(self.model, data)
+                if data.nefc == 0 or not reach:
+                    break
+            found[i, :nq], found[i, nq : nq + nv] = data.qpos, data.qvel
+            found[i, nq + nv :] = data.act
+        return found
+
+    def _pose(self, data: Any, reach: float, rng: np.random.Generator) -> None:
+        for j in range(self.model.njnt):
+            at = int(self.model.jnt_qposadr[j])
+            kind = int(self.model.jnt_type[j])
+            if kind not in (elements.HINGE, elements.SLIDE):
+                continue
+            if self.model.jnt_limited[j]:
+                low, high = self.model.jnt_range[j]
+                middle = 0.5 * (low + high)
+                data.qpos[at] = middle + 0.45 * reach * (high - low) * rng.uniform(-1, 1)
+            else:
+                wide = np.pi if kind == elements.HINGE else 1.0
+                data.qpos[at] += reach * wide * rng.uniform(-1, 1)
+
+
+def _period(model: Any, dt: float | None, path: Path) -> tuple[int, float]:
+    step = float(model.opt.timestep)
+    if dt is None:
+        count = max(1, round(0.01 / step))
+        return count, count * step
+    count = round(dt / step)
+    if count < 1 or abs(count * step - dt) > 1e-6 * dt:
+        raise ValueError(
+            f"{path}: the control period {dt:g} s is no multiple of the model's time step "
+            f"{step:g} s; give dt as a multiple, or a timestep that divides it"
+        )
+    return count, float(dt)

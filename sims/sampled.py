@@ -1,0 +1,128 @@
+"""A true system that is somebody else's environment: stepped and reset, never set to a state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sims.environment import observe
+from sims.simulator import Array, Simulator, wrap
+from sims.tasks import Task
+
+#: Reads the state, shape (n_s,), from the environment and its last observation.
+StateOf = Callable[[Any, Any], ArrayLike]
+
+
+class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
+    """Another library's environment under our task, seen as the nominal simulator is seen.
+
+    Rewards are the task's, of the states reached; an episode ends where the task or the
+    environment ends it. Angles are continued over whole turns.
+
+    Args:
+        env: Reports its state in ``info["state"]``, or ``state_of`` reads it.
+        nominal: Its channels name the columns of the state and the actions.
+        task: Reward, termination and horizon; start states are the environment's own.
+        state_of: Reads the state from the environment and its observation.
+
+    Raises:
+        ValueError: The actions or the control period are not those of ``nominal``.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env[Any, Any],
+        nominal: Simulator,
+        task: Task,
+        state_of: StateOf | None = None,
+    ) -> None:
+        self.env, self.nominal, self.task, self._state_of = env, nominal, task, state_of
+        low = np.array([channel.low for channel in nominal.action_channels])
+        high = np.array([channel.high for channel in nominal.action_channels])
+        self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
+        width = observe(nominal, np.zeros((1, len(nominal.state_channels)))).shape[1]
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (width,), np.float64)
+        box = env.action_space
+        fits = (
+            isinstance(box, gymnasium.spaces.Box)
+            and box.shape == low.shape
+            and np.allclose(box.low, low)
+            and np.allclose(box.high, high)
+        )
+        if not fits:
+            names = ", ".join(
+                f"{c.name} from {c.low:g} to {c.high:g} {c.unit}" for c in nominal.action_channels
+            )
+            raise ValueError(
+                f"the true environment's actions are {box}, those of {nominal.name} {names}: wrap "
+                "the environment (gymnasium.wrappers.RescaleAction) or change the channels"
+            )
+        period = getattr(env.unwrapped, "dt", None)
+        if isinstance(period, float) and not np.isclose(period, nominal.dt):
+            raise ValueError(
+                f"the true environment's control period is {period:g} s, that of {nominal.name} "
+                f"{nominal.dt:g} s: make them one"
+            )
+        self._angles = np.array([channel.angle for channel in nominal.state_channels])
+        self._state: Array = np.zeros(0)
+        self._steps = 0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin an episode where the environment begins it."""
+        super().reset(seed=seed)
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._state = self._read(observation, info)
+        self._steps = 0
+        return observe(self.nominal, self._state[None])[0], {"state": self._state.copy()}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Hold ``action`` for one control period."""
+        box = self.action_space
+        assert isinstance(box, gymnasium.spaces.Box)
+        held = np.clip(np.asarray(action, float), box.low, box.high)
+        dtype = self.env.action_space.dtype
+        observation, _, ended, cut, info = self.env.step(held.astype(dtype))
+        reached = self._read(observation, info)
+        turned = wrap(reached - self._state)
+        reached = np.where(self._angles, self._state + turned, reached)
+        before, after = self._state[None], reached[None]
+        reward = float(self.task.reward(before, held[None], after)[0])
+        terminated = bool(ended or self.task.terminal(after)[0])
+        self._state = reached
+        self._steps += 1
+        truncated = bool(cut or self._steps >= self.task.horizon)
+        seen = observe(self.nominal, after)[0]
+        return seen, reward, terminated, truncated, {"state": reached.copy()}
+
+    def render(self) -> Any:
+        """As the environment shows itself."""
+        return self.env.render()
+
+    def close(self) -> None:
+        """End the environment."""
+        self.env.close()
+
+    def _read(self, observation: Any, info: dict[str, Any]) -> Array:
+        if self._state_of is not None:
+            state = np.asarray(self._state_of(self.env, observation), float)
+        elif "state" in info:
+            state = np.asarray(info["state"], float)
+        else:
+            raise ValueError(
+                "the true environment does not report its state: put it into info['state'], or "
+                "give the System a function state_of(env, observation)"
+            )
+        channels = self.nominal.state_channels
+        if state.shape != (len(channels),):
+            names = ", ".join(channel.name for channel in channels)
+            raise ValueError(
+                f"the true environment's state has shape {state.shape}, expected "
+                f"({len(channels)},): {names}"
+            )
+        return state

@@ -1,0 +1,221 @@
+"""What a study is about: a simulator, the system that it stands for, and a task."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from sims.environment import SimulatorEnv
+from sims.sampled import SampledEnv, StateOf
+from sims.simulator import Array, Channel, Simulator
+from sims.tasks import Task
+
+# Up to so many state channels are reported one by one, more by their kind.
+_FEW = 6
+
+
+@dataclasses.dataclass(frozen=True)
+class EvaluationProtocol:
+    """How policies are tested while they learn and afterwards, and where accuracy is measured.
+
+    On a simulator tests are free; on the true system they are measurement and not counted, as
+    in the paper.
+
+    Args:
+        every: Steps of learning on a simulator between tests.
+        every_true: The same on the true system.
+        episodes: Rollouts without noise per test, each from its own start state.
+        noisy: Rollouts with a little noise per test on a model; they keep a policy from being
+            chosen for one lucky path through the model's errors.
+        finalists: So many of the best policies of a training are tested once more at its end.
+        final_episodes: Rollouts of each of them, from other starts; 0 for no final.
+        true_episodes: Rollouts of the policy kept on the true system: the result.
+        visited_seconds: Accuracy is measured over the first seconds of fresh rollouts.
+        visited_rollouts: How many of those.
+        visited_stride: Open-loop predictions start at every so many-th state of them.
+    """
+
+    every: int = 500
+    every_true: int = 250
+    episodes: int = 1
+    noisy: int = 3
+    finalists: int = 1
+    final_episodes: int = 0
+    true_episodes: int = 1
+    # Later a good policy balances, where there is next to nothing to predict.
+    visited_seconds: float = 2.0
+    visited_rollouts: int = 5
+    visited_stride: int = 1
+
+    def __repr__(self) -> str:
+        # What is as by default tells nothing.
+        values = ((f.name, getattr(self, f.name), f.default) for f in dataclasses.fields(self))
+        changed = ", ".join(f"{name}={now!r}" for name, now, usual in values if now != usual)
+        return f"{type(self).__name__}({changed})"
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class System:
+    """A simulator at hand, the true system, and what is asked of it.
+
+    Args:
+        name: For titles and files.
+        nominal: The simulator that one has; its channels are the system's.
+        true: The system that one wants to control: a simulator, a Gymnasium environment, or a
+            function that makes either. It is only ever sampled: reset and stepped.
+        task: Reward, termination, start states, horizon.
+        evaluation: How policies are tested.
+        state_of: For an environment that does not report ``info["state"]``: reads the state,
+            shape (n_s,), given the environment and its observation.
+        measures: What is reported of a rollout on the true system beside its return, by name,
+            from its states (T + 1, n_s) and actions (T, n_a).
+        groups: State channels by the name under which their errors are averaged; by default each
+            by itself, or many by their kind.
+        shown: State channels drawn over time; by default the first three.
+        target: A return that counts as success, if there is one.
+        best: Computes the best return that is possible, if it can be known.
+        elsewhere: Draws states (n, T + 1, n_s) and actions (n, T, n_a) of rollouts of the true
+            system from anywhere, to compare with where policies go; by default uniformly, if the
+            true system is a simulator.
+        published: For tables: what others published, by kind of policy.
+        cold_noise_sigma: Exploration noise of policies that are learnt from nothing.
+
+    Raises:
+        ValueError: Two parts do not fit together; the message says which.
+    """
+
+    name: str
+    nominal: Simulator
+    true: Simulator | gymnasium.Env[Any, Any] | Callable[[], Any]
+    task: Task
+    evaluation: EvaluationProtocol = EvaluationProtocol()
+    state_of: StateOf | None = None
+    measures: Callable[[Array, Array], Mapping[str, float]] | None = None
+    groups: Mapping[str, tuple[str, ...]] | None = None
+    shown: tuple[str, ...] | None = None
+    target: float | None = None
+    best: Callable[[], float] | None = None
+    elsewhere: Callable[[np.random.Generator], tuple[Array, Array]] | None = None
+    published: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    cold_noise_sigma: float = 0.20
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.nominal, Simulator):
+            raise ValueError(
+                f"system {self.name}: nominal is a {type(self.nominal).__name__}, expected a "
+                "Simulator: subclass sims.EquationOfMotion or sims.Simulator"
+            )
+        if isinstance(self.true, Simulator):
+            check_same_channels(self.nominal, self.true, f"system {self.name}: the true system")
+        names = [channel.name for channel in self.nominal.state_channels]
+        named = [*(self.shown or ()), *(n for part in (self.groups or {}).values() for n in part)]
+        if unknown := [name for name in named if name not in names]:
+            raise ValueError(
+                f"system {self.name}: no state channel {', '.join(unknown)}, only "
+                f"{', '.join(names)}"
+            )
+
+    def __repr__(self) -> str:
+        true = getattr(self.true, "name", None) or type(self.true).__name__
+        return f"System({self.name!r}: {self.nominal.name} for {true}, {self.task!r})"
+
+    def environment(self, simulator: Simulator, task: Task | None = None) -> SimulatorEnv:
+        """The task on a simulator."""
+        return SimulatorEnv(simulator, task or self.task)
+
+    def true_environment(self) -> gymnasium.Env[Any, Any]:
+        """The task on the true system.
+
+        Raises:
+            ValueError: The environment does not fit the nominal simulator.
+        """
+        true = self.true
+        if not isinstance(true, Simulator | gymnasium.Env):
+            true = true()
+        if isinstance(true, Simulator):
+            check_same_channels(self.nominal, true, f"system {self.name}: the true system")
+            return SimulatorEnv(true, self.task)
+        return SampledEnv(true, self.nominal, self.task, self.state_of)
+
+    @property
+    def can_learn_on_truth(self) -> bool:
+        """Whether there can be two of the true system: one to learn in, one to be tested in."""
+        return not isinstance(self.true, gymnasium.Env)
+
+    def with_nominal(self, simulator: Simulator) -> System:
+        """The same with another simulator at hand.
+
+        Raises:
+            ValueError: It has other channels than the present one.
+        """
+        check_same_channels(self.nominal, simulator, f"system {self.name}: the simulator")
+        return dataclasses.replace(self, nominal=simulator)
+
+    def check(self) -> None:
+        """Begin an episode on the simulator and on the true system, and reward one step.
+
+        Raises:
+            ValueError: The task, the simulator and the true system do not fit together.
+        """
+        try:
+            for env in (self.environment(self.nominal), self.true_environment()):
+                env.reset(seed=0)
+                env.step(env.action_space.sample() * 0)
+        except (IndexError, TypeError, KeyError) as error:
+            raise ValueError(
+                f"system {self.name}: {type(self.task).__name__} does not fit {self.nominal.name} "
+                f"({', '.join(c.name for c in self.nominal.state_channels)}): {error}"
+            ) from error
+
+    def channel_groups(self) -> dict[str, tuple[str, ...]]:
+        """State channels by the name under which their errors are averaged."""
+        if self.groups is not None:
+            return dict(self.groups)
+        channels = physical(self.nominal.state_channels)
+        if len(channels) <= _FEW:
+            return {channel.name: (channel.name,) for channel in channels}
+        kinds = dict.fromkeys(channel.kind for channel in channels)
+        return {f"{k}s": tuple(c.name for c in channels if c.kind == k) for k in kinds}
+
+    def description(self) -> dict[str, Any]:
+        """What tables and reports need to know, in plain values."""
+        channels = physical(self.nominal.state_channels)
+        return {
+            "name": self.name,
+            "nominal": self.nominal.name,
+            "dt": self.nominal.dt,
+            "states": [{"name": c.name, "unit": c.unit, "angle": c.angle} for c in channels],
+            "actions": [{"name": c.name, "unit": c.unit} for c in self.nominal.action_channels],
+            "groups": {name: list(part) for name, part in self.channel_groups().items()},
+            "shown": list(self.shown or [channel.name for channel in channels[:3]]),
+            "target": self.target,
+            "published": dict(self.published),
+            "starts": self.evaluation.true_episodes,
+        }
+
+
+def physical(channels: tuple[Channel, ...]) -> tuple[Channel, ...]:
+    """Without the hidden memory of effects."""
+    return tuple(channel for channel in channels if channel.kind != "memory")
+
+
+def check_same_channels(nominal: Simulator, other: Simulator, what: str) -> None:
+    """Raise ``ValueError`` unless both have the same channels, memory apart, and one period."""
+    for kind in ("state_channels", "action_channels"):
+        own, others = (
+            [channel.name for channel in physical(getattr(one, kind))] for one in (nominal, other)
+        )
+        if own != others:
+            raise ValueError(
+                f"{what} has {kind.replace('_', ' ')} {', '.join(others)}, expected "
+                f"{', '.join(own)} as {nominal.name}"
+            )
+    if not np.isclose(nominal.dt, other.dt):
+        raise ValueError(
+            f"{what} has a control period of {other.dt:g} s, expected {nominal.dt:g} s as "
+            f"{nominal.name}"
+        )

@@ -1,0 +1,189 @@
+"""One training: learn, keep the best policy, and test it on the true system."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from policy.evaluate import Policy, Rollout, rollout
+from policy.learner import Algorithm, Learner
+from policy.noise import OrnsteinUhlenbeck
+from policy.selection import Point, learn_and_select
+from residual.trajectories import Transitions
+from sims.simulator import Array
+from sims.system import System
+from studies.learning.streams import stream
+from studies.learning.warm_start import Simulated
+
+AGENT, CURVE, SUMMARY, EPISODE, SIMULATED = (
+    "agent.safetensors",
+    "curve.json",
+    "summary.json",
+    "rollout.npz",
+    "simulated.npz",
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Training:
+    """What a training leaves.
+
+    Attributes:
+        learner: With the networks of the policy that was kept.
+        curve: Tests while it learnt, in the environment that it learnt in.
+        summary: ``simulated_steps``, ``updates``, ``return_model``, ``seconds``, ``return_true``,
+            and, if asked for, ``tests`` with measures of every test on the true system.
+        episode: One episode on the true system: ``states``, ``actions`` and ``rewards``.
+        simulated: The transitions it learnt from, if they are to be learnt from again.
+        key: Of the step that it was kept as.
+    """
+
+    learner: Learner
+    curve: tuple[Point, ...]
+    summary: dict[str, Any]
+    episode: dict[str, Array]
+    simulated: Simulated | None = None
+    key: str = ""
+
+    def __repr__(self) -> str:
+        told = {k: round(v, 3) for k, v in self.summary.items() if isinstance(v, int | float)}
+        return f"Training({told})"[:180]
+
+    @property
+    def policy(self) -> Policy:
+        """The policy kept."""
+        return self.learner.policy
+
+    def save(self, folder: Path) -> None:
+        """Write it; no file holds code."""
+        self.learner.save(folder / AGENT, replay=False)
+        points = [dataclasses.asdict(point) for point in self.curve]
+        (folder / CURVE).write_text(json.dumps(points))
+        (folder / SUMMARY).write_text(json.dumps(self.summary))
+        arrays: dict[str, Any] = self.episode
+        np.savez_compressed(folder / EPISODE, **arrays)
+        if self.simulated:
+            np.savez(folder / SIMULATED, **vars(self.simulated))
+
+    @classmethod
+    def load(cls, folder: Path, key: str, algorithm: Algorithm, env: gymnasium.Env) -> Training:
+        """Read what ``save`` wrote."""
+        simulated = folder / SIMULATED
+        return cls(
+            algorithm.load(folder / AGENT, env),
+            tuple(Point(**point) for point in json.loads((folder / CURVE).read_text())),
+            json.loads((folder / SUMMARY).read_text()),
+            _arrays(folder / EPISODE),
+            Simulated(**_arrays(simulated)) if simulated.exists() else None,
+            key,
+        )
+
+
+def train(
+    system: System,
+    learner: Learner,
+    env: gymnasium.Env,
+    tested: gymnasium.Env,
+    steps: int,
+    seed: Callable[[str], int],
+    tell: Callable[[Point], None],
+    on_true: bool = False,
+    random_steps: int = 0,
+) -> Training:
+    """Learn, and keep the policy that is best in the environment learnt in.
+
+    Args:
+        system: Says how policies are tested.
+        learner: Learns on from where it stands; ends with the networks of the policy kept.
+        env: To learn in.
+        tested: Another one like it.
+        steps: Of the environment.
+        seed: Seed by purpose: ``"select"`` and ``"test"``.
+        tell: Told every test.
+        on_true: Whether the environment is the true system: then the test is the measure itself.
+        random_steps: The first so many actions are random.
+    """
+    protocol, updates, begin = system.evaluation, learner.updates, time.perf_counter()
+    selection = learn_and_select(
+        learner,
+        env,
+        tested,
+        steps,
+        every=protocol.every_true if on_true else protocol.every,
+        noisy=0 if on_true else protocol.noisy,
+        seed=seed("select"),
+        callback=tell,
+        random_steps=random_steps,
+        episodes=protocol.episodes,
+        finalists=protocol.finalists,
+        final_episodes=protocol.final_episodes,
+    )
+    seconds, updates = time.perf_counter() - begin, learner.updates - updates
+    learner.restore(selection.networks)
+    summary = {
+        "simulated_steps": steps,
+        "updates": updates,
+        "best_step": selection.best.step,
+        "return_model": (
+            selection.best.deterministic if selection.final is None else selection.final
+        ),
+        "seconds": seconds,
+    }
+    tests, episode = test_on_truth(system, learner.policy, seed("test"))
+    return Training(learner, selection.curve, summary | tests, episode)
+
+
+def test_on_truth(
+    system: System, policy: Policy, seed: int
+) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Rollouts on the true system: mean return and measures, and the first rollout."""
+    env = system.true_environment()
+    runs = [rollout(policy, env, seed + k) for k in range(system.evaluation.true_episodes)]
+    result: dict[str, Any] = {"return_true": float(np.mean([run.total for run in runs]))}
+    if system.measures:
+        result["tests"] = [
+            {"return": run.total, **system.measures(visited(system, run), run.actions)}
+            for run in runs
+        ]
+    first = runs[0]
+    episode = {"states": visited(system, first), "actions": first.actions}
+    return result, episode | {"rewards": first.rewards}
+
+
+def exploration(system: System, algorithm: Algorithm, seed: int) -> OrnsteinUhlenbeck:
+    """Exploration noise as in learning, of whatever algorithm."""
+    size, c = len(system.nominal.action_channels), algorithm.ddpg
+    return OrnsteinUhlenbeck(size, c.noise_sigma, c.noise_theta, stream(seed, "noise"))
+
+
+def transitions(system: System, rollouts: list[Rollout]) -> Transitions:
+    """The steps of rollouts, each its own episode."""
+    parts = []
+    for run in rollouts:
+        states = visited(system, run)
+        episode = np.zeros(len(run.rewards), dtype=np.int64)
+        parts.append(Transitions(states[:-1], run.actions, states[1:], episode))
+    return Transitions.join(parts)
+
+
+def visited(system: System, run: Rollout) -> Array:
+    """The states along a rollout, shape (T + 1, n_s), without what the simulator does not know.
+
+    Raises:
+        ValueError: The environment does not report them.
+    """
+    if run.states is None:
+        raise ValueError("the environment does not report info['state'], the system's state")
+    return run.states[:, : len(system.nominal.state_channels)]
+
+
+def _arrays(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path, allow_pickle=False) as data:
+        return dict(data)

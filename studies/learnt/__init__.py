@@ -1,0 +1,1 @@
+"""What the loop has learnt, told: tables over trials, figures and reports of any system."""

@@ -1,0 +1,41 @@
+"""Films of a system, if its simulator says how it looks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simgap_files import atomic_write_bytes
+from sims.render import renderer_for
+from sims.simulator import Simulator
+from studies.learnt.one_trial import read_episodes
+from studies.reporting.media import encode_gif
+
+SECONDS = 6.0
+_FRAME = 0.05  # s between pictures, if the control period is shorter
+_SHOWN = ("idealised", "corrected", "true")
+
+
+def write_films(results: Mapping[str, Any], folder: Path, simulator: Simulator) -> list[Path]:
+    """``films/<policy>.gif`` of the policies that a report shows; none without a renderer."""
+    if not hasattr(simulator, "renderer"):
+        return []
+    episodes = read_episodes(results, folder)
+    last = [name for name in episodes if name.startswith("difference")][-1:]
+    paths = []
+    for name in (*_SHOWN, *last):
+        if name in episodes:
+            paths.append(folder / "films" / f"{name}.gif")
+            atomic_write_bytes(paths[-1], film(simulator, episodes[name]["states"]))
+    return paths
+
+
+def film(simulator: Simulator, states: np.ndarray) -> bytes:
+    """The first seconds of an episode, shape (T + 1, n_s), as a GIF."""
+    draw = renderer_for(simulator).frame
+    stride = max(1, round(_FRAME / simulator.dt))
+    steps = min(len(states), round(SECONDS / simulator.dt))
+    return encode_gif([draw(state) for state in states[:steps:stride]], stride * simulator.dt)

@@ -1,0 +1,132 @@
+"""Tidy tables: one row per policy, and one per measurement of accuracy."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from simgap_files import atomic_path, atomic_write_json, atomic_write_text
+from studies.learnt.words import measures_of
+
+# Policies of trials that differ in these only are the same, or stand in rows of their own.
+_IN_COLUMNS = {
+    "seed",
+    *(
+        f"budget.{name}"
+        for name in (
+            "true_samples", "iterations", "true_steps", "baseline_steps", "control_steps",
+            "corrected_steps",
+        )
+    ),
+}  # fmt: skip
+
+
+def write_tables(
+    results: Sequence[Mapping[str, Any]], folder: Path
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """``results`` and ``accuracy`` as CSV and Parquet, and ``results.json`` with all trials.
+
+    Args:
+        results: Of every finished trial.
+        folder: Where to write.
+
+    Returns:
+        The two tables.
+    """
+    named = apart(results)
+    rows, errors = policy_rows(named), accuracy_rows(named)
+    for name, table in (("results", rows), ("accuracy", errors)):
+        atomic_write_text(folder / f"{name}.csv", table.to_csv(index=False))
+        with atomic_path(folder / f"{name}.parquet") as path:
+            table.to_parquet(path, index=False)
+    atomic_write_json(folder / "results.json", {"trials": list(results)})
+    return rows, errors
+
+
+def apart(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """The trials, those with other settings told apart by their label.
+
+    A mean over the trials of one label must not mix settings. Whatever differs between trials,
+    beside what the tables have columns for, becomes part of the label and is kept as
+    ``settings``.
+    """
+    flat = [_flat(trial["config"]) for trial in results]
+    names = dict.fromkeys(name for settings in flat for name in settings)
+    differing = [
+        name
+        for name in names
+        if name.split(".")[0] not in ("estimator", "corrected")
+        and name not in _IN_COLUMNS
+        and len({json.dumps(settings.get(name)) for settings in flat}) > 1
+    ]
+    named = []
+    for trial, settings in zip(results, flat, strict=True):
+        text = ", ".join(f"{name}={settings.get(name)}" for name in differing)
+        more = {"label": f"{trial['label']}, {text}", "settings": text} if text else {}
+        named.append(dict(trial) | more)
+    return named
+
+
+def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in settings.items():
+        nested = isinstance(value, Mapping)
+        flat |= _flat(value, f"{prefix}{name}.") if nested else {f"{prefix}{name}": value}
+    return flat
+
+
+def policy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """One row per policy of every trial."""
+    return pd.DataFrame(
+        [_trial(trial) | _policy(policy) for trial in results for policy in trial["policies"]]
+    )
+
+
+def policy_frame(policies: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """One row per policy of one trial."""
+    return pd.DataFrame([_policy(policy) for policy in policies])
+
+
+def _policy(record: Mapping[str, Any]) -> dict[str, Any]:
+    """A policy's record without its curve, and with the means of its tests by measure."""
+    flat = {name: value for name, value in record.items() if name not in ("curve", "tests")}
+    return flat | measures_of(record)
+
+
+def accuracy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """One row per trial, update and place where accuracy was measured."""
+    return pd.DataFrame(
+        [
+            _trial(trial)
+            | {
+                "iteration": record["iteration"],
+                "where": where,
+                "fit_seconds": record["fit_seconds"],
+                "coverage90": record[where]["coverage90"],
+                **{f"one_step_{k}": v for k, v in record[where]["one_step"].items()},
+                **{
+                    f"{horizon.replace(' ', '')}_{k}": v
+                    for horizon, errors in record[where]["multi_step"].items()
+                    for k, v in errors.items()
+                },
+            }
+            for trial in results
+            for record in trial["accuracy"]
+            for where in ("visited", "uniform")
+            if where in record
+        ]
+    )
+
+
+def _trial(trial: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "estimator": trial["label"],
+        "seed": trial["seed"],
+        "samples_per_update": trial["config"]["budget"]["true_samples"],
+        "made_by": trial.get("versions", {}).get("simgap", ""),
+        **({"settings": trial["settings"]} if "settings" in trial else {}),
+    }

@@ -1,0 +1,122 @@
+"""How often find_gap is right about robots: MuJoCo models of known truth.
+
+Hides effects of the default library in logs of the shipped models (MuJoCo at a finer step by
+another integrator, encoders of 0.5 mrad, rates unmeasured), asks find_gap, and prints a line for
+each answer and a table. Answers are kept in a file and not asked again.
+
+  python -m studies.robot_gaps --robot arm2 --kind single --seeds 1 --output results/robots.jsonl
+  python -m studies.robot_gaps --robot arm2 --kind none --seeds 10 --output results/robots.jsonl
+  python -m studies.robot_gaps --robot hopper --hidden "mass of body torso" --output r.jsonl
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jsonargparse.typing import NonNegativeInt, PositiveFloat, PositiveInt
+
+from studies.robots.cases import Answer, Case, ask, cases
+from studies.running.command import HelpFormatter, Parser, fail
+
+
+def build_parser() -> Parser:
+    """The command line."""
+    parser = Parser(
+        prog="python -m studies.robot_gaps", description=__doc__, formatter_class=HelpFormatter
+    )
+    parser.add_argument("--robot", choices=("cart_pole", "arm2", "arm6", "hopper"), default="arm2")
+    parser.add_argument(
+        "--kind", type=Literal["none", "single", "pair"], default="single",
+        help="nothing, each effect of the library alone, or a friction and a payload",
+    )  # fmt: skip
+    parser.add_argument("--hidden", type=str, nargs="*", help="hide these in place of a kind")
+    parser.add_argument("--seeds", type=PositiveInt, default=1, help="how many seeds")
+    parser.add_argument("--first", type=NonNegativeInt, default=0, help="the first seed")
+    parser.add_argument("--sample", type=PositiveInt | None, help="only so many, drawn at random")
+    parser.add_argument("--minutes", type=PositiveFloat, default=1.0, help="budget of each answer")
+    parser.add_argument("--output", type=Path, required=True, help="JSON lines of answers")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command."""
+    given = build_parser().parse_args(arguments)
+    seeds = range(given.first, given.first + given.seeds)
+    if given.hidden:
+        wanted = [Case(given.robot, tuple(given.hidden), seed) for seed in seeds]
+    else:
+        wanted = list(cases(given.robot, given.kind, seeds))
+    if given.sample:
+        order = np.random.default_rng(given.first).permutation(len(wanted))[: given.sample]
+        wanted = [wanted[i] for i in sorted(order)]
+    try:
+        known = _read(given.output)
+        given.output.parent.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        fail(f"{given.output}: {error}")
+    answers = []
+    for number, case in enumerate(wanted, start=1):
+        answer = known.get(_key(case))
+        if answer is None:
+            answer = json.loads(json.dumps(dataclasses.asdict(ask(case, given.minutes))))
+            with given.output.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(answer) + "\n")
+        answers.append(answer)
+        print(f"{number}/{len(wanted)}  {line(answer)}", file=sys.stderr, flush=True)
+    print(table(answers))
+
+
+def line(answer: dict[str, object] | object) -> str:
+    """One answer in words."""
+    a = _plain(answer)
+    named = ", ".join(f"{label} ({kind})" for label, kind, _ in a["named"]) or "nothing"
+    hidden = " + ".join(f"{name} {size:.3g}" for name, size in a["sizes"].items()) or "nothing"
+    mark = "ok " if a["right"] else "MISS"
+    return f"{mark} {a['processor']:5.0f} s  hidden {hidden}; named {named}"
+
+
+def table(answers: Sequence[object]) -> str:
+    """Markdown over all answers."""
+    rows = [_plain(answer) for answer in answers]
+    lines = [
+        "| robot | hidden | sets | right | confirmed wrong | s, median and most |",
+        "|---|---|---|---|---|---|",
+    ]
+    groups: dict[tuple[str, int], list[dict]] = {}
+    for row in rows:
+        groups.setdefault((row["case"]["robot"], len(row["case"]["hidden"])), []).append(row)
+    for (robot, count), own in groups.items():
+        seconds = [row["processor"] for row in own]
+        what = ("nothing", "one effect", "two effects")[min(count, 2)]
+        right = sum(row["right"] for row in own)
+        wrong = sum(bool(row["confirmed_wrong"]) for row in own)
+        lines.append(
+            f"| {robot} | {what} | {len(own)} | {right} | {wrong} | "
+            f"{np.median(seconds):.0f}, {max(seconds):.0f} |"
+        )
+    return "\n".join(lines)
+
+
+def _plain(answer: object) -> dict:
+    return dataclasses.asdict(answer) if isinstance(answer, Answer) else dict(answer)  # type: ignore[call-overload]
+
+
+def _key(case: Case) -> str:
+    return json.dumps(dataclasses.asdict(case), sort_keys=True)
+
+
+def _read(path: Path) -> dict[str, dict]:
+    if not path.is_file():
+        return {}
+    found = [json.loads(text) for text in path.read_text(encoding="utf-8").splitlines()]
+    return {json.dumps(answer["case"], sort_keys=True): answer for answer in found}
+
+
+if __name__ == "__main__":
+    main()

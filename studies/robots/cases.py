@@ -1,0 +1,163 @@
+"""What is hidden in a robot, how strongly, and whether the answer is right."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+import zlib
+from collections.abc import Iterator
+
+import numpy as np
+
+from residual.gap import find_gap
+from residual.trajectories import Trajectory
+from sims.effects.library import exact_aliases
+from sims.mujoco import MujocoSimulator
+from studies.robots.drives import MODELS, measure
+
+#: Median deviation of positions over 0.3 s that a hidden effect causes, as a multiple of the noise.
+SIZE, NOISE, AHEAD = 30.0, 5e-4, 0.3
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """One set of logs.
+
+    Attributes:
+        robot: The shipped model.
+        hidden: Names of what is hidden.
+        seed: Of strengths, motion and noise.
+    """
+
+    robot: str
+    hidden: tuple[str, ...]
+    seed: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Answer:
+    """What find_gap said of a case.
+
+    Attributes:
+        case: The case.
+        sizes: What was hidden.
+        named: Labels that it named, strongest first, with kind and numbers.
+        right: Whether the names are those hidden, or cannot be told from them by any motion; with
+            several hidden, whether all of them are among the first as many names.
+        confirmed_wrong: Names confirmed that are neither.
+        remainder: Whether it says that something is left.
+        processor: Seconds of processor time.
+    """
+
+    case: Case
+    sizes: dict[str, float]
+    named: tuple[tuple[str, str, dict[str, tuple[float, float, float]]], ...]
+    right: bool
+    confirmed_wrong: tuple[str, ...]
+    remainder: bool
+    processor: float
+
+
+def nominal(robot: str) -> MujocoSimulator:
+    """A shipped model as a simulator."""
+    return MujocoSimulator(str(MODELS / f"{robot}.xml"))
+
+
+def cases(robot: str, kind: str, seeds: range) -> Iterator[Case]:
+    """Cases of a kind: ``"none"``, ``"single"`` (each effect of the library) or ``"pair"``."""
+    simulator = nominal(robot)
+    names = [str(effect) for effect in simulator.offered_effects()]
+    if kind == "none":
+        for seed in seeds:
+            yield Case(robot, (), seed)
+    elif kind == "single":
+        for seed in seeds:
+            for name in names:
+                yield Case(robot, (name,), seed)
+    elif kind == "pair":
+        friction = [name for name in names if name.startswith("frictionloss")]
+        masses = [name for name in names if name.startswith("mass")]
+        for seed in seeds:
+            rng = np.random.default_rng([7, seed])
+            yield Case(robot, (str(rng.choice(friction)), str(rng.choice(masses))), seed)
+    else:
+        raise ValueError(f"there is no kind {kind!r}: none, single or pair")
+
+
+def strengths(case: Case) -> dict[str, float]:
+    """Sizes that make every hidden effect alone deviate by about ``SIZE`` times the noise."""
+    simulator = nominal(case.robot)
+    logs = measure(case.robot, {}, seed=case.seed, runs=2, seconds=3.0)
+    found = {}
+    for name in case.hidden:
+        (effect,) = [e for e in simulator.offered_effects() if str(e) == name]
+        field = effect.strengths()[0]
+        quantity = effect.quantities(simulator)[field]
+        if not np.isfinite(quantity.nominal):
+            column = [c.name for c in simulator.action_channels].index(effect.where)
+            found[name] = 0.6 * max(float(np.abs(log.actions[:, column]).max()) for log in logs)
+            continue
+        rng = np.random.default_rng([zlib.crc32(name.encode()), case.seed])
+        sign = 1.0 if quantity.low >= 0 else float(rng.choice([-1.0, 1.0]))
+        low, high = 1e-4, 30.0
+        for _ in range(12):
+            middle = np.sqrt(low * high)
+            size = sign * middle * quantity.scale
+            changed = simulator.with_effects([effect.with_values(**{field: size})])
+            if _deviation(simulator, changed, logs) > SIZE * NOISE:
+                high = middle
+            else:
+                low = middle
+        found[name] = float(max(sign * low * quantity.scale, 0.95 * quantity.low))
+    return found
+
+
+def _deviation(
+    simulator: MujocoSimulator, changed: MujocoSimulator, logs: list[Trajectory]
+) -> float:
+    """Median over windows of the largest deviation of a position."""
+    steps = round(AHEAD / simulator.dt)
+    nq, nv = simulator.model.nq, simulator.model.nv
+    starts, actions = [], []
+    for log in logs:
+        for a in range(2, len(log.actions) - steps, steps):
+            q = log.states[a, :nq]
+            v = (log.states[a + 2, :nq] - log.states[a - 2, :nq]) / (4 * simulator.dt)
+            starts.append(np.concatenate([q, v[:nv]]))
+            actions.append(log.actions[a : a + steps])
+    start, held = np.array(starts), np.array(actions)
+    one = simulator.rollout(simulator.augment(start, held[:, 0]), held)[..., :nq]
+    two = changed.rollout(changed.augment(start, held[:, 0]), held)[..., :nq]
+    return float(np.median(np.abs(two - one).max(axis=(1, 2))))
+
+
+def ask(case: Case, minutes: float) -> Answer:
+    """Measure the robot and let find_gap answer."""
+    sizes = strengths(case)
+    runs = 8 if case.robot == "hopper" else 4
+    logs = measure(case.robot, sizes, seed=case.seed, runs=runs)
+    simulator = nominal(case.robot)
+    begin = time.process_time()
+    result = find_gap(simulator, logs, minutes=minutes)
+    processor = time.process_time() - begin
+    named = []
+    for verdict in result.verdicts:
+        if verdict.effect and verdict.kind in ("confirmed", "ambiguous", "minor"):
+            same = verdict.effect == verdict.where
+            label = verdict.effect if same else f"{verdict.effect}@{verdict.where}"
+            numbers = {k: (n.value, n.low, n.high) for k, n in verdict.parameters.items()}
+            named.append((label, verdict.kind, numbers))
+    twins = {
+        name: set(alias.effects)
+        for alias in exact_aliases(simulator)
+        if not alias.combination
+        for name in alias.effects
+    }
+    alike = [twins.get(name, {name}) for name in case.hidden]
+    first = [label for label, _, _ in named][: len(alike)]
+    found = all(any(label in group for label in first) for group in alike)
+    right = found if alike else not named
+    known = set().union(*alike) if alike else set()
+    wrong = tuple(label for label, kind, _ in named if kind == "confirmed" and label not in known)
+    remainder = any(verdict.kind == "unexplained" for verdict in result.verdicts)
+    return Answer(case, sizes, tuple(named), right, wrong, remainder, processor)

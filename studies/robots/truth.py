@@ -1,0 +1,208 @@
+"""Measure a robot that hides something: MuJoCo at a finer step, by another integrator.
+
+None of it is the code that explains the logs: the truth is one ``mujoco.MjData`` stepped in a
+loop, with forces and commands of its own.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.trajectories import Trajectory
+
+Array = NDArray[np.float64]
+
+#: Friction of the truth creeps a hundred times less than that which find_gap hosts.
+HARDER = (0.9999, 0.99999, 0.001)
+
+#: Time, positions and velocities of the truth -> command.
+Controller = Callable[[float, Array, Array], Array]
+
+
+@dataclasses.dataclass(frozen=True)
+class Sensors:
+    """What is measured.
+
+    Args:
+        noise: Standard deviation of the encoders, in rad or m.
+        period: Seconds between samples, also the control period.
+        rates: Whether velocities are measured too (with 50 times the noise).
+    """
+
+    noise: float = 5e-4
+    period: float = 0.01
+    rates: bool = False
+
+
+class Truth:
+    """A model file with hidden changes, simulated finely.
+
+    Args:
+        path: The nominal model.
+        hidden: Size by name: attributes as ``"frictionloss of joint elbow"``, effects as
+            ``"delay@elbow_motor"``; sizes are changes, those of gains and groups shares.
+        finer: Steps of the truth in one of the nominal; by default 10, or 250 where the truth has
+            the integrator of lower order, whose error would be a gap of its own.
+
+    Raises:
+        ValueError: A name is not known.
+    """
+
+    def __init__(self, path: str | Path, hidden: Mapping[str, float], finer: int = 0) -> None:
+        self.model = mujoco.MjModel.from_xml_path(str(path))
+        model = self.model
+        first = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
+        kinds = mujoco.mjtIntegrator
+        model.opt.integrator = kinds.mjINT_IMPLICITFAST if first else kinds.mjINT_RK4
+        model.opt.timestep /= finer or (250 if first else 10)
+        model.dof_solimp[:, :3] = HARDER
+        self.loads = np.zeros(model.nv)
+        self.delay = np.zeros(model.nu)
+        self.lag = np.zeros(model.nu)
+        self.bias = np.zeros(model.nu)
+        self.zone = np.zeros(model.nu)
+        self.level = np.full(model.nu, np.inf)
+        self.offset = np.zeros(model.nq)
+        for name, size in hidden.items():
+            self._hide(name, size)
+        # What is derived from masses follows; bodies here are not compiled as "simple".
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+
+    def _hide(self, name: str, size: float) -> None:
+        model = self.model
+        if "@" in name:
+            effect, _, where = name.partition("@")
+            known: dict[str, Array] = {
+                "delay": self.delay,
+                "actuator_lag": self.lag,
+                "actuator_bias": self.bias,
+                "dead_zone": self.zone,
+                "saturation": self.level,
+            }
+            if effect in known:
+                known[effect][model.actuator(where).id] = size
+            elif effect == "constant_load":
+                self.loads[self._dof(where)] = size
+            elif effect == "linear_spring":
+                model.jnt_stiffness[model.joint(where).id] = size
+            elif effect == "sensor_offset":
+                self.offset[model.joint(where.removesuffix("_qpos")).qposadr[0]] = size
+            else:
+                raise ValueError(f"no effect {effect!r} can be hidden")
+            return
+        what, _, place = name.partition(" of ")
+        kind, _, element = place.partition(" ")
+        if kind == "joint":
+            d = self._dof(element)
+            fields = {
+                "damping": model.dof_damping,
+                "frictionloss": model.dof_frictionloss,
+                "armature": model.dof_armature,
+            }
+            if what == "quadratic damping":
+                model.dof_dampingpoly[d, 0] += size
+            else:
+                fields[what][d] += size
+        elif kind == "body":
+            b = model.body(element).id
+            if what == "mass":
+                model.body_inertia[b] *= 1 + size / model.body_mass[b]
+                model.body_mass[b] += size
+            else:
+                model.body_ipos[b, "xyz".index(what[-1])] += size
+        elif kind == "actuator":
+            a = model.actuator(element).id
+            model.actuator_gainprm[a, :3] *= 1 + size
+            model.actuator_biasprm[a, :3] *= 1 + size
+        elif name == "gain of all actuators":
+            model.actuator_gainprm[:, :3] *= 1 + size
+            model.actuator_biasprm[:, :3] *= 1 + size
+        elif name == "damping of all joints":
+            model.dof_damping *= 1 + size
+        elif name == "friction of all contacts":
+            model.geom_friction[:, 0] *= 1 + size
+        elif what.startswith("gravity "):
+            model.opt.gravity["xyz".index(what[-1])] += size
+        else:
+            raise ValueError(f"nothing called {name!r} can be hidden")
+
+    def _dof(self, joint: str) -> int:
+        return int(self.model.joint(joint).dofadr[0])
+
+    def run(
+        self,
+        controller: Controller,
+        seconds: float,
+        sensors: Sensors,
+        rng: np.random.Generator,
+        start: tuple[Array, Array] | None = None,
+        name: str = "run",
+        stop: Callable[[Array], bool] | None = None,
+    ) -> Trajectory:
+        """One record.
+
+        Args:
+            controller: Gives the command of every control period.
+            seconds: Length.
+            sensors: What is measured.
+            rng: Source of noise.
+            start: Positions and velocities; the reference pose by default.
+            name: Of the record.
+            stop: Ends the record where positions say so.
+        """
+        model, data = self.model, mujoco.MjData(self.model)
+        if start is not None:
+            data.qpos[:], data.qvel[:] = start
+        mujoco.mj_forward(model, data)
+        data.qfrc_applied[:] = self.loads
+        step = float(model.opt.timestep)
+        fine = round(sensors.period / step)
+        count = round(seconds / sensors.period)
+        # Commands on their way are looked at every tenth of a millisecond.
+        moving = bool(self.delay.any() or self.lag.any())
+        together = max(1, round(1e-4 / step)) if moving else fine
+        stays = np.exp(-together * step / np.maximum(self.lag, 1e-12))
+        positions, rates = [np.array(data.qpos)], [np.array(data.qvel)]
+        commands: list[Array] = []
+        past: list[Array] = []
+        received: Array | None = None
+        for k in range(count):
+            command: Array = np.asarray(
+                controller(k * sensors.period, data.qpos, data.qvel), np.float64
+            )
+            limited = model.actuator_ctrllimited.astype(bool)
+            low, high = model.actuator_ctrlrange.T
+            command = np.where(limited, np.clip(command, low, high), command)
+            commands.append(command)
+            past.append(self._shaped(command))
+            for i in range(0, fine, together):
+                late = (k * sensors.period + i * step - self.delay) / sensors.period
+                index = np.clip(np.floor(late + 1e-9).astype(int), 0, k)
+                wanted = np.array([past[n][j] for j, n in enumerate(index)])
+                received = wanted if received is None else wanted + (received - wanted) * stays
+                data.ctrl[:] = received
+                mujoco.mj_step(model, data, min(together, fine - i))
+            positions.append(np.array(data.qpos))
+            rates.append(np.array(data.qvel))
+            if stop is not None and stop(data.qpos):
+                break
+        seen = np.array(positions) + self.offset
+        seen += rng.normal(0, sensors.noise, seen.shape)
+        speed = np.full((len(seen), model.nv), np.nan)
+        if sensors.rates:
+            speed = np.array(rates) + rng.normal(0, 50 * sensors.noise, speed.shape)
+        times = sensors.period * np.arange(len(seen), dtype=np.float64)
+        states: Array = np.concatenate([seen, speed], axis=1, dtype=np.float64)
+        return Trajectory(name, times, states, np.array(commands, dtype=np.float64))
+
+    def _shaped(self, command: Array) -> Array:
+        """Commands after bias, dead zone and saturation."""
+        command = command + self.bias
+        command = command - np.clip(command, -self.zone, self.zone)
+        return np.clip(command, -self.level, self.level)

@@ -1,0 +1,84 @@
+"""The tutorial's systems run as they are written, with less training."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TUTORIAL = ROOT / "docs" / "tutorial-learn.md"
+LESS = [
+    "--budget.idealised_steps", "1300", "--budget.difference_steps", "600",
+    "--budget.iterations", "1", "--budget.true_samples", "150",
+]  # fmt: skip
+SMALL_DDPG = ["--ddpg.hidden", "[32, 32]", "--ddpg.warm_up", "300"]
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", TUTORIAL.read_text(), re.DOTALL)
+
+
+def run(command, folder):
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tutorial")
+    for code in blocks("python"):
+        (folder / code.splitlines()[0].removeprefix("# ")).write_text(code)
+    return folder
+
+
+def learnt(folder, command, more):
+    words = command.split()
+    assert words[0] == "python"
+    output = f"out{len(list(folder.glob('out*')))}"
+    run([sys.executable, *words[1:], *LESS, *more, "--output", output], folder)
+    assert "Policies" in (folder / output / "report.html").read_text()
+    return json.loads((folder / output / "results.json").read_text())
+
+
+def test_the_file_is_short_and_the_command_learns(folder):
+    assert len((folder / "cart_pole.py").read_text().splitlines()) <= 60
+    found = learnt(folder, blocks("bash")[0], [*SMALL_DDPG, "--budget.true_samples", "300"])
+    assert [policy["name"] for policy in found["policies"]] == ["idealised", "difference"]
+    errors = found["accuracy"][0]["visited"]["one_step"]
+    assert max(errors.values()) < 0.2
+    assert set(found["accuracy"][0]) >= {"visited", "uniform"}
+
+
+def test_the_python_call_runs(folder):
+    code = (folder / "call.py").read_text()
+    few = "from policy import DDPGConfig\nimport cart_pole\ncart_pole.SwingUp.horizon = 60\n" + (
+        code.replace("samples=450, updates=2", "samples=60, updates=1, steps=300, "
+                     "ddpg=DDPGConfig((16, 16), warm_up=100)")
+    )  # fmt: skip
+    assert few != code
+    (folder / "few.py").write_text(few)
+    assert "Learnt(system: return on the true system" in run([sys.executable, "few.py"], folder)
+    assert (folder / "report.html").exists() and list((folder / "kept").glob("difference-*"))
+
+
+@pytest.mark.parametrize("learner", ["ddpg", "sac"])
+def test_a_mujoco_environment_is_the_true_system(folder, learner):
+    pytest.importorskip("mujoco")
+    pytest.importorskip("imageio")
+    command = blocks("bash")[1 if learner == "ddpg" else 2]
+    small = "{policy_kwargs: {net_arch: [16, 16]}, learning_starts: 100}"
+    more = SMALL_DDPG if learner == "ddpg" else ["--learner_options", small]
+    found = learnt(folder, command, more)
+    _first, second = found["policies"]
+    assert second["true_samples"] == 150 and second["updates"] > 0
+    # The truth cannot be set to a state, so accuracy is where the policy goes and nowhere else.
+    assert "uniform" not in found["accuracy"][0]
+    assert max(found["accuracy"][0]["visited"]["one_step"].values()) < 0.5

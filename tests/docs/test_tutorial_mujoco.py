@@ -1,0 +1,68 @@
+"""The tutorial on MuJoCo runs as it is written: it names what is hidden, and the policy holds."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TUTORIAL = ROOT / "docs" / "tutorial-mujoco.md"
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", TUTORIAL.read_text(), re.DOTALL)
+
+
+def run(words, folder):
+    paths = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": paths}
+    done = subprocess.run(
+        [sys.executable, *words], cwd=folder, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def worked(tmp_path_factory):
+    """A folder in which steps 1 to 3 of the tutorial were done."""
+    folder = tmp_path_factory.mktemp("lever")
+    (model,) = blocks("xml")
+    (folder / "lever.xml").write_text(model)
+    for code in (*blocks("python"), *blocks("yaml")):
+        (folder / code.splitlines()[0].removeprefix("# ")).write_text(code)
+    run(["measure.py"], folder)
+    (command,) = blocks("bash")
+    told = run(command.split()[1:], folder)
+    return folder, json.loads((folder / "gap" / "gap.json").read_text()), told
+
+
+def test_the_payload_and_the_friction_are_named(worked):
+    _, gap, told = worked
+    named = {v["effect"]: v for v in gap["verdicts"] if v["kind"] == "confirmed"}
+    friction = named["frictionloss of joint pivot"]["parameters"]["change"]
+    assert friction["value"] == pytest.approx(0.08, rel=0.05)
+    (other,) = [v for name, v in named.items() if name != "frictionloss of joint pivot"]
+    assert "mass of body beam" in (other["effect"], *other["alternatives"])
+    assert "corrected.xml" in told
+
+
+def test_the_corrected_model_is_the_file_with_two_attributes_changed(worked):
+    folder, _, _ = worked
+    changed = run(["compare.py"], folder)
+    assert "<!-- hangs down at zero -->" not in changed
+    assert 'frictionloss="0.0' in changed
+    model = mujoco.MjModel.from_xml_path(str(folder / "gap" / "corrected.xml"))
+    assert model.dof_frictionloss[0] == pytest.approx(0.08, rel=0.05)
+
+
+def test_the_policy_holds_the_robot(worked):
+    folder, _, _ = worked
+    told = run(["train.py"], folder)
+    angle = float(re.search(r"holds ([\d.-]+) rad", told)[1])
+    assert angle == pytest.approx(1.0, abs=0.15)

@@ -1,0 +1,84 @@
+"""The one import and the one command, also beside foreign packages of the same names."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import simgap
+from policy import rollout
+
+ROOT = Path(__file__).parents[1]
+
+
+def run(arguments, folder):
+    # An empty entry is the present folder, as for whoever starts Python there.
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": f"{os.pathsep}{ROOT}"}
+    command = [sys.executable, *arguments]
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+def test_every_public_name_is_there():
+    for name in simgap.__all__:
+        assert getattr(simgap, name).__name__ == name
+    with pytest.raises(AttributeError, match="no attribute 'Nothing'"):
+        simgap.Nothing  # noqa: B018
+
+
+def test_the_import_alone_is_light(tmp_path):
+    code = "import simgap, sys; simgap.System; print(any(m in sys.modules for m in ('torch',)))"
+    assert run(["-c", code], tmp_path).stdout.strip() == "False"
+
+
+@pytest.mark.parametrize("command", simgap.COMMANDS)
+def test_every_command_tells_its_options(command, tmp_path):
+    done = run(["-m", "simgap", command, "--help"], tmp_path)
+    assert done.returncode == 0 and "usage:" in done.stdout
+
+
+def test_what_a_notebook_shows_is_short():
+    rng = np.random.default_rng(0)
+    states, actions = rng.uniform(-3, 3, (300, 2)), rng.uniform(-3, 3, (300, 1))
+    pendulum, leo = simgap.Pendulum(), simgap.Leo()
+    after = simgap.Pendulum.true().step(states, actions)
+    rows = simgap.Transitions(states, actions, after, np.zeros(300, int))
+    difference = simgap.DifferenceModel(simgap.Linear(), pendulum).fit(rows)
+    corrected = simgap.CorrectedSimulator(pendulum, difference)
+    env = simgap.SimulatorEnv(pendulum, simgap.SwingUp(horizon=20))
+    agent = simgap.DDPG.for_env(env)
+    run = rollout(agent.policy, env, 0)
+    trajectory = simgap.Trajectory("run 1", np.arange(4.0), np.zeros((4, 2)), np.zeros((3, 1)))
+    system = simgap.System("pendulum", pendulum, simgap.Pendulum.true(), simgap.SwingUp())
+    accuracy = simgap.accuracy_along(corrected, run.states[None], run.actions[None])
+    shown = [
+        pendulum, leo, rows, difference, corrected, agent, agent.policy, run, trajectory, system,
+        accuracy, simgap.Algorithm(), simgap.Budget(), simgap.EvaluationProtocol(),
+        simgap.Linear(), simgap.SwingUp(),
+    ]  # fmt: skip
+    for thing in shown:
+        text = repr(thing)
+        assert text.startswith(type(thing).__name__)
+        assert "\n" not in text and len(text) <= 200, text
+
+
+def test_an_unknown_command_is_one_line(capsys):
+    with pytest.raises(SystemExit) as stopped:
+        simgap.main(["lern"])
+    assert stopped.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    simgap.main(["--help"])
+    assert "find-gap" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("start", [["-m", "studies.learn"], ["-m", "simgap", "learn"]])
+def test_a_foreign_package_in_the_way_is_one_line(start, tmp_path):
+    (tmp_path / "policy").mkdir()
+    (tmp_path / "policy" / "__init__.py").write_text("")
+    done = run([*start, "--help"], tmp_path)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1 and "policy" in done.stderr
