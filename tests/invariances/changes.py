@@ -97,9 +97,7 @@ def other_units(log: Log, folder: Path) -> Log:
             writer.writerow(["clock", *used, *layout.actions, "humidity"])
             held = np.vstack([run.actions, run.actions[-1:]])
             for time, state, action in zip(run.times, run.states, held, strict=True):
-                row = [
-                    _written(c, v) for c, v in zip(states, state, strict=True) if c.name in used
-                ]
+                row = [_written(c, v) for c, v in zip(states, state, strict=True) if c.name in used]
                 row += [_written(c, v) for c, v in zip(actions, action, strict=True)]
                 writer.writerow([repr(float(1000 * time)), *row, repr(float(rng.normal()))])
     data = read_logs(files, states, actions, layout)

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import studies
 
+import studies
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 from sims.pendulum_equation import PendulumEquation
