@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from residual.gap.noise import Floor, driven_states, push
 from residual.gap.samples import Samples
 from residual.gap.screening import flatten, project_out
-from residual.gap.shooting import Shot
+from residual.gap.shooting import ShootingFit
 from residual.gap.slopes import observe
 from residual.gap.windows import Windows, carry
 from sims.host import HostSimulator
@@ -98,7 +98,7 @@ def generic_forces(
 
 
 def remainder(
-    fit: Shot, samples: Samples, windows: Windows, sigma: Array, floor: Floor, scale: Array
+    fit: ShootingFit, samples: Samples, windows: Windows, sigma: Array, floor: Floor, scale: Array
 ) -> Remainder:
     """Size and shape of what is left after a fit."""
     measured = samples.measured
@@ -139,7 +139,7 @@ def remainder(
     )  # fmt: skip
 
 
-def _beyond_cap(fit: Shot, places: int) -> Array:
+def _beyond_cap(fit: ShootingFit, places: int) -> Array:
     """Squared residual of windows beyond the cap, counted at the cap, by channel."""
     far = fit.weights < 1.0
     square = fit.projected.reshape(len(fit.costs), places, -1)[far] ** 2

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True)
-class Shot:
+class ShootingFit:
     """Result of fitting a model to windows.
 
     Attributes:
@@ -77,7 +77,7 @@ def fit(
     shrink: float = 0.35,
     by_state: Array | None = None,
     tolerance: float = 1e-4,
-) -> Shot:
+) -> ShootingFit:
     """Gauss-Newton on start states and unknowns.
 
     Args:
@@ -98,7 +98,7 @@ def fit(
     """
     count, f, p = len(windows), len(model.free), len(theta)
     problem = _Problem(model, samples, windows, sigma, scale, cap)
-    best: Shot | None = None
+    best: ShootingFit | None = None
     moves = np.zeros((*windows.index.shape, nodes.shape[1]))
     step_theta = np.zeros_like(theta)
     damping, failed = 1e-6, np.zeros(count, int)
@@ -180,7 +180,7 @@ class _Problem:
 
     def at(
         self, nodes: Array, theta: Array, width: Array, by_state: Array | None, turn: int
-    ) -> tuple[Shot, _Tangent]:
+    ) -> tuple[ShootingFit, _Tangent]:
         """Costs and their linearisation at nodes and unknowns."""
         model, samples, windows, sigma = self.model, self.samples, self.windows, self.sigma
         f, p, count = len(model.free), len(theta), len(windows)
@@ -208,14 +208,16 @@ class _Problem:
         inner = basis_rows.transpose(0, 2, 1)
         projected = flat - (basis_rows @ (inner @ flat[..., None]))[..., 0]
         by_knob = columns[..., f:] - basis_rows @ (inner @ columns[..., f:])
-        found = Shot(
+        found = ShootingFit(
             theta, nodes, costs, float(capped(costs, self.cap).sum()), self.cap, residual,
             basis_rows, by_knob, projected, slope, model,
         )  # fmt: skip
         return found, _Tangent(response, columns, flat, basis, triangle)
 
 
-def _merge(old: Shot, new: Shot, better: NDArray[np.bool_], windows: Windows) -> Shot:
+def _merge(
+    old: ShootingFit, new: ShootingFit, better: NDArray[np.bool_], windows: Windows
+) -> ShootingFit:
     """The new fit in the windows where it is better, elsewhere the old one."""
     if better.all():
         return new

@@ -83,13 +83,13 @@ class SmoothFitter:
 
     def _shot(
         self, model: Model, nodes: Array, theta: Array, by_state: Array | None, widths: float
-    ) -> shooting.Shot:
+    ) -> shooting.ShootingFit:
         return shooting.fit(
             model, self.samples, self.blocks.windows, nodes, theta, self.sigma,
             model.scales(self.scale), self.turns, self.cap, widths, by_state=by_state,
         )  # fmt: skip
 
-    def _as_fit(self, found: shooting.Shot) -> Fit:
+    def _as_fit(self, found: shooting.ShootingFit) -> Fit:
         return Fit(
             found.model, found.theta, shooting.capped(found.costs, self.cap), found.weights,
             found.projected, found.by_knob, found.basis, found.converged, found,
@@ -102,30 +102,30 @@ class SmoothFitter:
         carried linearly along the window: one batch serves all windows, and none runs away.
         """
         model, samples, windows = fit.model, self.samples, self.blocks.windows
-        shot: shooting.Shot = fit.inner
-        n, width = shot.nodes.shape
+        inner: shooting.ShootingFit = fit.inner
+        n, width = inner.nodes.shape
         moved: list[Array] = []
         shown: list[Array] = []
         for candidate in candidates:
             joint = Model(model.simulator, (*model.chosen, candidate))
             values = np.vstack([trial.values for trial in candidate.trials])
             theta = np.hstack([np.repeat(fit.theta[None], len(values), axis=0), values])
-            states = np.broadcast_to(shot.nodes, (len(values), n, width))
+            states = np.broadcast_to(inner.nodes, (len(values), n, width))
             if joint.width > width:
-                play = [joint.widen(samples, shot.nodes[:, : joint.physical], t) for t in theta]
+                play = [joint.widen(samples, inner.nodes[:, : joint.physical], t) for t in theta]
                 states = np.concatenate([states, np.stack(play)[:, :, width:]], axis=2)
             still = np.zeros((n, width, len(values)))
             if candidate.effect.enters == "sensor":
                 moved.append(still)
-                seen = joint.sense(states, theta) - shot.slope.shown
+                seen = joint.sense(states, theta) - inner.slope.shown
                 shown.append(seen.transpose(1, 2, 0))
             else:
-                after = joint.advance(samples, states, theta)[..., :width] - shot.slope.after
+                after = joint.advance(samples, states, theta)[..., :width] - inner.slope.after
                 moved.append(after.transpose(1, 2, 0))
                 shown.append(still)
         start = np.zeros((width, 0))
-        response = carry(windows, shot.slope.by_state, start, np.concatenate(moved, axis=2))
-        columns = observe(samples, windows, shot.slope, response, self.sigma)
+        response = carry(windows, inner.slope.by_state, start, np.concatenate(moved, axis=2))
+        columns = observe(samples, windows, inner.slope, response, self.sigma)
         measured = samples.measured
         direct = np.concatenate(shown, axis=2)[:, measured][windows.index] / self.sigma[:, None]
         columns = columns + direct * self.valid[..., None]
@@ -209,8 +209,8 @@ class SmoothFitter:
         samples, windows, lead = self.samples, self.blocks.windows, self.lead
         measured = samples.measured
         first = windows.index[:, 0]
-        shot: shooting.Shot = fit.inner
-        states = np.array(shot.nodes[first])
+        inner: shooting.ShootingFit = fit.inner
+        states = np.array(inner.nodes[first])
         free = model.free
         moves = 1e-3 * self.scale[free]
         seen = samples.seen[windows.index][..., measured]

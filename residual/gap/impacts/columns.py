@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.candidates import Candidate
-from residual.gap.impacts.single_shooting import Aimed, Shots, job, run, shown, whitened
+from residual.gap.impacts.single_shooting import StartFit, WindowData, job, run, shown, whitened
 from residual.gap.model import Model
 
 Array = NDArray[np.float64]
@@ -18,29 +18,33 @@ Array = NDArray[np.float64]
 GENTLE = 0.3
 
 
-def chosen_changes(model: Model, theta: Array, shots: Shots, aimed: Aimed) -> Array:
+def chosen_changes(model: Model, theta: Array, data: WindowData, fitted: StartFit) -> Array:
     """Derivative of the whitened output by the unknowns of the model, (W, R, p)."""
     steps = np.where(theta + 0.1 * model.step > model.high, -0.1, 0.1) * model.step
     thetas = theta + np.diag(steps)
-    jobs = [job(model, t, shots, aimed.starts[None]) for t in thetas]
-    measured = shots.samples.measured
+    jobs = [job(model, t, data, fitted.starts[None]) for t in thetas]
+    measured = data.samples.measured
     columns = [
-        whitened(shots, (shown(one, path, measured)[0] - aimed.shown) / step)
+        whitened(data, (shown(one, path, measured)[0] - fitted.shown) / step)
         for one, path, step in zip(jobs, run(jobs), steps, strict=True)
     ]
-    return np.stack(columns, axis=2) if columns else np.zeros((*aimed.residual.shape, 0))
+    return np.stack(columns, axis=2) if columns else np.zeros((*fitted.residual.shape, 0))
 
 
 def candidate_changes(
-    model: Model, theta: Array, shots: Shots, aimed: Aimed, candidates: Sequence[Candidate]
+    model: Model,
+    theta: Array,
+    data: WindowData,
+    fitted: StartFit,
+    candidates: Sequence[Candidate],
 ) -> Array:
     """Change of the whitened output by every trial of candidates beside a fitted model, (W, R, c).
 
     Args:
         model: The fitted simulator with effects.
         theta: Their numbers.
-        shots: The windows.
-        aimed: The fit to them.
+        data: The windows.
+        fitted: The fit to them.
         candidates: All that may be missing.
     """
     jobs, shares = [], []
@@ -50,11 +54,11 @@ def candidate_changes(
         for trial in candidate.trials:
             for row in trial.values:
                 values = np.where(candidate.linear, gentle * row, row)
-                jobs.append(job(joint, np.append(theta, values), shots, aimed.starts[None]))
+                jobs.append(job(joint, np.append(theta, values), data, fitted.starts[None]))
                 shares.append(gentle)
-    measured = shots.samples.measured
+    measured = data.samples.measured
     changes = [
-        whitened(shots, shown(one, path, measured)[0] - aimed.shown) / share
+        whitened(data, shown(one, path, measured)[0] - fitted.shown) / share
         for one, path, share in zip(jobs, run(jobs), shares, strict=True)
     ]
     return np.stack(changes, axis=2)

@@ -15,7 +15,7 @@ from residual.gap.impacts.columns import candidate_changes, chosen_changes
 from residual.gap.impacts.noise import with_noise
 from residual.gap.impacts.refine import Refined, refine, renew, settle
 from residual.gap.impacts.robust import weights
-from residual.gap.impacts.single_shooting import Job, Shots, aim, job, run, shown
+from residual.gap.impacts.single_shooting import Job, WindowData, fit_starts, job, run, shown
 from residual.gap.impacts.windows import lay_out
 from residual.gap.model import Model
 from residual.gap.noise import Noise
@@ -42,14 +42,14 @@ class ImpactFitter:
     """See ``residual.gap.fitting.Fitter``.
 
     Args:
-        shots: The windows with their noise.
+        data: The windows with their noise.
         blocks: The same windows in blocks and folds.
         horizon: Forecast length in rows, beyond the window.
         scale: Usual size of every physical state, (n_p,).
         limit: Largest squared error that a forecast counts with, (m,).
     """
 
-    shots: Shots
+    data: WindowData
     blocks: Blocks
     horizon: int
     scale: Array
@@ -58,52 +58,52 @@ class ImpactFitter:
     @property
     def samples(self) -> Samples:
         """The table."""
-        return self.shots.samples
+        return self.data.samples
 
     @property
     def sigma(self) -> Array:
         """Weight of every measured channel, (m,)."""
-        return self.shots.sigma
+        return self.data.sigma
 
     def halved(self) -> ImpactFitter:
         """See ``Fitter.halved``."""
         samples = dataclasses.replace(self.samples, substeps=2 * self.samples.substeps)
-        return dataclasses.replace(self, shots=dataclasses.replace(self.shots, samples=samples))
+        return dataclasses.replace(self, data=dataclasses.replace(self.data, samples=samples))
 
     def weighed_like(self, other: Fitter) -> ImpactFitter:
         """See ``Fitter.weighed_like``."""
-        return dataclasses.replace(self, shots=with_noise(self.shots, other.sigma, self.scale))
+        return dataclasses.replace(self, data=with_noise(self.data, other.sigma, self.scale))
 
     def fit(self, model: Model, theta: Array, near: Fit | None = None) -> Fit:
         """See ``Fitter.fit``."""
-        shots = self.shots
+        data = self.data
         if near is not None and len(theta):
-            found = refine(model, theta, shots, near.inner.aimed, 2)
+            found = refine(model, theta, data, near.inner.fitted, 2)
         elif len(theta):
             theta = np.clip(theta, model.low, model.high)
-            found = renew(model, theta, shots, shots.guess, STEPS)
+            found = renew(model, theta, data, data.guess, STEPS)
         else:
-            found = settle(model, theta, shots, shots.guess, 2)
+            found = settle(model, theta, data, data.guess, 2)
             if near is not None:
-                aimed = near.inner.aimed
-                again = settle(model, theta, shots, aimed.starts, 1, aimed.by_start)
+                fitted = near.inner.fitted
+                again = settle(model, theta, data, fitted.starts, 1, fitted.by_start)
                 found = found.with_better(again)
         return self._as_fit(found)
 
     def _as_fit(self, found: Refined) -> Fit:
-        aimed = found.aimed
-        basis, _ = np.linalg.qr(aimed.by_start)
+        fitted = found.fitted
+        basis, _ = np.linalg.qr(fitted.by_start)
         inner = basis.transpose(0, 2, 1)
-        changes = chosen_changes(found.model, found.theta, self.shots, aimed)
+        changes = chosen_changes(found.model, found.theta, self.data, fitted)
         return Fit(
-            found.model, found.theta, found.loss, weights(aimed.costs, self.shots.freedom),
-            aimed.residual - (basis @ (inner @ aimed.residual[..., None]))[..., 0],
+            found.model, found.theta, found.loss, weights(fitted.costs, self.data.freedom),
+            fitted.residual - (basis @ (inner @ fitted.residual[..., None]))[..., 0],
             changes - basis @ (inner @ changes), basis, True, found,
         )  # fmt: skip
 
     def columns(self, fit: Fit, candidates: Sequence[Candidate]) -> Array:
         """See ``Fitter.columns``."""
-        return candidate_changes(fit.model, fit.theta, self.shots, fit.inner.aimed, candidates)
+        return candidate_changes(fit.model, fit.theta, self.data, fit.inner.fitted, candidates)
 
     def foretell(self, model: Model, thetas: Array, which: NDArray[np.int64], fit: Fit) -> Foretold:
         """See ``Fitter.foretell``: from the end of every window on, in the same run."""
@@ -113,10 +113,10 @@ class ImpactFitter:
         for number in np.unique(which):
             own = np.flatnonzero(which == number)
             theta = thetas[number]
-            part = self.shots.take(own)
-            starts = fit.inner.aimed.starts[own]
+            part = self.data.take(own)
+            starts = fit.inner.fitted.starts[own]
             if len(theta):
-                starts = aim(model, theta, part, starts, 1).starts
+                starts = fit_starts(model, theta, part, starts, 1).starts
             one = job(model, theta, part, starts[None])
             inputs = model.inputs(self.samples, theta[None])[0]
             whole = Job(
@@ -124,26 +124,26 @@ class ImpactFitter:
             )
             found[own] = shown(whole, run([whole])[0], self.samples.measured)[0]
         square = np.where(self._inside(rows), np.minimum((seen - found) ** 2, self.limit), np.nan)
-        begun = self.shots.windows.index.shape[1]
+        begun = self.data.windows.index.shape[1]
         middle = begun + self.horizon // 2
         return Foretold(_mean(square[:, begun:]), _mean(square[:, begun:middle]), found[:, :begun])
 
     def _ahead(self) -> NDArray[np.int64]:
         """Rows of every window and of its forecast, (W, L + horizon)."""
-        index = self.shots.windows.index
+        index = self.data.windows.index
         rows = index[:, :1] + np.arange(index.shape[1] + self.horizon)
         return np.minimum(rows, len(self.samples) - 1)
 
     def _inside(self, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which of them belong to the window's run, (W, L + horizon, 1)."""
-        ends = np.array([self.samples.runs[r][1] for r in self.shots.windows.run])
-        index = self.shots.windows.index[:, :1] + np.arange(rows.shape[1])
+        ends = np.array([self.samples.runs[r][1] for r in self.data.windows.run])
+        index = self.data.windows.index[:, :1] + np.arange(rows.shape[1])
         return (index < ends[:, None])[..., None]
 
     def redrawn(self, fit: Fit, sigma: Array, rng: np.random.Generator) -> ImpactFitter:
         """See ``Fitter.redrawn``; forecasts overlap, so each window becomes a run of its own."""
         rows, samples = self._ahead(), self.samples
-        one = job(fit.model, fit.theta, self.shots, fit.inner.aimed.starts[None])
+        one = job(fit.model, fit.theta, self.data, fit.inner.fitted.starts[None])
         inputs = fit.model.inputs(samples, fit.theta[None])[0]
         whole = Job(one.host, one.starts, inputs[rows[:, :-1]], samples.durations[rows[:, :-1]])
         clean = shown(whole, run([whole])[0], samples.measured)[0]
@@ -160,11 +160,11 @@ class ImpactFitter:
             runs=tuple((int(a), int(a) + length) for a in begins),
             recorded=tuple(Recorded(samples.actions[r], samples.durations[r]) for r in rows),
         )  # fmt: skip
-        size = self.shots.windows.index.shape[1]
+        size = self.data.windows.index.shape[1]
         cut = [(k, int(a), int(a) + size) for k, a in enumerate(begins)]
-        shots = with_noise(lay_out(fit.model.simulator, drawn, cut), self.sigma, self.scale)
-        blocks = dataclasses.replace(self.blocks, windows=shots.windows)
-        return dataclasses.replace(self, shots=shots, blocks=blocks)
+        data = with_noise(lay_out(fit.model.simulator, drawn, cut), self.sigma, self.scale)
+        blocks = dataclasses.replace(self.blocks, windows=data.windows)
+        return dataclasses.replace(self, data=data, blocks=blocks)
 
     def left(self, fit: Fit, floor: Noise) -> Left:
         """See ``Fitter.left``.
@@ -174,10 +174,10 @@ class ImpactFitter:
         """
         count, length = self.blocks.windows.index.shape
         measured = len(self.sigma)
-        square = fit.inner.aimed.residual[:, : length * measured].reshape(count, length, -1) ** 2
-        portion = float(self.shots.freedom.mean()) / (length * measured)
+        square = fit.inner.fitted.residual[:, : length * measured].reshape(count, length, -1) ** 2
+        portion = float(self.data.freedom.mean()) / (length * measured)
         by_channel = np.sqrt(np.median(square.mean(axis=1), axis=0) / portion)
-        ratio = float(np.sqrt(np.median(fit.inner.aimed.costs / self.shots.freedom)))
+        ratio = float(np.sqrt(np.median(fit.inner.fitted.costs / self.data.freedom)))
         return Left(True, ratio, "", tuple(float(r) for r in by_channel))
 
     def needed(self, around: Signatures, nominal: Fit) -> float:
@@ -192,7 +192,7 @@ class ImpactFitter:
         """See ``Fitter.where``; impacts leave no smooth force to be drawn."""
         samples = self.samples
         channels = nominal.model.simulator.physical_channels
-        left = nominal.inner.aimed.costs / self.shots.freedom
+        left = nominal.inner.fitted.costs / self.data.freedom
         return Where(
             by_channel={
                 channels[c].name: ratio

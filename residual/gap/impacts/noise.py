@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.impacts.robust import weights
-from residual.gap.impacts.single_shooting import Aimed, Shots, aim
+from residual.gap.impacts.single_shooting import StartFit, WindowData, fit_starts
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 
@@ -26,44 +26,44 @@ def first_guess(samples: Samples, nodes: Array) -> Array:
     return np.maximum(0.1 * np.median(steps[inside], axis=0), 1e-9)
 
 
-def spread(shots: Shots, aimed: Aimed) -> tuple[Array, Array]:
+def spread(data: WindowData, fitted: StartFit) -> tuple[Array, Array]:
     """Noise of every measured channel and its standard error, (m,).
 
     One step of the EM algorithm for Student's t, start states allowed for.
     """
-    count, length, measured = aimed.shown.shape
+    count, length, measured = fitted.shown.shape
     rows = length * measured
-    basis, _ = np.linalg.qr(aimed.by_start)
+    basis, _ = np.linalg.qr(fitted.by_start)
     leverage = (basis[:, :rows] ** 2).sum(axis=2).reshape(count, length, measured)
-    square = (aimed.residual[:, :rows] ** 2).reshape(count, length, measured)
-    weight = weights(aimed.costs, shots.freedom)[:, None, None]
-    valid = np.isfinite(shots.seen)
+    square = (fitted.residual[:, :rows] ** 2).reshape(count, length, measured)
+    weight = weights(fitted.costs, data.freedom)[:, None, None]
+    valid = np.isfinite(data.seen)
     free = (weight * valid * (1 - leverage)).sum(axis=(0, 1))
     ratio = (weight * square).sum(axis=(0, 1)) / np.maximum(free, 1e-9)
-    sigma = shots.sigma * np.sqrt(np.maximum(ratio, 1e-12))
+    sigma = data.sigma * np.sqrt(np.maximum(ratio, 1e-12))
     counted = (valid * (1 - leverage)).sum(axis=(0, 1))
     return sigma, sigma / np.sqrt(2 * np.maximum(counted, 1.0))
 
 
-def with_noise(shots: Shots, sigma: Array, scale: Array) -> Shots:
+def with_noise(data: WindowData, sigma: Array, scale: Array) -> WindowData:
     """The windows in units of another noise.
 
     States are moved by a quarter of it, so that the kinks of contacts are averaged; a rate by
     what such an error makes of it over an interval.
     """
-    samples = shots.samples
+    samples = data.samples
     sigma = np.maximum(sigma, FINEST * scale[samples.measured])
-    moves = np.array(shots.moves)
+    moves = np.array(data.moves)
     moves[samples.measured] = 0.25 * np.minimum(sigma, 0.02 * scale[samples.measured])
-    return dataclasses.replace(shots, sigma=sigma, moves=moves)
+    return dataclasses.replace(data, sigma=sigma, moves=moves)
 
 
 def quieten(
-    model: Model, theta: Array, shots: Shots, starts: Array, scale: Array, turns: int
-) -> tuple[Shots, Aimed]:
+    model: Model, theta: Array, data: WindowData, starts: Array, scale: Array, turns: int
+) -> tuple[WindowData, StartFit]:
     """Start states and noise in turns."""
     for _ in range(turns):
-        aimed = aim(model, theta, shots, starts, 1)
-        starts = aimed.starts
-        shots = with_noise(shots, spread(shots, aimed)[0], scale)
-    return shots, aimed
+        fitted = fit_starts(model, theta, data, starts, 1)
+        starts = fitted.starts
+        data = with_noise(data, spread(data, fitted)[0], scale)
+    return data, fitted

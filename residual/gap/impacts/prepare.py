@@ -37,25 +37,25 @@ def impact_fitter(
     rates = np.array([i for i, c in enumerate(simulator.physical_channels) if c.kind == "rate"])
     grouped = blocks(samples, Windows.cut(pieces(samples)), drive(samples, nodes, rates), NAMED_ON)
     scale = scales(simulator)
-    shots = lay_out(simulator, samples, grouped.windows.pieces)
-    shots, _ = quieten(model, none, shots, shots.guess, scale, 3)
+    data = lay_out(simulator, samples, grouped.windows.pieces)
+    data, _ = quieten(model, none, data, data.guess, scale, 3)
     ahead = max(1, round(horizon / samples.step))
-    free = np.full(len(shots.sigma), np.inf)
-    fitter = ImpactFitter(shots, grouped, ahead, scale, free)
+    free = np.full(len(data.sigma), np.inf)
+    fitter = ImpactFitter(data, grouped, ahead, scale, free)
     nominal = fitter.fit(model, none)
-    every = np.zeros(len(shots), np.int64)
+    every = np.zeros(len(data), np.int64)
     squares = fitter.foretell(model, none[None], every, nominal).squares
     limit = LOST * np.nanquantile(squares, 0.75, axis=0)
-    return dataclasses.replace(fitter, limit=limit), Noise(*spread(shots, nominal.inner.aimed))
+    return dataclasses.replace(fitter, limit=limit), Noise(*spread(data, nominal.inner.fitted))
 
 
 def weigh_impacts(now: Fitter, fit: Fit) -> tuple[Fitter, Noise]:
     """The windows with the noise around a fit."""
     assert isinstance(now, ImpactFitter)
-    sigma, error = spread(now.shots, fit.inner.aimed)
-    shots = with_noise(now.shots, sigma, now.scale)
-    shots = dataclasses.replace(shots, guess=fit.inner.aimed.starts)
-    return dataclasses.replace(now, shots=shots), Noise(sigma, error)
+    sigma, error = spread(now.data, fit.inner.fitted)
+    data = with_noise(now.data, sigma, now.scale)
+    data = dataclasses.replace(data, guess=fit.inner.fitted.starts)
+    return dataclasses.replace(now, data=data), Noise(sigma, error)
 
 
 def simple(pool: Sequence[Candidate]) -> list[Candidate]:

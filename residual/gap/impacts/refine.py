@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 from residual.gap.impacts.columns import chosen_changes
 from residual.gap.impacts.quadratic import Quadratic, minimise
 from residual.gap.impacts.robust import losses
-from residual.gap.impacts.single_shooting import Aimed, Shots, aim, residual, shoot
+from residual.gap.impacts.single_shooting import (
+    StartFit,
+    WindowData,
+    fit_starts,
+    residual,
+    simulate,
+)
 from residual.gap.model import Model
 
 Array = NDArray[np.float64]
@@ -23,20 +29,20 @@ class Refined:
     Attributes:
         model: Simulator with the effects.
         theta: Their numbers, (p,).
-        aimed: The windows shot from their best start states.
+        fitted: The windows inner from their best start states.
         loss: Robust loss of every window, (W,).
     """
 
     model: Model
     theta: Array
-    aimed: Aimed
+    fitted: StartFit
     loss: Array
 
     def with_better(self, again: Refined) -> Refined:
         """The better of two fits of the same strengths, window by window."""
         won = again.loss < self.loss
-        mine, theirs = self.aimed, again.aimed
-        aimed = Aimed(
+        mine, theirs = self.fitted, again.fitted
+        fitted = StartFit(
             *(
                 np.where(won.reshape(-1, *([1] * (a.ndim - 1))), b, a)
                 for a, b in (
@@ -47,7 +53,7 @@ class Refined:
                 )
             )
         )
-        return dataclasses.replace(self, aimed=aimed, loss=np.where(won, again.loss, self.loss))
+        return dataclasses.replace(self, fitted=fitted, loss=np.where(won, again.loss, self.loss))
 
     @property
     def total(self) -> float:
@@ -56,14 +62,19 @@ class Refined:
 
 
 def settle(
-    model: Model, theta: Array, shots: Shots, starts: Array, turns: int, slope: Array | None = None
+    model: Model,
+    theta: Array,
+    data: WindowData,
+    starts: Array,
+    turns: int,
+    slope: Array | None = None,
 ) -> Refined:
-    """Start states alone, the strengths as they are; see ``aim``."""
-    aimed = aim(model, theta, shots, starts, turns, slope=slope)
-    return Refined(model, theta, aimed, losses(aimed.costs, shots.freedom))
+    """Start states alone, the strengths as they are; see ``fit_starts``."""
+    fitted = fit_starts(model, theta, data, starts, turns, slope=slope)
+    return Refined(model, theta, fitted, losses(fitted.costs, data.freedom))
 
 
-def renew(model: Model, theta: Array, shots: Shots, starts: Array, steps: int) -> Refined:
+def renew(model: Model, theta: Array, data: WindowData, starts: Array, steps: int) -> Refined:
     """Full steps of the strengths, each from start states sought afresh from the same ones.
 
     Start states that have settled hold the strengths back: along the kinks of impacts a better
@@ -71,38 +82,43 @@ def renew(model: Model, theta: Array, shots: Shots, starts: Array, steps: int) -
     begins where another effect has settled ends far off.
     """
     for _ in range(steps if len(theta) else 0):
-        theta = theta + newton(settle(model, theta, shots, starts, 2), shots)
-    return settle(model, theta, shots, starts, 2)
+        theta = theta + newton(settle(model, theta, data, starts, 2), data)
+    return settle(model, theta, data, starts, 2)
 
 
-def level(one: Refined, other: Refined, shots: Shots) -> tuple[Refined, Refined]:
+def level(one: Refined, other: Refined, data: WindowData) -> tuple[Refined, Refined]:
     """Both after they have tried each other's start states, so that neither wins by its search.
 
     A start state is found by search, and to go on searching lowers the loss of any set.
     """
     better = []
-    for mine, theirs in ((one, other.aimed), (other, one.aimed)):
-        again = settle(mine.model, mine.theta, shots, theirs.starts, 1, theirs.by_start)
+    for mine, theirs in ((one, other.fitted), (other, one.fitted)):
+        again = settle(mine.model, mine.theta, data, theirs.starts, 1, theirs.by_start)
         better.append(mine.with_better(again))
     return better[0], better[1]
 
 
 def refine(
-    model: Model, theta: Array, shots: Shots, near: Aimed, turns: int = 3, settled: float = 3e-3
+    model: Model,
+    theta: Array,
+    data: WindowData,
+    near: StartFit,
+    turns: int = 3,
+    settled: float = 3e-3,
 ) -> Refined:
     """Strengths and start states in turns, each turn from a fresh derivative of both.
 
     Args:
         theta: First guess of the strengths, (p,).
-        near: The windows as shot by a similar model.
+        near: The windows as inner by a similar model.
         turns: At most so many.
         settled: Stop when the loss falls by a smaller share.
     """
     theta = np.clip(theta, model.low, model.high)
-    best = settle(model, theta, shots, near.starts, 1, near.by_start)
+    best = settle(model, theta, data, near.starts, 1, near.by_start)
     for _ in range(turns if len(theta) else 0):
-        strengths, starts = step(best, shots)
-        fresh = settle(model, strengths, shots, starts, 1, best.aimed.by_start)
+        strengths, starts = step(best, data)
+        fresh = settle(model, strengths, data, starts, 1, best.fitted.by_start)
         gain = best.total - fresh.total
         if gain > 0:
             best = fresh
@@ -111,40 +127,44 @@ def refine(
     return best
 
 
-def quadratic(found: Refined, shots: Shots, changes: Array) -> Quadratic:
+def quadratic(found: Refined, data: WindowData, changes: Array) -> Quadratic:
     """The windows as quadratic functions of changes (W, R, p) by the strengths."""
-    aimed = found.aimed
+    fitted = found.fitted
     return Quadratic.of(
-        aimed.by_start, aimed.residual, changes, shots.freedom, found.model.low - found.theta
+        fitted.by_start,
+        fitted.residual,
+        changes,
+        data.freedom,
+        found.model.low - found.theta,
     )
 
 
-def newton(found: Refined, shots: Shots, changes: Array | None = None) -> Array:
+def newton(found: Refined, data: WindowData, changes: Array | None = None) -> Array:
     """Full step of the strengths by the quadratic model, within their bounds, (p,)."""
     model = found.model
     if changes is None:
-        changes = chosen_changes(model, found.theta, shots, found.aimed)
-    _, (change,) = minimise(quadratic(found, shots, changes), [tuple(range(len(model)))])
+        changes = chosen_changes(model, found.theta, data, found.fitted)
+    _, (change,) = minimise(quadratic(found, data, changes), [tuple(range(len(model)))])
     return np.clip(found.theta + change, model.low, model.high) - found.theta
 
 
-def step(found: Refined, shots: Shots) -> tuple[Array, Array]:
+def step(found: Refined, data: WindowData) -> tuple[Array, Array]:
     """Strengths and start states a step of Gauss and Newton further, or a part of it."""
-    model, aimed = found.model, found.aimed
-    changes = chosen_changes(model, found.theta, shots, aimed)
-    full = newton(found, shots, changes)
-    inverse = np.linalg.pinv(aimed.by_start, rcond=1e-8)
+    model, fitted = found.model, found.fitted
+    changes = chosen_changes(model, found.theta, data, fitted)
+    full = newton(found, data, changes)
+    inverse = np.linalg.pinv(fitted.by_start, rcond=1e-8)
     shares = (1.0, 0.4, 0.15)
     for share in shares:
         move = share * full
-        target = aimed.residual - (changes @ move)
-        options = np.stack([aimed.starts, aimed.starts + (inverse @ target[..., None])[..., 0]])
-        outputs = shoot(model, found.theta + move, shots, options)
+        target = fitted.residual - (changes @ move)
+        options = np.stack([fitted.starts, fitted.starts + (inverse @ target[..., None])[..., 0]])
+        outputs = simulate(model, found.theta + move, data, options)
         costs = np.stack(
-            [(residual(shots, *pair) ** 2).sum(1) for pair in zip(options, outputs, strict=True)]
+            [(residual(data, *pair) ** 2).sum(1) for pair in zip(options, outputs, strict=True)]
         )
         # An impact may spoil the linear start of one window without spoiling the step.
         starts = np.where((costs[0] < costs[1])[:, None], options[0], options[1])
-        if losses(costs.min(axis=0), shots.freedom).sum() < found.total or share == shares[-1]:
+        if losses(costs.min(axis=0), data.freedom).sum() < found.total or share == shares[-1]:
             break
     return found.theta + move, starts

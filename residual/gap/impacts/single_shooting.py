@@ -26,7 +26,7 @@ PIECE = 200
 
 
 @dataclasses.dataclass(frozen=True)
-class Shots:
+class WindowData:
     """Windows of equal length with what was measured in them.
 
     Attributes:
@@ -60,7 +60,7 @@ class Shots:
         values = np.isfinite(self.seen).sum(axis=(1, 2))
         return np.maximum(values - np.isinf(self.doubt).sum(), 1).astype(float)
 
-    def take(self, which: NDArray[np.int64]) -> Shots:
+    def take(self, which: NDArray[np.int64]) -> WindowData:
         """Some of the windows."""
         windows = self.windows
         part = Windows(windows.index[which], windows.inside[which], windows.run[which])
@@ -68,8 +68,8 @@ class Shots:
 
 
 @dataclasses.dataclass(frozen=True)
-class Aimed:
-    """Windows shot from their best start states.
+class StartFit:
+    """Windows inner from their best start states.
 
     Attributes:
         starts: Physical start states, (W, n_p).
@@ -132,9 +132,9 @@ def run(jobs: Sequence[Job]) -> list[Array]:
     ]
 
 
-def job(model: Model, theta: Array, shots: Shots, starts: Array) -> Job:
+def job(model: Model, theta: Array, data: WindowData, starts: Array) -> Job:
     """The work of shooting all windows from physical start states (V, W, n_p)."""
-    samples, index = shots.samples, shots.windows.index
+    samples, index = data.samples, data.windows.index
     host = model.bind(theta)
     inputs = model.inputs(samples, theta[None])[0]
     own = len(host.integrated_channels)
@@ -151,52 +151,52 @@ def shown(job: Job, path: Array, measured: NDArray[np.int64]) -> Array:
     return job.host.sense(flat).reshape(path.shape)[..., measured]
 
 
-def shoot(model: Model, theta: Array, shots: Shots, starts: Array) -> Array:
+def simulate(model: Model, theta: Array, data: WindowData, starts: Array) -> Array:
     """What the sensors show along windows from start states (V, W, n_p), (V, W, L, m)."""
-    one = job(model, theta, shots, starts)
-    return shown(one, run([one])[0], shots.samples.measured)
+    one = job(model, theta, data, starts)
+    return shown(one, run([one])[0], data.samples.measured)
 
 
-def residual(shots: Shots, starts: Array, shown: Array) -> Array:
+def residual(data: WindowData, starts: Array, shown: Array) -> Array:
     """Whitened residual, zero where nothing was measured, and the doubts below it, (W, R)."""
-    gap = (shots.seen - shown) / shots.sigma
-    gap = np.clip(np.nan_to_num(gap, nan=0.0), -1e7, 1e7).reshape(len(shots), -1)
-    return np.concatenate([gap, (shots.guess - starts) / shots.doubt], axis=1)
+    gap = (data.seen - shown) / data.sigma
+    gap = np.clip(np.nan_to_num(gap, nan=0.0), -1e7, 1e7).reshape(len(data), -1)
+    return np.concatenate([gap, (data.guess - starts) / data.doubt], axis=1)
 
 
-def whitened(shots: Shots, change: Array) -> Array:
+def whitened(data: WindowData, change: Array) -> Array:
     """Change of what is shown (W, L, m) in units of the residual; no doubt changes, (W, R)."""
-    valid = np.isfinite(shots.seen)
-    flat = np.where(valid, change / shots.sigma, 0.0).reshape(len(shots), -1)
+    valid = np.isfinite(data.seen)
+    flat = np.where(valid, change / data.sigma, 0.0).reshape(len(data), -1)
     flat = np.clip(flat, -1e7, 1e7)
-    return np.concatenate([flat, np.zeros((len(shots), len(shots.doubt)))], axis=1)
+    return np.concatenate([flat, np.zeros((len(data), len(data.doubt)))], axis=1)
 
 
-def by_start(model: Model, theta: Array, shots: Shots, starts: Array, base: Array) -> Array:
+def by_start(model: Model, theta: Array, data: WindowData, starts: Array, base: Array) -> Array:
     """Derivative of the whitened output by the start states, (W, R, n_p)."""
     channels = model.simulator.physical_channels
     moved = [i for i, channel in enumerate(channels) if not channel.invariant]
-    steps = shots.moves
+    steps = data.moves
     variants = starts[None] + np.zeros((len(moved), 1, 1))
     for row, i in enumerate(moved):
         variants[row, :, i] += steps[i]
-    outputs = shoot(model, theta, shots, variants)
-    found = np.zeros((len(shots), base[0].size + len(steps), len(steps)))
+    outputs = simulate(model, theta, data, variants)
+    found = np.zeros((len(data), base[0].size + len(steps), len(steps)))
     for row, i in enumerate(moved):
-        found[:, :, i] = whitened(shots, (outputs[row] - base) / steps[i])
-    measured = shots.samples.measured
+        found[:, :, i] = whitened(data, (outputs[row] - base) / steps[i])
+    measured = data.samples.measured
     for i, channel in enumerate(channels):
         if channel.invariant:
             # The motion is the same from there, only that much further.
-            found[:, :, i] = whitened(shots, np.where(measured == i, 1.0, 0.0) + 0.0 * base)
-        found[:, base[0].size + i, i] = 1.0 / shots.doubt[i]
+            found[:, :, i] = whitened(data, np.where(measured == i, 1.0, 0.0) + 0.0 * base)
+        found[:, base[0].size + i, i] = 1.0 / data.doubt[i]
     return found
 
 
-def aim(
-    model: Model, theta: Array, shots: Shots, starts: Array, turns: int, tries: int = 5,
+def fit_starts(
+    model: Model, theta: Array, data: WindowData, starts: Array, turns: int, tries: int = 5,
     slope: Array | None = None,
-) -> Aimed:  # fmt: skip
+) -> StartFit:  # fmt: skip
     """Least squares for the start state of every window (Levenberg and Marquardt).
 
     Between two full derivatives, steps of Broyden's method go on with a corrected one: they cost
@@ -207,37 +207,37 @@ def aim(
         tries: Steps in a round.
         slope: Derivative by the start states from nearby, to start with.
     """
-    base = shoot(model, theta, shots, starts[None])[0]
-    now = residual(shots, starts, base)
-    damping = np.full(len(shots), 1e-3)
+    base = simulate(model, theta, data, starts[None])[0]
+    now = residual(data, starts, base)
+    damping = np.full(len(data), 1e-3)
     starts = starts.copy()
     if slope is None:
-        slope = by_start(model, theta, shots, starts, base)
+        slope = by_start(model, theta, data, starts, base)
     for _ in range(turns):
         local = slope
-        busy = np.ones(len(shots), bool)
+        busy = np.ones(len(data), bool)
         for _ in range(tries):
             rows = np.flatnonzero(busy)
             if not len(rows):
                 break
-            part = shots.take(rows)
+            part = data.take(rows)
             step = _step(local[rows], now[rows], damping[rows])
             there = starts[rows] + step
-            output = shoot(model, theta, part, there[None])[0]
+            output = simulate(model, theta, part, there[None])[0]
             trial = residual(part, there, output)
             old, new = (now[rows] ** 2).sum(1), (trial**2).sum(1)
             # Broyden's correction of the derivative along the step that was made.
             surprise = now[rows] - trial - (local[rows] @ step[..., None])[..., 0]
-            size = np.maximum((step**2 / shots.moves**2).sum(1), 1e-12)
+            size = np.maximum((step**2 / data.moves**2).sum(1), 1e-12)
             local = local.copy()
-            local[rows] += surprise[:, :, None] * (step / shots.moves**2 / size[:, None])[:, None]
+            local[rows] += surprise[:, :, None] * (step / data.moves**2 / size[:, None])[:, None]
             good = new < old
             damping[rows] = np.where(good, 0.3 * damping[rows], 10 * damping[rows])
             won = rows[good]
             starts[won], now[won], base[won] = there[good], trial[good], output[good]
             busy[rows] = ~good | (old - new > 0.02 * old + 0.1)
-        slope = by_start(model, theta, shots, starts, base)
-    return Aimed(starts, base, now, slope)
+        slope = by_start(model, theta, data, starts, base)
+    return StartFit(starts, base, now, slope)
 
 
 def _step(slope: Array, now: Array, damping: Array) -> Array:

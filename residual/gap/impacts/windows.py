@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from residual.gap import paths
 from residual.gap.impacts.noise import first_guess, with_noise
-from residual.gap.impacts.single_shooting import Shots
+from residual.gap.impacts.single_shooting import WindowData
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from residual.gap.windows import Windows
@@ -32,7 +32,9 @@ def pieces(samples: Samples, steps: int = STEPS) -> list[tuple[int, int, int]]:
     ]
 
 
-def lay_out(simulator: HostSimulator, samples: Samples, cut: list[tuple[int, int, int]]) -> Shots:
+def lay_out(
+    simulator: HostSimulator, samples: Samples, cut: list[tuple[int, int, int]]
+) -> WindowData:
     """Windows with a first guess of start states and noise.
 
     Raises:
@@ -52,12 +54,12 @@ def lay_out(simulator: HostSimulator, samples: Samples, cut: list[tuple[int, int
     names = [channel.name for channel in channels]
     step = float(np.median(samples.durations))
     sigma = first_guess(samples, nodes)
-    shots = Shots(samples, windows, sigma, nodes[windows.index[:, 0]], doubt, 1e-3 * scale)
-    shots = with_noise(shots, sigma, scale)
+    data = WindowData(samples, windows, sigma, nodes[windows.index[:, 0]], doubt, 1e-3 * scale)
+    data = with_noise(data, sigma, scale)
     for i, channel in enumerate(channels):
         if not measured[i] and channel.rate_of in names:
-            shots.moves[i] = 0.5 * 1e-3 * scale[names.index(str(channel.rate_of))] / step
-    return shots
+            data.moves[i] = 0.5 * 1e-3 * scale[names.index(str(channel.rate_of))] / step
+    return data
 
 
 def scales(simulator: HostSimulator) -> Array:
