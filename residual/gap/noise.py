@@ -115,6 +115,8 @@ def estimate(
         pad = np.zeros((count, f, f + q))
         pad[:, range(f), range(f)] = ridge
         basis, triangle = np.linalg.qr(np.concatenate([columns, pad], axis=1))
+        # A force that moves nothing measured has no direction of its own, and takes no freedom.
+        basis *= (np.abs(np.einsum("wii->wi", triangle)) > 1e-9)[:, None, :]
         basis_rows = basis[:, : residual.shape[1]]
         triangle = triangle + 1e-12 * np.eye(f + q)
         move = np.linalg.solve(triangle, basis_rows.transpose(0, 2, 1) @ residual[..., None])
