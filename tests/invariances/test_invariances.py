@@ -1,0 +1,55 @@
+"""The answer does not depend on what says nothing about the system.
+
+Kinds and names of the answer stay, and every number stays within its interval, when a log is told
+in another way. Each case is one log and one change; those that fail today are listed with what
+happens, and a case that begins to hold has to be taken from the list.
+"""
+
+import pytest
+from answers import after, first, log, moved, names
+from changes import CHANGES, halves, joined
+from logs import DATA, MAKERS, MEASURED
+from numpy.testing import assert_array_equal
+
+#: Logs that take a second or so are part of every run of the suite, and changes that find most.
+QUICK = {
+    "heater": ("cut", "time", "half", "idle input", "idle constant", "units", "horizon"),
+    "airtrack": ("cut", "copy"),
+    "phone-drop": ("order", "idle constant", "horizon"),
+    "pendulum-pair": ("half",),
+    "heavier pendulum": ("order", "half"),
+}
+#: What fails today, and how.
+FAILS: dict[tuple[str, str], str] = {}
+
+
+def cases():
+    for name in MAKERS:
+        for change in (*CHANGES, "units", "horizon"):
+            marks = []
+            if change not in QUICK.get(name, ()):
+                marks.append(pytest.mark.long)
+            if name in MEASURED and not DATA.is_dir():
+                marks.append(pytest.mark.skip(reason="no data: set SIMGAP_DATA"))
+            if (name, change) in FAILS:
+                marks.append(pytest.mark.xfail(strict=True, reason=FAILS[name, change]))
+            yield pytest.param(name, change, marks=marks, id=f"{name}-{change}")
+
+
+@pytest.mark.parametrize(("name", "change"), cases())
+def test_the_answer_stays(name, change, tmp_path):
+    before, now = first(name), after(name, change, tmp_path)
+    assert names(now) == names(before)
+    assert moved(before, now) == []
+
+
+@pytest.mark.parametrize("name", ["heavier pendulum", "airtrack"])
+def test_what_was_cut_is_joined_again_without_a_trace(name):
+    """So that a log that came in parts is the log that did not: joining undoes cutting."""
+    if name in MEASURED and not DATA.is_dir():
+        pytest.skip("no data: set SIMGAP_DATA")
+    for run in log(name).runs:
+        again = joined(halves(run))
+        assert_array_equal(again.times, run.times)
+        assert_array_equal(again.states, run.states)
+        assert_array_equal(again.actions, run.actions)

@@ -1,0 +1,70 @@
+"""How far forecasts go if the user does not say."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from residual.gap.horizon import SAMPLES, WINDOWS, usual_horizon
+from residual.gap.smooth import LEAD
+from residual.trajectories import Trajectory
+from sims.leo import Leo
+from sims.pendulum_equation import PendulumEquation
+
+
+def swing(period, seconds=60.0, step=0.02, size=0.4, noise=0.0, name="run"):
+    times = np.arange(0, seconds, step)
+    angle = np.pi + size * np.sin(2 * np.pi * times / period)
+    angle = angle + noise * np.random.default_rng(0).standard_normal(len(times))
+    states = np.stack([angle, np.full(len(times), np.nan)], axis=1)
+    return Trajectory(name, times, states, np.sin(times)[:-1, None])
+
+
+@given(st.floats(0.8, 10))
+@settings(max_examples=20, deadline=None)
+def test_a_third_of_the_period(period):
+    found = usual_horizon(PendulumEquation(), [swing(period, 8 * period)])
+    assert found == pytest.approx(period / 3, rel=0.1)
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="speeds are differences over a sixtieth of the record, which a long record makes longer "
+    "than the period: 5.6 s for a swing of 1 s logged for 60 s, and 19.9 s for 1000 s",
+)
+@pytest.mark.parametrize("seconds", [60.0, 200.0, 1000.0])
+def test_a_long_record_has_the_horizon_of_a_short_one(seconds):
+    found = usual_horizon(PendulumEquation(), [swing(1.0, seconds)])
+    assert found == pytest.approx(1 / 3, rel=0.2)
+
+
+def test_noise_does_not_pass_for_speed():
+    clean, noisy = (usual_horizon(PendulumEquation(), [swing(3.0, noise=n)]) for n in (0, 0.01))
+    assert noisy == pytest.approx(clean, rel=0.1)
+
+
+def test_how_often_and_in_which_order_it_was_recorded_does_not_matter():
+    runs = [swing(2.0), swing(3.0, 40.0, name="other")]
+    wanted = usual_horizon(PendulumEquation(), runs)
+    assert usual_horizon(PendulumEquation(), runs[::-1]) == pytest.approx(wanted)
+    assert usual_horizon(PendulumEquation(), runs + runs) == pytest.approx(wanted)
+    late = [Trajectory(r.name, r.times + 500, r.states, r.actions) for r in runs]
+    assert usual_horizon(PendulumEquation(), late) == pytest.approx(wanted)
+    rare = [Trajectory(r.name, r.times[::2], r.states[::2], r.actions[1::2]) for r in runs]
+    assert usual_horizon(PendulumEquation(), rare) == pytest.approx(wanted, rel=0.05)
+
+
+def test_short_records_leave_room_for_windows():
+    found = usual_horizon(PendulumEquation(), [swing(20.0, 10.0)])
+    assert found == pytest.approx((1 - LEAD) * 10.0 / WINDOWS, rel=0.01)
+
+
+def test_a_window_has_samples_enough():
+    found = usual_horizon(PendulumEquation(), [swing(2.0, 20.0, step=0.4)])
+    assert found >= (1 - LEAD) * SAMPLES * 0.4 * (1 - 1e-9)
+
+
+def test_what_strikes_the_ground_is_foretold_over_ten_steps():
+    states = np.zeros((50, 18))
+    run = Trajectory("walk", 0.03 * np.arange(50), states, np.zeros((49, 6)))
+    assert usual_horizon(Leo(), [run]) == pytest.approx(10 * Leo().dt)

@@ -1,0 +1,49 @@
+"""Numbers that switch a system off are refused, whatever error they take away."""
+
+import numpy as np
+import pytest
+
+from residual.gap.candidates import candidates
+from residual.gap.model import Model
+from residual.gap.plausible import absurd
+from residual.gap.samples import Samples
+from residual.trajectories import Trajectory
+from sims.effects import ActuatorGain, DeadZone, ParameterChange, Saturation, ViscousFriction
+from sims.pendulum_equation import PendulumEquation
+
+
+def said(effect, **values):
+    rng = np.random.default_rng(0)
+    volts = np.repeat(rng.uniform(-2, 2, (40, 1)), 5, axis=0)
+    states = np.array([np.pi, 0.0]) + rng.standard_normal((201, 2))
+    samples = Samples.join([Trajectory("run", 0.05 * np.arange(201.0), states, volts)], 4)
+    model = Model(PendulumEquation(), candidates(PendulumEquation(), [effect], samples))
+    return absurd(model, np.array([values[knob.field] for knob in model.knobs]), samples)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "words"),
+    [
+        (ActuatorGain("voltage"), {"gain": -0.99}, "voltage would have 0.01 of its strength"),
+        (ActuatorGain("voltage"), {"gain": 30.0}, "voltage would have 31 of its strength"),
+        (DeadZone("voltage"), {"width": 1.95}, "of its strength"),
+        (Saturation("voltage"), {"level": 0.05}, "of its strength"),
+        (ParameterChange("mass"), {"change": 0.6}, "mass would be 11.9 times its nominal value"),
+        (ParameterChange("inertia"), {"change": -1.8e-4}, "inertia would be 0.0576 times"),
+    ],
+)
+def test_what_switches_the_system_off_is_refused(effect, values, words):
+    assert words in said(effect, **values)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        (ActuatorGain("voltage"), {"gain": -0.7}),
+        (DeadZone("voltage"), {"width": 0.8}),
+        (ParameterChange("mass"), {"change": 0.1}),
+        (ViscousFriction("pivot"), {"coefficient": 1.0}),
+    ],
+)
+def test_what_may_be_is_left_to_the_data(effect, values):
+    assert said(effect, **values) == ""
