@@ -15,6 +15,7 @@ import yaml
 
 from sims.effects.base import Effect
 from sims.effects.library import library
+from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
 from sims.simulator import Hold, Simulator
 
@@ -145,6 +146,8 @@ def chosen_effects(
         else:
             name, _, where = entry.partition("@")
             own = [e for e in known.values() if entry in (e.name, str(e))]
+            if not own and entry in simulator.parameters:
+                own = [ParameterChange(entry)]
             if not own and "." in name:
                 own = _placed(simulator, name, where)
         if not own:

@@ -56,7 +56,7 @@ class GapStudy:
             happens before an input said to be "linear" (dead zone, lag) is no candidate.
         horizon: Forecast length in s that matters to you; by default a quarter of the usual
             period of the motion.
-        minutes: Time budget; what has not been tried by then is left out.
+        minutes: Budget of processor time; what has not been tried by then is left out.
     """
 
     simulator: Simulator

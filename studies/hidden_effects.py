@@ -32,6 +32,7 @@ import threadpoolctl
 from jsonargparse.typing import PositiveInt
 
 from residual.gap import find_gap
+from simgap_files import atomic_write_json, read_json
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
@@ -45,7 +46,6 @@ from studies.hidden.rivals import one_step, regression, sparse
 from studies.hidden.scores import replaceable, score, score_names
 from studies.hidden.strengths import draw, truth
 from studies.running.command import HelpFormatter, Parser, fail
-from studies.running.files import atomic_write_json, read_json
 from studies.running.progress import Progress
 from studies.running.trials import Execution, read_trials, run_trials, trial_folder
 

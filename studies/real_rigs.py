@@ -19,11 +19,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from simgap_files import atomic_write_json, atomic_write_text
 from studies.real.judge import Judged, ask
 from studies.real.rigs import RIGS
 from studies.reporting.markdown import markdown
 from studies.running.command import HelpFormatter, Parser, fail
-from studies.running.files import atomic_write_json, atomic_write_text
 
 #: What a corrected simulator's error may be, in errors of the repair by hand, and processor
 #: time in s.

@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         module = importlib.import_module(f"studies.{study_of(folder)}")
         # Other studies than those of a gap have a function of their own.
         if hasattr(module, "STUDY"):
-            command.rebuild(module.STUDY, folder)
+            command.rebuild(folder)
         else:
             module.rebuild(folder)
     except (OSError, ValueError) as error:

@@ -14,9 +14,11 @@ Array = NDArray[np.float64]
 def run(search: Search, seeds: Proposals | None = None) -> Key:
     """Grow sets until one more effect no longer pays; returns the one that forecasts best."""
     effort = search.effort
-    search.add(seeds or {})
     frontier: list[Key] = [()]
     reached = 1.0
+    if seeds:
+        frontier = _best(search, search.add(seeds)) or frontier
+        reached = search.error(frontier[0])
     for level in range(1, effort.most + 1):
         fresh: list[Key] = []
         for key in frontier:
@@ -24,14 +26,19 @@ def run(search: Search, seeds: Proposals | None = None) -> Key:
             fresh += grown + together(search, key, grown)
         if not fresh or search.late:
             break
-        by_merit = sorted(fresh, key=lambda k: search.tried[k].merit)[: effort.beam]
-        by_error = sorted(fresh, key=search.error)[:1]
-        frontier = list(dict.fromkeys([*by_error, *by_merit]))
-        now = search.error(by_error[0])
-        if level > 1 and not _pays(search, by_error[0], reached):
+        frontier = _best(search, fresh)
+        now = search.error(frontier[0])
+        if (level > 1 or seeds) and not _pays(search, frontier[0], reached):
             break
         reached = min(reached, now)
     return search.best()
+
+
+def _best(search: Search, keys: list[Key]) -> list[Key]:
+    """The set that forecasts best, and those that fit best."""
+    sound = [key for key in keys if search.sound(key)]
+    by_merit = sorted(sound, key=lambda k: search.tried[k].merit)[: search.effort.beam]
+    return list(dict.fromkeys([*sorted(sound, key=search.error)[:1], *by_merit]))
 
 
 def _pays(search: Search, key: Key, reached: float) -> bool:

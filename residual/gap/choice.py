@@ -11,6 +11,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
+import numpy as np
+
 from residual.gap.search import Key, Search
 
 #: Part of the remaining error that an effect must take off: over all joints, or at one of several.
@@ -83,10 +85,15 @@ def _smaller(search: Search, key: Key, among: list[Key]) -> list[Key]:
 
 
 def as_good(search: Search, key: Key, best: Key) -> bool:
-    """Whether a set forecasts as well as the best: within a standard error, or next to it."""
-    squares = search.validated
-    more, error = search.currency.difference(squares[key].squares, squares[best].squares)
-    return more <= max(error, min(SAME, ALIKE * search.error(best)))
+    """Whether a set forecasts as well as the best at every joint: within chance, or next to it."""
+    currency = search.currency
+    own, its = (search.validated[k].squares for k in (key, best))
+    behind = currency.by_group(own) - currency.by_group(its)
+    slack = np.minimum(SAME, ALIKE * currency.by_group(its))
+    return all(
+        behind[group] <= slack[group] or currency.clearly(own, its, group) <= 1.0
+        for group in range(len(behind))
+    )
 
 
 def material(search: Search, smaller: Key, larger: Key) -> bool:

@@ -26,7 +26,7 @@ ROUNDS = 3
 #: Change of a weight that is worth another search.
 WORTH = 1.3
 #: Effects tried in place of each chosen one, and rounds of that.
-RIVALS, EXCHANGES = 5, 3
+RIVALS, EXCHANGES = 10, 3
 #: Sets that a new search begins with.
 SEEDS = 12
 
@@ -87,7 +87,7 @@ def explain(
         weigh: Weighs the channels anew.
         effort: How hard to search.
         tell: Progress.
-        until: When to stop searching, on the clock of ``time.perf_counter``.
+        until: When to stop searching, on the clock of ``time.process_time``.
     """
     seeds: Proposals = {}
     key: Key = ()
@@ -131,7 +131,7 @@ def settle(search: Search, floor: Noise, key: Key) -> Explanation:
             choice = choose(search, enough)
             key = choice.key
         before = len(search.tried)
-        search.add_exchanged(key, RIVALS)
+        search.add_exchanged(key, max(2, RIVALS // max(len(key), 1)))
         if len(search.tried) == before or search.late:
             break
         if not quiet and choose(search, enough).key == key:

@@ -64,7 +64,8 @@ def find_gap(
             happens before that (dead zone, saturation, lag) is then no candidate.
         horizon: Forecast length in seconds; by default a third of the usual period of the motion,
             see ``residual.gap.horizon``.
-        minutes: Time budget; the search for rival explanations ends in time.
+        minutes: Budget of processor time, so that a busy machine finds the same: the search for
+            further explanations ends in time.
         n_jobs: Processes for a simulator that steps row by row.
         progress: Called with a line of text now and then.
 
@@ -78,7 +79,7 @@ def find_gap(
     """
     clock = Clock()
     tell = progress or (lambda _: None)
-    until = time.perf_counter() + 60 * minutes * SEARCHING
+    until = time.process_time() + 60 * minutes * SEARCHING
     offered = tuple(library(simulator) if effects is None else effects)
     if measured_input:
         offered = tuple(e for e in offered if not e.upstream_of_sensor)

@@ -11,6 +11,7 @@ from residual.gap.model import Model
 from residual.gap.samples import Samples
 from residual.gap.slopes import Slope, defects, misfit, observe, slopes
 from residual.gap.windows import Windows, carry, fixed
+from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
@@ -150,6 +151,30 @@ def _spread(
     variance = np.where(valid, square, 0.0)[settled].sum(axis=(0, 1)) / np.maximum(freedom, 1e-9)
     fresh = sigma * np.sqrt(np.maximum(variance, 1e-12))
     return fresh, fresh / np.sqrt(2 * np.maximum(freedom, 1.0))
+
+
+def with_walks(simulator: HostSimulator, samples: Samples, sigma: Array, seconds: float) -> Array:
+    """Noise of every measured channel, with what summing another one up adds within a window.
+
+    The error of a sum over noisy samples is a random walk: over t seconds its standard deviation is
+    sigma sqrt(dt t), with the noise sigma and the sampling time dt of what was summed up.
+
+    Args:
+        simulator: Its channels say of what they are the integral.
+        samples: The table.
+        sigma: Noise from sample to sample, (m,).
+        seconds: Length of a window.
+    """
+    channels = simulator.physical_channels
+    names = [channels[c].name for c in samples.measured]
+    found = np.array(sigma)
+    step = samples.step / samples.stride
+    for place, column in enumerate(samples.measured):
+        source = channels[column].integrates
+        if source in names:
+            walk = sigma[names.index(source)] * np.sqrt(step * seconds)
+            found[place] = np.hypot(sigma[place], walk)
+    return found
 
 
 def local_noise(samples: Samples, length: int = 9) -> Array:

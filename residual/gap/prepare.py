@@ -31,6 +31,8 @@ ROBUST = 4.0
 FINEST = 1e-5
 #: Windows that are fitted: where all rows advance at once, and row by row.
 AT_ONCE, BY_ROW = 120, 40
+#: States in all windows of a row together: every state costs a simulation more.
+STATES = 400
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,7 +76,7 @@ def prepare(
         around = floor
         if len(fit.theta):
             # Noise suffers from a large gap, so it is estimated around the better model.
-            better = _noise_around(fit, fitter, floor)
+            better = _noise_around(fit, fitter, floor, horizon / (1 - LEAD))
             around = better if (better.sigma < floor.sigma).all() else floor
         again = weighted(now, fit, around.sigma)
         few = enough_substeps(simulator, now.samples, now.nodes, again.sigma, finest)
@@ -84,14 +86,19 @@ def prepare(
     return Prepared(fitter, floor, weigh, effort, horizon)
 
 
-def _noise_around(fit: Fit, fitter: SmoothFitter, floor: noise.Floor) -> noise.Floor:
+def _noise_around(
+    fit: Fit, fitter: SmoothFitter, floor: noise.Floor, seconds: float
+) -> noise.Floor:
     corrected = Model(fit.model.bind(fit.theta))
     samples, none = fitter.samples, np.zeros(0)
     nodes = paths.measured(corrected, samples, none)
     scale = corrected.scales(fitter.scale)
     found = noise.estimate(corrected, samples, nodes, none, floor.sigma, scale)
     least = FINEST * fitter.scale[samples.measured]
-    return dataclasses.replace(found, sigma=np.maximum(found.sigma, least))
+    sigma = np.maximum(found.sigma, least)
+    return dataclasses.replace(
+        found, sigma=noise.with_walks(fit.model.simulator, samples, sigma, seconds)
+    )
 
 
 def smooth_fitter(
@@ -108,11 +115,12 @@ def smooth_fitter(
     scale = paths.variation(samples, nodes)
     floor = noise.estimate(model, samples, nodes, np.zeros(0), noise.local_noise(samples), scale)
     least = FINEST * scale[samples.measured]
-    floor = dataclasses.replace(floor, sigma=np.maximum(floor.sigma, least))
     seconds = horizon / (1 - LEAD)
+    sigma = noise.with_walks(simulator, samples, np.maximum(floor.sigma, least), seconds)
+    floor = dataclasses.replace(floor, sigma=sigma)
     windows = cut(samples, floor.slope.by_state, _foreseen(simulator, samples, scale), seconds)
     moving = np.array(noise.driven_states(model))
-    most = AT_ONCE if simulator.advances_rows_at_once else BY_ROW
+    most = min(AT_ONCE, STATES // len(scale)) if simulator.advances_rows_at_once else BY_ROW
     grouped = blocks(samples, windows, drive(samples, nodes, moving), most)
     start = SmoothFitter(samples, grouped, nodes, floor.slope.by_state, floor.sigma, scale)
     nominal = start.fit(model, np.zeros(0))

@@ -32,6 +32,10 @@ Proposals = dict[Key, Array]
 SAME_MOTION = 0.995
 
 
+#: Part of the best gain by the linear screen below which no rival is worth a fit.
+HOPELESS = 0.5
+
+
 @dataclasses.dataclass(frozen=True)
 class Effort:
     """How hard to search.
@@ -127,7 +131,7 @@ class Search:
     @property
     def late(self) -> bool:
         """Whether the time for searching is over."""
-        return time.perf_counter() > self.until
+        return time.process_time() > self.until
 
     def signatures(self, key: Key) -> Signatures:
         """What every candidate would add to a fitted set."""
@@ -224,10 +228,12 @@ class Search:
                 continue
             around, family = self.signatures(rest), self.family(gone)
             taken: list[int] = []
-            for gain in gains(around):
+            ranked = gains(around)
+            for gain in ranked:
                 number = around.variants[gain.variants[0]].candidate
                 near = len(taken) < most or (family and self.family(number) == family)
-                if number in key or number in taken or gain.value <= 0 or not near:
+                hopeless = gain.value < HOPELESS * ranked[0].value
+                if number in key or number in taken or hopeless or not near:
                     continue
                 taken.append(number)
                 fresh, theta = self.merged(rest, [(number, gain.values[0])])

@@ -24,6 +24,9 @@ except ImportError as missing:  # pragma: no cover - depends on what is installe
 HARD_FRICTION = (0.99, 0.999, 0.001)
 DEFAULT_FRICTION = (0.9, 0.95, 0.001)
 
+#: ``interp`` of an actuator's delay.
+LINEAR = 1
+
 INTEGRATORS = {
     "Euler": mujoco.mjtIntegrator.mjINT_EULER,
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -115,41 +118,74 @@ def _read(path: Path) -> Any:
         raise ValueError(f"{path}: {_one_line(error)}") from None
 
 
-def compiled(source: Source) -> Any:
-    """The ``mujoco.MjModel`` that is stepped.
+def compiled(source: Source) -> tuple[Any, dict[int, float]]:
+    """The ``mujoco.MjModel`` that is stepped, and the delays in s that actuators have in the file.
 
-    It differs from the file in four ways that leave the motion alone: a diverged state is not
-    reset, controls are not clamped (the simulator has clipped them to the same range, and effects
-    come after that), friction that is not there yet would be hard, and no body takes the short
-    cut that forbids its centre of mass to move.
+    It differs from the file in ways that leave the motion alone: a diverged state is not reset,
+    controls are not clamped (the simulator has clipped them to the same range, and effects come
+    after that), friction that is not there yet would be hard, and no body takes the short cut that
+    forbids its centre of mass to move. Delays are left to the simulator, which hosts them as
+    effects: MuJoCo would keep the commands on their way in a state that no row carries.
 
     Raises:
         ValueError: The file cannot be compiled, or has hidden state that no row carries.
     """
-    model = plain(source, simple=False)
+    spec = specification(source)
+    for body in spec.bodies:
+        body.simple = False
+    late = _without_delays(spec, source.path)
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise ValueError(f"{source.path}: {_one_line(error)}") from None
     _refuse_hidden_state(model, source.path)
     flags = mujoco.mjtDisableBit
     model.opt.disableflags |= int(flags.mjDSBL_AUTORESET) | int(flags.mjDSBL_CLAMPCTRL)
     soft = np.isclose(model.dof_solimp[:, :3], DEFAULT_FRICTION).all(axis=1)
     model.dof_solimp[soft & (model.dof_frictionloss == 0), :3] = HARD_FRICTION
-    return model
+    return model, late
 
 
-def plain(source: Source, simple: bool = True) -> Any:
-    """The model as MuJoCo compiles it.
+def _without_delays(spec: Any, path: Path) -> dict[int, float]:
+    """Takes the delays out of a specification; by index of the actuator, in s."""
+    step = float(spec.option.timestep)
+    # RK4 reads the record of commands inside a step too, half a step early on average.
+    early = 0.5 * step if spec.option.integrator == INTEGRATORS["RK4"] else 0.0
+    found = {}
+    for index, actuator in enumerate(spec.actuators):
+        delay, samples = float(actuator.delay), int(actuator.nsample)
+        actuator.delay, actuator.nsample = 0.0, 0
+        if not samples or not delay:
+            continue
+        steps = delay / step
+        if actuator.interp != LINEAR and abs(steps - round(steps)) > 1e-6:
+            raise ValueError(
+                f"{path}: actuator {actuator.name!r} has a delay of {delay:g} s, no multiple of "
+                'the time step; write it with interp="linear"'
+            )
+        found[index] = max(delay - early, 0.0)
+    for sensor in spec.sensors:  # what sensors show is not looked at
+        sensor.delay, sensor.nsample = 0.0, 0
+    return found
 
-    Args:
-        source: The file.
-        simple: Whether bodies may be compiled as "simple", which is a little faster.
+
+def control_period(model: Any, dt: float | None, path: Path) -> tuple[int, float]:
+    """Time steps in a control period, and its length in s.
+
+    Raises:
+        ValueError: ``dt`` is no multiple of the time step.
     """
-    spec = specification(source)
-    if not simple:
-        for body in spec.bodies:
-            body.simple = False
-    try:
-        return spec.compile()
-    except ValueError as error:
-        raise ValueError(f"{source.path}: {_one_line(error)}") from None
+    step = float(model.opt.timestep)
+    if dt is None:
+        count = max(1, round(0.01 / step))
+        return count, count * step
+    count = round(dt / step)
+    if count < 1 or abs(count * step - dt) > 1e-6 * dt:
+        raise ValueError(
+            f"{path}: the control period {dt:g} s is no multiple of the model's time step "
+            f"{step:g} s; give dt as a multiple, or a timestep that divides it"
+        )
+    return count, float(dt)
 
 
 def _add_motors(spec: Any, motors: Sequence[str], path: Path) -> None:
@@ -174,7 +210,7 @@ def _refuse_hidden_state(model: Any, path: Path) -> None:
     hidden = {
         "sleep (option flag sleep)": model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP),
         "engine plugins": model.nplugin,
-        "actuators or sensors with a delay (nsample)": model.nhistory,
+        "a history of its own": model.nhistory,
         "flexible bodies (flex)": model.nflex,
         "mocap bodies": model.nmocap,
     }

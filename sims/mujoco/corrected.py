@@ -191,7 +191,12 @@ class _Writer:
         circuits = [Circuit(model, a, fields) for a in range(len(model.actuator_trntype))]
         for column, drive in enumerate(elements.drives(model)):
             name = simulator.action_channels[column].name
-            for effect in sorted(simulator.actuator_effects(name), key=lambda e: e.stage):
+            effects = simulator.actuator_effects(name)
+            late = [effect for effect in effects if isinstance(effect, Delay)]
+            if late:  # that of the file and the one that was found
+                whole = Delay(name, sum(float(effect.time) for effect in late))
+                effects = [*(e for e in effects if not isinstance(e, Delay)), whole]
+            for effect in sorted(effects, key=lambda e: e.stage):
                 self._cannot(effect, self._put(circuits[drive.actuator], effect))
         for load in simulator.joint_effects():
             if type(load) is ConstantLoad:

@@ -23,7 +23,7 @@ from sims.effects.sensor import SensorOffset
 from sims.host import HostSimulator
 from sims.mujoco import elements
 from sims.mujoco.attributes import Attribute, attributes, row_fields
-from sims.mujoco.compiled import INTEGRATORS, Source, compiled
+from sims.mujoco.compiled import INTEGRATORS, Source, compiled, control_period
 from sims.mujoco.contacts import touching_geoms
 from sims.mujoco.corrected import corrected_files
 from sims.mujoco.effects import AttributeChange
@@ -75,9 +75,9 @@ class MujocoSimulator(HostSimulator):
     ) -> None:
         path = Path(model).expanduser()
         self.source = Source(path, timestep, integrator, None if motors is None else tuple(motors))
-        self.model = compiled(self.source)
+        self.model, late = compiled(self.source)
         self.name = path.stem
-        self.substeps, self.dt = _period(self.model, dt, path)
+        self.substeps, self.dt = control_period(self.model, dt, path)
         self.attributes: dict[str, Attribute] = attributes(self.model)
         self.parameters = {name: known.parameter for name, known in self.attributes.items()}
         self.joints = elements.joints(self.model)
@@ -95,8 +95,14 @@ class MujocoSimulator(HostSimulator):
         }
         self.effects = ()
         self._forget_what_shows_nowhere()
-        if effects:
-            hosted = self.with_effects(effects)
+        self._added = tuple(effects)
+        delays = [
+            Delay(drive.name, late[drive.actuator])
+            for drive in elements.drives(self.model)
+            if late.get(drive.actuator)
+        ]
+        if effects or delays:
+            hosted = self.with_effects([*delays, *effects])
             self.effects, self.state_channels = hosted.effects, hosted.state_channels
 
     def offered_effects(self) -> tuple[Effect, ...]:
@@ -212,7 +218,7 @@ class MujocoSimulator(HostSimulator):
                     step,
                     "RK4",
                     None if settings.motors is None else list(settings.motors),
-                    self.effects,
+                    self._added,
                 ),
             )
 
@@ -280,17 +286,3 @@ class MujocoSimulator(HostSimulator):
             else:
                 wide = np.pi if kind == elements.HINGE else 1.0
                 data.qpos[at] += reach * wide * rng.uniform(-1, 1)
-
-
-def _period(model: Any, dt: float | None, path: Path) -> tuple[int, float]:
-    step = float(model.opt.timestep)
-    if dt is None:
-        count = max(1, round(0.01 / step))
-        return count, count * step
-    count = round(dt / step)
-    if count < 1 or abs(count * step - dt) > 1e-6 * dt:
-        raise ValueError(
-            f"{path}: the control period {dt:g} s is no multiple of the model's time step "
-            f"{step:g} s; give dt as a multiple, or a timestep that divides it"
-        )
-    return count, float(dt)

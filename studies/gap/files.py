@@ -16,11 +16,11 @@ import yaml
 
 from residual.gap import GapResult
 from residual.logs import Finding
+from simgap_files import atomic_write_json, atomic_write_text
 from sims.loading import corrected_settings
 from studies.gap.answer import lead
 from studies.gap.report import write_report
 from studies.running.command import versions
-from studies.running.files import atomic_write_json, atomic_write_text
 
 JSON, CORRECTED, REPORT = "gap.json", "corrected.yaml", "report.html"
 

@@ -22,7 +22,7 @@ class Heartbeat:
     """Tells what is being done, with the time since the start and what is left of a budget.
 
     Args:
-        budget: Seconds.
+        budget: Seconds of processor time, as the search counts them.
         write: Takes a line.
         quiet: Seconds without a line after which the last one is repeated.
     """
@@ -32,12 +32,14 @@ class Heartbeat:
     ) -> None:
         self._budget, self._write, self._quiet = budget, write, quiet
         self._begin = self._spoke = time.perf_counter()
+        self._used = time.process_time()
         self._text = ""
         self._lock, self._over = threading.Lock(), threading.Event()
         self._thread = threading.Thread(target=self._beat, daemon=True)
 
     def __enter__(self) -> Self:
         self._begin = self._spoke = time.perf_counter()
+        self._used = time.process_time()
         self._thread.start()
         return self
 
@@ -59,7 +61,7 @@ class Heartbeat:
     def _say(self, text: str) -> None:
         self._spoke = time.perf_counter()
         spent = self._spoke - self._begin
-        left = max(self._budget - spent, 0.0)
+        left = max(self._budget - (time.process_time() - self._used), 0.0)
         self._write(f"{spent:6.1f} s, {left:.0f} s left  {text}")
 
     def _beat(self) -> None:

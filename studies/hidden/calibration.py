@@ -28,11 +28,11 @@ from residual.gap.prepare import prepare
 from residual.gap.screening import gains
 from residual.gap.search import Search
 from residual.gap.smooth import SmoothFitter
+from simgap_files import atomic_write_text
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
 from studies.running.command import HelpFormatter, Parser
-from studies.running.files import atomic_write_text
 from studies.running.progress import Progress
 from studies.running.trials import Execution, run_trials, trial_folder
 

@@ -12,12 +12,12 @@ import yaml
 from matplotlib.figure import Figure as Drawing
 from scipy.stats import beta
 
+from simgap_files import atomic_write_text
 from studies.hidden.strengths import HIDDEN
 from studies.reporting.figures import new_figure, save_figure, styled
 from studies.reporting.page import Report
 from studies.reporting.sections import Code, Figure, Prose, Section, Table
 from studies.running.command import versions
-from studies.running.files import atomic_write_text
 
 #: Residual over noise on held-out windows at which a gap counts as closed.
 CLOSED = 1.1

@@ -26,6 +26,8 @@ from studies.running.progress import Bars, Progress, Several
 from studies.running.trials import Execution, Failures, read_trials, run_trials, trial_folder
 from studies.running.workers import WorkersError
 
+BEST = "best.json"
+
 
 def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
     """The command of a study: one trial, or the grid of a config file."""
@@ -109,17 +111,20 @@ def run_grid(
         run_trials(study.name, trials, work, execution, made_by)
     except WorkersError as error:
         fail(str(error))
-    failures = report_grid(study, output)
+    # For later reports, which load nothing that a file names.
+    if best := study.system(instantiate(study, configs[0])).best:
+        atomic_write_json(output / BEST, {"return": best()})
+    failures = report_grid(output)
     if failures:
         raise SystemExit(1)
 
 
-def report_grid(study: Study, folder: Path) -> Failures:
+def report_grid(folder: Path) -> Failures:
     """Tables and report of a grid from the trials in its folder; returns the failed ones."""
     results, failures = read_trials(folder)
     if results:
-        best = study.system(instantiate(study, results[0]["config"])).best
-        print(f"\n{write_grid_report(results, failures, folder, best() if best else None)}")
+        best = read_json(folder / BEST)["return"] if (folder / BEST).exists() else None
+        print(f"\n{write_grid_report(results, failures, folder, best)}")
         print(f"\nreport: {folder / 'report.html'}")
     for path, failure in failures.items():
         reason = failure.strip().splitlines()[-1]
@@ -127,20 +132,24 @@ def report_grid(study: Study, folder: Path) -> Failures:
     return failures
 
 
-def rebuild(study: Study, folder: Path) -> None:
+def rebuild(folder: Path) -> None:
     """Tables, figures and report of a finished or unfinished run, without computing trials.
 
     Raises:
         FileNotFoundError: Nothing in the folder is finished.
+        ValueError: An earlier version wrote it.
     """
     path = folder / "results.json"
     results = read_json(path) if path.exists() else {}
+    if "policies" not in results and not read_trials(folder)[0]:
+        raise FileNotFoundError(f"{folder}: no trial in it is finished")
+    first = results if "policies" in results else read_trials(folder)[0][0]
+    if "about" not in first:
+        raise ValueError(f"{folder} is of an earlier version: give its command again")
     if "policies" in results:
         report_single(results, folder)
-    elif not read_trials(folder)[0]:
-        raise FileNotFoundError(f"{folder}: no trial in it is finished")
     else:
-        report_grid(study, folder)
+        report_grid(folder)
 
 
 def grid_trial(

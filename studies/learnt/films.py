@@ -21,7 +21,9 @@ _SHOWN = ("idealised", "corrected", "true")
 
 def write_films(results: Mapping[str, Any], folder: Path, simulator: Simulator) -> list[Path]:
     """``films/<policy>.gif`` of the policies that a report shows; none without a renderer."""
-    if not hasattr(simulator, "renderer"):
+    try:
+        renderer_for(simulator)
+    except ValueError:  # it does not say how it looks, or this machine cannot draw it
         return []
     episodes = read_episodes(results, folder)
     last = [name for name in episodes if name.startswith("difference")][-1:]

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import jsonargparse
+import yaml
 
 from sims.loading import model_settings
 
@@ -51,6 +52,19 @@ class Parser(jsonargparse.ArgumentParser):
         if isinstance(value, str) and (settings := model_settings(value)):
             cfg_obj = {**cfg_obj, "simulator": settings}
         return super().parse_object(cfg_obj, *rest, **options)
+
+    def parse_string(self, content: str, path: Any = "", *rest: Any, **options: Any) -> Any:
+        """As usual; a robot's model file, also one beside the config, may be the simulator."""
+        try:
+            given = yaml.safe_load(content)
+        except yaml.YAMLError:
+            given = None  # whoever reads it next says what is wrong
+        value = given.get("simulator") if isinstance(given, dict) else None
+        if isinstance(value, str):
+            beside = Path(str(path)).parent / value
+            if settings := model_settings(beside if path and beside.is_file() else value):
+                content = yaml.safe_dump({**given, "simulator": settings})
+        return super().parse_string(content, path, *rest, **options)
 
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
         """Say what is wrong and how to learn more, in one line."""

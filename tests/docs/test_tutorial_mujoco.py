@@ -37,7 +37,7 @@ def worked(tmp_path_factory):
     for code in (*blocks("python"), *blocks("yaml")):
         (folder / code.splitlines()[0].removeprefix("# ")).write_text(code)
     run(["measure.py"], folder)
-    (command,) = blocks("bash")
+    command, _ = blocks("bash")
     told = run(command.split()[1:], folder)
     return folder, json.loads((folder / "gap" / "gap.json").read_text()), told
 
@@ -66,3 +66,13 @@ def test_the_policy_holds_the_robot(worked):
     told = run(["train.py"], folder)
     angle = float(re.search(r"holds ([\d.-]+) rad", told)[1])
     assert angle == pytest.approx(1.0, abs=0.15)
+
+
+def test_the_loop_runs_on_it(worked):
+    folder, _, _ = worked
+    _, command = blocks("bash")
+    less = ["--budget.idealised_steps", "1100", "--budget.difference_steps", "400"]
+    small = ["--ddpg.hidden", "[32, 32]", "--ddpg.warm_up", "300"]
+    run([*command.split()[1:], *less, *small], folder)
+    found = json.loads((folder / "learnt" / "results.json").read_text())
+    assert [policy["name"] for policy in found["policies"]] == ["idealised", "difference"]

@@ -1,6 +1,7 @@
 """A report is rebuilt from what trials left, and nothing is computed."""
 
 import json
+import shutil
 from types import SimpleNamespace
 
 import pandas as pd
@@ -40,7 +41,7 @@ def test_tables_come_back_from_the_trials_alone(finished, monkeypatch):
     for name in tables:
         (finished / name).unlink()
     monkeypatch.setattr("studies.learning.trial.run_loop", None)
-    rebuild(quick_gap.STUDY, finished)
+    rebuild(finished)
     assert {name: (finished / name).read_bytes() for name in tables} == before
 
 
@@ -53,7 +54,7 @@ def test_an_unfinished_study_shows_what_is_finished(finished, tmp_path, capsys):
     kept = (finished / first / "results.json").read_text()
     (tmp_path / first / "results.json").write_text(kept)
     (tmp_path / second / "error.txt").write_text("Traceback\nRuntimeError: deliberate\n")
-    rebuild(quick_gap.STUDY, tmp_path)
+    rebuild(tmp_path)
     assert len(pd.read_csv(tmp_path / "results.csv")) == 2
     assert "RuntimeError: deliberate" in capsys.readouterr().err
 
@@ -66,6 +67,7 @@ def test_an_unfinished_study_shows_what_is_finished(finished, tmp_path, capsys):
         ("results.json", {"system": "leo", "policies": []}, "leo_gap"),
         ("results.json", {"trials": [{"system": "pendulum"}]}, "pendulum_gap"),
         ("results.json", {"policies": []}, "pendulum_gap"),
+        ("results.json", {"study": "learn", "system": "cart"}, "learn"),
     ],
 )
 def test_the_folder_says_which_study_made_it(tmp_path, file, content, name):
@@ -97,3 +99,16 @@ def test_a_study_of_its_own_rebuilds_itself(tmp_path, monkeypatch):
     monkeypatch.setattr(report.importlib, "import_module", lambda name: own)
     main([str(tmp_path)])
     assert rebuilt == [tmp_path]
+
+
+def test_a_report_imports_nothing_that_a_file_names(finished, tmp_path, capsys):
+    """Estimators and systems are named in the files; rebuilding does not look them up."""
+    shutil.copytree(finished, tmp_path / "out")
+    for path in (tmp_path / "out").glob("*/results.json"):
+        results = json.loads(path.read_text())
+        results["config"] |= {"system": "evil.SYSTEM", "estimator": {"class_path": "evil.Code"}}
+        del results["checksum"]
+        path.write_text(json.dumps(results))
+    (tmp_path / "out" / "results.json").unlink()
+    rebuild(tmp_path / "out")
+    assert "report:" in capsys.readouterr().out

@@ -8,10 +8,10 @@ from typing import Any
 
 import pandas as pd
 
+from simgap_files import atomic_write_text
 from studies.hidden.dirty.score import finite
 from studies.hidden.report import count, share
 from studies.reporting.markdown import markdown
-from studies.running.files import atomic_write_text
 
 #: Held-out error over the oracle's that is asked for, and room for "never worse than nominal".
 RATIO, SAME = 1.3, 1.02

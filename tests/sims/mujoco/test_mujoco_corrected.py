@@ -105,6 +105,26 @@ def test_a_delay_of_commands_that_are_cut_is_said_to_be_near(tmp_path):
     assert agreement(changed, path) < 0.02 * agreement(simulator, path)
 
 
+@pytest.mark.parametrize("integrator", ["Euler", "RK4"])
+def test_a_delay_in_the_file_is_a_delay_of_the_simulator(integrator, tmp_path):
+    simulator = robot("arm2", integrator=integrator)
+    late = simulator.with_effects([Delay("elbow_motor", 0.0123)])
+    _, path = saved(late, tmp_path)
+    again = MujocoSimulator(str(path))
+    (delay,) = again.effects
+    assert delay.time == pytest.approx(0.0123)
+    start = late.augment(np.array([[0.3, -0.2, 1.0, 0.5]]))
+    actions = np.random.default_rng(0).uniform(-1, 1, (1, 50, 2))
+    found, expected = again.rollout(start, actions), late.rollout(start, actions)
+    assert np.allclose(found, expected, rtol=0, atol=1e-9)
+    # And one that is found on top of it is written as the sum.
+    (tmp_path / "more").mkdir()
+    later = again.with_effects([*again.effects, Delay("elbow_motor", 0.004)])
+    _, path = saved(later, tmp_path / "more")
+    (delay,) = MujocoSimulator(str(path)).effects
+    assert delay.time == pytest.approx(0.0163)
+
+
 def test_with_runge_kutta_a_delay_is_said_to_be_near(tmp_path):
     simulator = robot("arm2")
     for effect in (Delay("elbow_motor", 0.0123), ActuatorLag("elbow_motor", 0.0123)):

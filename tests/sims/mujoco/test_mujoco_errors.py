@@ -6,7 +6,7 @@ import pytest
 from sims.effects import CoulombFriction
 from sims.loading import chosen_effects, load_simulator
 from sims.mujoco import MujocoSimulator
-from studies.find_gap import main
+from studies.find_gap import build_parser, main
 from tests.sims.mujoco.robots import MODELS, robot
 
 
@@ -40,7 +40,7 @@ def test_files_that_are_missing_broken_or_lack_a_mesh(tmp_path):
 
 def test_models_with_hidden_state_or_without_motion(tmp_path):
     text = (MODELS / "cart_pole.xml").read_text()
-    late = written(tmp_path, text.replace('gear="10"', 'gear="10" nsample="3" delay="0.01"'))
+    late = written(tmp_path, text.replace('gear="10"', 'gear="10" nsample="3" delay="0.012"'))
     assert "delay" in refused(late)
     still = written(tmp_path, "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
     assert "no joint moves" in refused(still)
@@ -69,6 +69,24 @@ def test_a_model_file_is_a_simulator_wherever_one_is_expected(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     (effect,) = chosen_effects(simulator, ["mass of body fore"])
     assert str(effect) == "mass of body fore"
+    # Not offered by default, but there.
+    (effect,) = chosen_effects(robot("hopper"), ["friction of geom foot"])
+    assert effect.quantities(robot("hopper"))["change"].unit == "1"
+
+
+def test_a_model_file_in_a_config_may_lie_beside_it(tmp_path):
+    for name in ("cart_pole.xml", "arm2.xml"):
+        (tmp_path / name).write_text((MODELS / name).read_text())
+    config = tmp_path / "ask.yaml"
+    config.write_text("simulator: cart_pole.xml\nlogs: [a.csv]\noutput: out\n")
+    chosen = build_parser().parse_args(["--config", str(config), "--simulator.integrator", "RK4"])
+    made = build_parser().instantiate(chosen).simulator
+    assert made.source.path == tmp_path / "cart_pole.xml"
+    assert made.runge_kutta
+    other = build_parser().parse_args(
+        ["--config", str(config), "--simulator", str(MODELS / "arm2.xml")]
+    )
+    assert build_parser().instantiate(other).simulator.name == "arm2"
 
 
 def test_a_log_of_another_robot_is_refused_by_the_command(tmp_path, capsys):
