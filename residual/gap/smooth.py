@@ -101,6 +101,8 @@ class SmoothFitter:
         A candidate acts for one sample interval from every row, and the change it makes is
         carried linearly along the window: one batch serves all windows, and none runs away.
         """
+        if not candidates:
+            return np.zeros((*fit.projected.shape, 0))
         model, samples, windows = fit.model, self.samples, self.blocks.windows
         inner: shooting.ShootingFit = fit.inner
         n, width = inner.nodes.shape

@@ -20,7 +20,25 @@ QUICK = {
     "heavier pendulum": ("order", "half"),
 }
 #: What fails today, and how.
-FAILS: dict[tuple[str, str], str] = {}
+FAILS: dict[tuple[str, str], str] = {
+    ("airtrack", "idle noise"): "quadratic drag is confirmed at the idle joint: it shrinks the "
+    "rate that noise gives a start state, which forecasts better where nothing moves",
+    ("heater", "copy"): "lag 16.49 s (14.37 to 18.6), then 14.32 s (13.06 to 15.58): the usual "
+    "horizon grows from 38 to 49 s with the length of all records",
+    ("pendulum-pair", "idle noise"): "payload comes up, not certain, where nothing was named: 8 "
+    "blocks, and the idle joint changes what a fifth of the error is",
+    ("pendulum-swingup", "cut"): "viscous friction is confirmed beside the payload, which falls "
+    "from 0.19 to 0.11 kg: 10 windows in place of 8",
+    ("pendulum with friction", "horizon"): "level 3.93e-4 (3.86e-4 to 3.994e-4), then 3.995e-4 "
+    "(3.948e-4 to 4.044e-4), where 4e-4 is true: a hair outside",
+    ("dirty arm", "idle input"): "inertia comes up, not certain",
+    ("dirty arm", "horizon"): "inertia comes up, not certain",
+}
+#: Logs on which the answer is known to hang on details; not every change has been looked at.
+UNSETTLED = {
+    "dirty oven": "gain and load come up, not certain, beside the delay that was hidden; cut in "
+    "two it is the time constant, and the delay goes from 0.649 s to 0.634 s"
+}
 
 
 def cases():
@@ -33,10 +51,12 @@ def cases():
                 marks.append(pytest.mark.skip(reason="no data: set SIMGAP_DATA"))
             if (name, change) in FAILS:
                 marks.append(pytest.mark.xfail(strict=True, reason=FAILS[name, change]))
+            if name in UNSETTLED:
+                marks.append(pytest.mark.xfail(strict=False, reason=UNSETTLED[name]))
             yield pytest.param(name, change, marks=marks, id=f"{name}-{change}")
 
 
-@pytest.mark.parametrize(("name", "change"), cases())
+@pytest.mark.parametrize(("name", "change"), list(cases()))
 def test_the_answer_stays(name, change, tmp_path):
     before, now = first(name), after(name, change, tmp_path)
     assert names(now) == names(before)

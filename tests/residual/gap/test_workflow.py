@@ -96,6 +96,13 @@ def test_tolerance_turns_a_small_gap_into_nothing_that_matters():
     assert "nothing that matters" in found.verdicts[0].says
 
 
+def test_with_nothing_on_offer_a_gap_is_unexplained_and_no_gap_is_none():
+    found = answer(Truth(mass=0.3), runs=3, effects=[])
+    assert kinds(found) == ["unexplained"]
+    found = answer(Truth(), excitation="weak", runs=3, effects=[])
+    assert kinds(found) == ["no_gap"]
+
+
 def few():
     return [e for e in library(PendulumEquation()) if e.name in ("inertia", "delay", "mass")]
 
