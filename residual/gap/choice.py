@@ -15,8 +15,8 @@ import numpy as np
 
 from residual.gap.search import Key, Search
 
-#: Part of the remaining error that an effect must take off: over all joints, or at one of several.
-MATERIAL, AT_ONE = 0.2, 1 / 3
+#: Part of the remaining error that an effect must take off: over all joints, or at one of them.
+MATERIAL, AT_ONE = 0.2, 0.3
 #: And of the nominal error.
 TRIFLE = 0.005
 #: Forecasts so many times as bad are not as good, whatever the chance is.
@@ -97,7 +97,7 @@ def as_good(search: Search, key: Key, best: Key) -> bool:
 
 
 def material(search: Search, smaller: Key, larger: Key) -> bool:
-    """Whether a set takes a fifth off what a smaller one leaves, or a third at one joint."""
+    """Whether a set takes a fifth off what a smaller one leaves, or three tenths at one joint."""
     before = search.currency.by_group(search.validated[smaller].squares)
     after = search.currency.by_group(search.validated[larger].squares)
     gained = before - after
