@@ -17,6 +17,10 @@ from sims.simulator import Channel
 Array = NDArray[np.float64]
 
 
+#: Squared error over that by noise alone, below which a joint shows no gap.
+NOISY = 1.3
+
+
 def groups(channels: Sequence[Channel]) -> tuple[tuple[int, ...], ...]:
     """Positions in a list of measured channels that belong to one joint."""
     found: dict[str, list[int]] = {}
@@ -36,6 +40,18 @@ class Currency:
 
     nominal: Array
     groups: tuple[tuple[int, ...], ...]
+
+    def only_where_wrong(self, floor: Array) -> Currency:
+        """The same without joints at which the nominal simulator errs no more than noise does.
+
+        What moves there is noise, and a force that calms it would pass for physics.
+
+        Args:
+            floor: Mean squared errors of blocks if only noise were left, (B, m).
+        """
+        times = np.nanmean(self.nominal, axis=0) / np.maximum(np.nanmean(floor, axis=0), 1e-300)
+        kept = tuple(g for g in self.groups if (times[list(g)] > NOISY).any())
+        return dataclasses.replace(self, groups=kept or self.groups)
 
     def by_block(self, squares: Array) -> Array:
         """Share of every block and group in the relative error, (B, g); sums over B are errors."""

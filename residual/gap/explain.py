@@ -12,6 +12,7 @@ from residual.gap.beam import run
 from residual.gap.candidates import Candidate
 from residual.gap.choice import Choice, choose, reasons
 from residual.gap.fitting import Fit, Fitter, Left
+from residual.gap.forecasts import noise_floor
 from residual.gap.noise import Noise
 from residual.gap.search import Effort, Key, Proposals, Search
 from residual.gap.significance import significant
@@ -93,6 +94,9 @@ def explain(
     key: Key = ()
     for _ in range(ROUNDS):
         search = Search(simulator, pool, fitter, effort, tell, until)
+        if len(search.currency.groups) > 1 and not simulator.has_contacts:
+            alone = noise_floor(fitter, search.tried[()], floor.sigma)
+            search.currency = search.currency.only_where_wrong(alone)
         run(search, seeds)
         key = _best_explained(search)
         fresh, floor = weigh(fitter, search.tried[key])

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from residual.gap.smooth import LEAD
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
 
 #: Spread of an angle that turns and turns.
 TURNING = np.pi / np.sqrt(3)
@@ -55,20 +58,36 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
 
 def _period(trajectories: Sequence[Trajectory], column: int, angle: bool) -> float:
     """Of a sine that moves as far and as fast as a channel, NaN if it stands still."""
-    spread, speed, count = 0.0, 0.0, 0
-    most = TURNING if angle else np.inf
+    records = []
     for run in trajectories:
-        values, times = run.states[:, column], run.times
-        known = np.isfinite(values)
-        if known.sum() < 8:
-            continue
-        values, times = values[known], times[known]
-        # Differences over several samples: noise must not pass for speed.
-        lag = max(1, len(values) // 60)
-        rates = (values[lag:] - values[:-lag]) / (times[lag:] - times[:-lag])
-        spread += len(values) * min(float(values.std()), most) ** 2
-        speed += float((rates**2).mean()) * len(values)
-        count += len(values)
-    if not count or speed <= 0 or spread <= 0:
+        known = np.isfinite(run.states[:, column])
+        if known.sum() >= 8:
+            records.append((run.states[known, column], float(np.median(np.diff(run.times[known])))))
+    if not records:
         return float("nan")
-    return 2 * np.pi * float(np.sqrt(spread / speed))
+    most = TURNING if angle else np.inf
+    sizes = np.array([len(values) for values, _ in records], float)
+    stds = np.minimum([values.std() for values, _ in records], most)
+    spread = float(np.sqrt((sizes * stds**2).sum() / sizes.sum()))
+    speeds = [_speed(values, step, spread) for values, step in records]
+    speed = float(np.sqrt((sizes * np.square(speeds)).sum() / sizes.sum()))
+    if speed <= 0 or spread <= 0:
+        return float("nan")
+    return 2 * np.pi * spread / speed
+
+
+def _speed(values: Array, step: float, spread: float) -> float:
+    """Root mean square rate of a channel: from differences over which it moves a quarter of its
+    spread, less what noise adds to differences of any length."""
+    lag = 1
+    while 4 * lag < len(values) and _change(values, lag) < (0.25 * spread) ** 2:
+        lag *= 2
+    once, twice = _change(values, lag), _change(values, min(2 * lag, len(values) - 1))
+    # With noise s: (v L dt)^2 + 2 s^2 and (2 v L dt)^2 + 2 s^2.
+    square = (twice - once) / 3 if twice > once else once
+    return float(np.sqrt(square)) / (lag * step)
+
+
+def _change(values: Array, lag: int) -> float:
+    """Mean squared difference over so many samples."""
+    return float(np.mean((values[lag:] - values[:-lag]) ** 2))

@@ -91,8 +91,8 @@ def evidence(result: GapResult) -> Table:
         "Every explanation is fitted in full; 0 is a perfect forecast, 1 is as bad as the nominal "
         "simulator, always on data that did not fit the numbers, all channels together. The "
         "smallest set that is good enough is chosen: each effect has to take a fifth off what "
-        "remains without it, or three tenths at one joint; where only noise remains, chance decides."
-        + (f" {more} more are in `gap.json`." if more > 0 else ""),
+        "remains without it, or three tenths at one joint; where only noise is left, chance "
+        "decides." + (f" {more} more are in `gap.json`." if more > 0 else ""),
         highlight=[i for i, rival in enumerate(shown) if rival.chosen],
         heading="Evidence and runners-up",
     )

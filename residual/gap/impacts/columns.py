@@ -57,6 +57,8 @@ def candidate_changes(
                 jobs.append(job(joint, np.append(theta, values), data, fitted.starts[None]))
                 shares.append(gentle)
     measured = data.samples.measured
+    if not jobs:
+        return np.zeros((*fitted.residual.shape, 0))
     changes = [
         whitened(data, shown(one, path, measured)[0] - fitted.shown) / share
         for one, path, share in zip(jobs, run(jobs), shares, strict=True)
