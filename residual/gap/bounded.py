@@ -7,11 +7,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: Passes over all unknowns where a bound holds some of them.
+PASSES = 200
+
 
 def bounded_step(
     matrix: Array, right: Array, low: Array, high: Array, damping: float = 1e-6
 ) -> Array:
-    """Least squares step, (p,): what would leave the bounds is held there, the rest solved again.
+    """Least squares step, (p,), the best within the bounds.
 
     Args:
         matrix, right: Normal equations, (p, p) and (p,).
@@ -19,22 +22,18 @@ def bounded_step(
         damping: Added to the diagonal of the scaled matrix.
     """
     p = len(right)
-    step = np.zeros(p)
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     matrix = matrix / np.outer(size, size) + damping * np.eye(p)
-    right = right / size
-    held = np.zeros(p, bool)
-    for _ in range(p + 1):
-        loose = ~held
-        if not loose.any():
-            break
-        shift = right[loose] - matrix[np.ix_(loose, held)] @ (step[held] * size[held])
-        step[loose] = (
-            np.linalg.lstsq(matrix[np.ix_(loose, loose)], shift, rcond=None)[0] / size[loose]
-        )
-        out = loose & ((step < low) | (step > high))
-        if not out.any():
-            break
-        step[out] = np.clip(step[out], low[out], high[out])
-        held |= out
-    return np.clip(step, low, high)
+    right, low, high = right / size, low * size, high * size
+    step = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    if ((step < low) | (step > high)).any():
+        step = np.clip(step, low, high)
+        # One unknown after the other: the problem is convex, so this ends at its least value.
+        for _ in range(PASSES):
+            before = step.copy()
+            for i in range(p):
+                rest = right[i] - matrix[i] @ step + matrix[i, i] * step[i]
+                step[i] = min(max(rest / matrix[i, i], low[i]), high[i])
+            if np.abs(step - before).max() <= 1e-9 * np.abs(step).max():
+                break
+    return np.clip(step / size, low / size, high / size)

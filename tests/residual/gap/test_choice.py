@@ -14,9 +14,9 @@ def test_an_effect_has_to_take_a_fifth_off_what_remains(second, key):
     assert found.key == key
 
 
-@pytest.mark.parametrize(("first", "key"), [(0.65, (0, 1)), (0.70, (0,))])
-def test_or_a_third_at_one_joint_of_several(first, key):
-    # Over three joints that is a ninth: too little on the whole.
+@pytest.mark.parametrize(("first", "key"), [(0.65, (0, 1)), (0.72, (0,))])
+def test_or_three_tenths_at_one_joint_of_several(first, key):
+    # Over three joints that is a tenth: too little on the whole.
     toy = Toy({(0,): 0.6, (0, 1): (0.6 * first, 0.6, 0.6)}, joints=3)
     assert choose(toy).key == key
 

@@ -27,11 +27,6 @@ def test_a_third_of_the_period(period):
     assert found == pytest.approx(period / 3, rel=0.1)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="speeds are differences over a sixtieth of the record, which a long record makes longer "
-    "than the period: 5.6 s for a swing of 1 s logged for 60 s, and 19.9 s for 1000 s",
-)
 @pytest.mark.parametrize("seconds", [60.0, 200.0, 1000.0])
 def test_a_long_record_has_the_horizon_of_a_short_one(seconds):
     found = usual_horizon(PendulumEquation(), [swing(1.0, seconds)])
