@@ -241,3 +241,11 @@ def test_a_damaged_policy_is_not_called_an_agent(tmp_path, folder):
         load_policy(tmp_path / "cut")
     arrays = load_file(whole("policy", folder))
     assert np.array_equal(arrays["low"], agent().policy.low)
+
+
+def test_a_process_without_a_factor_is_refused_and_not_waited_for(tmp_path, folder):
+    header, arrays = copy.deepcopy(read_arrays(whole("process", folder)))
+    arrays["outputscale_"] *= -1
+    write_arrays(tmp_path / "process", header, arrays)
+    with pytest.raises(ValueError, match=r"process is damaged.*have to be positive"):
+        residual.load(tmp_path / "process")
