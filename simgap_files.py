@@ -81,8 +81,15 @@ def copy_file(source: str | Path, target: str | Path) -> None:
 
 
 def read_json(path: str | Path) -> Any:
-    """What ``atomic_write_json`` wrote."""
-    return json.loads(Path(path).read_text(encoding="utf-8"))
+    """What ``atomic_write_json`` wrote.
+
+    Raises:
+        ValueError: The file is cut or otherwise no JSON; the message names it.
+    """
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path} is damaged: expected JSON ({error})") from None
 
 
 def jsonable(value: Any) -> Any:

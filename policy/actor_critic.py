@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from policy.adam import Adam
-from policy.config import DDPGConfig
+from policy.config import DDPGConfig, whole
 from policy.networks import Actor, Critic, FlatNetwork, Inputs
+from policy.passes import Weights
 from policy.replay import Batch
 
 Array = NDArray[np.float32]
+# What a file may claim, in bytes: a replay of 10^7 transitions of 100 observations is half of it.
+_MOST = 2**34
 
 
 class ActorCritic:
@@ -111,3 +116,30 @@ def _adam(
 ) -> Adam:
     flat = network.parameters, network.gradient, target.parameters
     return Adam(*flat, learning_rate, weight_decay)
+
+
+def check_sizes(
+    config: DDPGConfig, observation_size: int, action_size: int, arrays: Mapping[str, Array]
+) -> None:
+    """Whether arrays of a file are of an agent of these settings, before any memory is claimed.
+
+    Raises:
+        ValueError: A size is no whole number, or asks for more than the arrays hold.
+    """
+    n_o = whole("observation_size", observation_size, 1, arrays["actor"].size)
+    hidden = tuple(whole("hidden", width, 1, arrays["actor"].size) for width in config.hidden)
+    first, second = hidden
+    late = action_size if config.action_layer == 2 else 0
+    early = action_size - late
+    wanted = {
+        "actor": Weights.size(n_o + 1, (first, second), action_size, 0),
+        "critic1": Weights.size(n_o + 1 + early, (first, second), 1, late),
+    }
+    for name, size in wanted.items():
+        if arrays[name].shape != (size,) or arrays[name].dtype != np.float32:
+            raise ValueError(
+                f"{name} is {arrays[name].dtype} of shape {arrays[name].shape}, expected float32 "
+                f"of shape ({size},) by the settings"
+            )
+    for name, width in (("batch", first + second + n_o), ("replay", 2 * n_o + action_size + 2)):
+        whole(name, getattr(config, name), 1, _MOST // (4 * (width + action_size)))

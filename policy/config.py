@@ -75,3 +75,14 @@ class DDPGConfig:
             value = getattr(self, name)
             if not low <= value <= high:
                 raise ValueError(f"{name} is {value}, expected a value from {low} to {high}")
+
+
+def whole(name: str, value: object, low: int, high: int) -> int:
+    """A whole number from a file.
+
+    Raises:
+        ValueError: It is none, or not from ``low`` to ``high``.
+    """
+    if type(value) is not int or not low <= value <= high:
+        raise ValueError(f"{name} is {value!r:.40}, expected a whole number from {low} to {high}")
+    return value

@@ -12,9 +12,9 @@ import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from policy.actor_critic import ActorCritic
-from policy.config import DDPGConfig
-from policy.files import read_arrays, write_arrays
+from policy.actor_critic import ActorCritic, check_sizes
+from policy.config import DDPGConfig, whole
+from policy.files import content_of, read_arrays, write_arrays
 from policy.mlp import MlpPolicy
 from policy.noise import OrnsteinUhlenbeck
 from policy.replay import Replay
@@ -246,23 +246,29 @@ class DDPG:
 
         Raises:
             FileNotFoundError: There is no such file.
-            ValueError: The file holds something else.
+            ValueError: The file is damaged or holds something else.
         """
         arrays, metadata = read_arrays(path, FORMAT)
+        with content_of(path, "agent"):
+            return cls._restored(arrays, metadata)
+
+    @classmethod
+    def _restored(cls, arrays: dict[str, Any], metadata: dict[str, Any]) -> DDPG:
         low, high = arrays.pop("low"), arrays.pop("high")
         rows = arrays.pop("replay", None)
         # Before version 0.2 there were settings of TD3 as well.
         known = {field.name for field in dataclasses.fields(DDPGConfig)}
         settings = {name: value for name, value in metadata["config"].items() if name in known}
-        agent = cls(
-            gymnasium.spaces.Box(-np.inf, np.inf, (metadata["observation_size"],)),
-            gymnasium.spaces.Box(low, high),
-            DDPGConfig(**settings),
-        )
+        config, n_o = DDPGConfig(**settings), metadata["observation_size"]
+        check_sizes(config, n_o, len(low), arrays)
+        if low.dtype != np.float32 or high.dtype != np.float32 or not np.all(low <= high):
+            raise ValueError("the bounds of the action are no float32, or the wrong way round")
+        observed = gymnasium.spaces.Box(-np.inf, np.inf, (n_o,))
+        agent = cls(observed, gymnasium.spaces.Box(low, high), config)
         agent.restore(arrays)
         if rows is not None:
-            agent.replay.restore(rows, metadata["position"])
-        agent._networks.updates = metadata["updates"]
+            agent.replay.restore(rows, whole("position", metadata["position"], 0, config.replay))
+        agent._networks.updates = whole("updates", metadata["updates"], 0, 2**62)
         agent._rng.bit_generator.state = metadata["random"]
         return agent
 

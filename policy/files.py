@@ -1,20 +1,16 @@
-"""Arrays in files: the same content gives the same bytes, and nothing in them is executed."""
+"""What kind of file a policy or an agent is in, and that it is the kind asked for."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save
 
-from simgap_files import atomic_write_bytes
-
-_KEY = "simgap"
+import simgap_arrays
+from simgap_arrays import FileError
 
 
 def write_arrays(
@@ -28,10 +24,7 @@ def write_arrays(
         arrays: By name.
         metadata: Values that JSON knows, by name.
     """
-    # All metadata under one key: safetensors writes several in any order.
-    text = json.dumps({"format": form, **metadata}, sort_keys=True)
-    contiguous = {name: np.array(value, order="C") for name, value in arrays.items()}
-    atomic_write_bytes(path, save(contiguous, {_KEY: text}))
+    simgap_arrays.write_arrays(path, {"format": form, **metadata}, arrays)
 
 
 def read_arrays(path: str | Path, form: str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -43,23 +36,32 @@ def read_arrays(path: str | Path, form: str) -> tuple[dict[str, Any], dict[str, 
 
     Raises:
         FileNotFoundError: There is no such file.
-        ValueError: It is not a safetensors file, its metadata is not JSON, or it holds something
-            else.
+        OtherForm: It holds something else.
+        ValueError: It is damaged, or not of this project.
     """
-    if not Path(path).is_file():
-        raise FileNotFoundError(f"{path} is not a file")
-    try:
-        with safe_open(path, "np") as file:
-            arrays = {name: file.get_tensor(name) for name in list(file.keys())}
-            texts = file.metadata() or {}
-        metadata = {key: json.loads(text) for key, text in texts.items()}
-        # Before version 0.2 every value had a key of its own.
-        metadata = metadata.get(_KEY, metadata)
-    except (SafetensorError, json.JSONDecodeError) as error:
-        raise ValueError(f"{path} is not a safetensors file of this toolkit: {error}") from error
+    metadata, arrays = simgap_arrays.read_arrays(path)
     if metadata.get("format") != form:
-        raise ValueError(
+        raise OtherForm(
             f"{path} has format {metadata.get('format')!r}, expected {form!r}: agents are read by "
             "DDPG.load, policies by MlpPolicy.load"
         )
     return arrays, metadata
+
+
+class OtherForm(FileError):
+    """A whole file, but of another kind than was asked for."""
+
+
+@contextlib.contextmanager
+def content_of(path: str | Path, what: str) -> Iterator[None]:
+    """Whatever does not fit in the content of a file is a ``FileError`` that names it."""
+    try:
+        yield
+    except FileError:
+        raise
+    except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, MemoryError,
+            RecursionError) as error:  # fmt: skip
+        reason = f"it has no {error}" if isinstance(error, KeyError) else str(error)
+        raise FileError(
+            f"{path} is damaged or holds no {what} ({reason}): save it again"
+        ) from error

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from policy.config import DDPGConfig
 from policy.ddpg import DDPG, Progress
 from policy.evaluate import Policy
-from policy.files import read_arrays
+from policy.files import OtherForm, read_arrays
 
 OURS = "policy.DDPG"
 
@@ -169,5 +169,5 @@ def load_policy(path: str | Path) -> Policy:
         return found() if isinstance(found, type) else found
     try:
         return MlpPolicy.load(path)
-    except ValueError:
+    except OtherForm:
         return DDPG.load(path).policy

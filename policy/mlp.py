@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from policy.files import read_arrays, write_arrays
+from policy.files import content_of, read_arrays, write_arrays
 
 FORMAT = "simgap.policy.1"
 
@@ -99,8 +99,28 @@ class MlpPolicy:
 
         Raises:
             FileNotFoundError: There is no such file.
-            ValueError: The file holds something else.
+            ValueError: The file is damaged or holds something else.
         """
         arrays, _ = read_arrays(path, FORMAT)
-        low, high = arrays.pop("low"), arrays.pop("high")
+        with content_of(path, "policy"):
+            low, high = arrays.pop("low"), arrays.pop("high")
+            _check_shapes(arrays, low, high)
         return cls(arrays, low, high)
+
+
+def _check_shapes(
+    weights: dict[str, NDArray[np.float32]], low: NDArray[np.float32], high: NDArray[np.float32]
+) -> None:
+    first, second = len(weights["bias1"]), len(weights["bias2"])
+    expected = {
+        "weight1": (first, weights["weight1"].shape[-1]), "bias1": (first,),
+        "weight2": (second, first), "bias2": (second,),
+        "weight3": (len(low), second), "bias3": (len(low),),
+    }  # fmt: skip
+    given = {name: array.shape for name, array in weights.items()}
+    if given != expected or low.shape != (len(low),) or high.shape != low.shape:
+        raise ValueError(f"its layers have shapes {given}, which do not fit together")
+    if any(array.dtype != np.float32 for array in (*weights.values(), low, high)):
+        raise ValueError("its arrays are not of float32")
+    if not np.all(low <= high):
+        raise ValueError("the lowest action is above the highest")

@@ -252,6 +252,12 @@ class GaussianProcess(Estimator):
     def _prepare(self) -> None:
         if "_kept" not in self.__dict__:
             self._kept = {}
+        shape, points = (len(self.outputscale_), len(self.center_)), len(self.points_)
+        if self.lengthscale_.shape != shape or self.weights_.shape != (shape[0], points):
+            raise ValueError("lengthscales, weights and points do not fit together")
+        # Of others no kernel matrix has a Cholesky factor, whatever is added to it.
+        if min(part.min() for part in (self.noise_, self.outputscale_, self.lengthscale_)) <= 0:
+            raise ValueError("noise, output scales and length scales have to be positive")
         inverse = 1 / self.lengthscale_**2
         # |x - p|^2 = x.x + p.p - 2 x.p for the points p of all outputs in one product.
         self._doubled = -2 * (self.points_[None] * inverse[:, None]).reshape(-1, len(self.center_))

@@ -9,21 +9,17 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save as to_bytes
 
 from residual.difference import DifferenceModel
 from residual.estimator import Estimator
-from simgap_files import atomic_write_bytes
+from simgap_arrays import FileError, read_arrays, write_arrays
 from sims.simulator import Channel, Simulator
 
-VERSION = 1
 _CLASSES = {
     "DropoutNet": "residual.dropout_net",
     "GaussianProcess": "residual.gaussian_process",
@@ -32,7 +28,8 @@ _CLASSES = {
 }
 # Steps the simulator itself; not imported here, since it brings the whole search for effects.
 _OF_SIMULATOR = "NamedEffects"
-_KEY = "simgap"
+# Far more columns than any system has; a larger number in a file is damage.
+_MOST_COLUMNS = 100_000
 
 
 def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
@@ -50,7 +47,7 @@ def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
             text, None or a sequence of those.
         sklearn.exceptions.NotFittedError: The estimator is not fitted.
     """
-    header: dict[str, Any] = {"version": VERSION}
+    header: dict[str, Any] = {}
     estimator: Any = model
     if isinstance(model, DifferenceModel):
         estimator = model.fitted()
@@ -78,9 +75,7 @@ def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
         header["values"] = estimator.state_values()
     names = getattr(estimator, "feature_names_in_", None)
     header["feature_names"] = None if names is None else [str(name) for name in names]
-    arrays = {key: np.array(value, order="C") for key, value in estimator.state_arrays().items()}
-    content = to_bytes(arrays, metadata={_KEY: json.dumps(header, sort_keys=True)})
-    atomic_write_bytes(path, content)
+    write_arrays(path, header, estimator.state_arrays())
 
 
 def load(path: str | Path, simulator: Simulator | None = None) -> Any:
@@ -100,17 +95,16 @@ def load(path: str | Path, simulator: Simulator | None = None) -> Any:
         ValueError: The file is damaged or not one that ``save`` wrote, or the difference model
             in it was fitted for another control period or other channels than ``simulator``.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise FileNotFoundError(f"there is no file {path}")
+    header, arrays = read_arrays(path)
     try:
-        header, arrays = _read(path)
-        model = _restore(header, arrays, simulator)
-    except _Unusable as error:
-        raise ValueError(f"{path}: {error}") from None
-    except (SafetensorError, OSError, ArithmeticError, AttributeError, LookupError, TypeError,
-            ValueError, RecursionError, MemoryError) as error:  # fmt: skip
-        raise ValueError(
+        # What divides by zero shows as a prediction that is not finite.
+        with np.errstate(all="ignore"):
+            model = _restore(header, arrays, simulator)
+    except FileError as error:
+        raise FileError(f"{path}: {error}") from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, RecursionError,
+            MemoryError) as error:  # fmt: skip
+        raise FileError(
             f"{path} is damaged or was not written by residual.save "
             f"({type(error).__name__}: {error}): save the model again"
         ) from error
@@ -120,43 +114,25 @@ def load(path: str | Path, simulator: Simulator | None = None) -> Any:
     return model
 
 
-class _Unusable(ValueError):
-    """A file that is whole, but not for this version."""
-
-
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    with safe_open(path, framework="numpy") as file:
-        metadata = file.metadata() or {}
-        if _KEY not in metadata:
-            raise _Unusable(
-                "a safetensors file, but not of this project: give one of residual.save"
-            )
-        arrays = {key: file.get_tensor(key) for key in list(file.keys())}
-    header = json.loads(metadata[_KEY])
-    if header["version"] != VERSION:
-        raise _Unusable(
-            f"format version {header['version']!r}, this release reads {VERSION}: save the model "
-            "again with this release"
-        )
-    return header, arrays
-
-
 def _restore(
     header: dict[str, Any], arrays: dict[str, NDArray], simulator: Simulator | None
 ) -> DifferenceModel | Estimator:
     name = header["class"]
     if name not in _CLASSES:
-        raise _Unusable(f"holds a {name!r}; only {', '.join(_CLASSES)} can be loaded")
-    if not all(np.isfinite(array).all() for array in arrays.values()):
-        raise ValueError("an array holds values that are not finite")
+        raise FileError(f"holds a {name!r}; only {', '.join(_CLASSES)} can be loaded")
+    columns = arrays["n_features_in_"].item()
+    if type(columns) is not int or not 1 <= columns <= _MOST_COLUMNS:
+        raise ValueError(f"n_features_in_ is {columns}, expected 1 to {_MOST_COLUMNS}")
     params = {key: _tuples(value) for key, value in header["params"].items()}
     kind: type[Estimator] = getattr(importlib.import_module(_CLASSES[name]), name)
     estimator = kind.from_state(params, arrays)
     if name == _OF_SIMULATOR:
         if simulator is None:
-            raise _Unusable("holds NamedEffects, which step the simulator: load(path, simulator)")
+            raise FileError("holds NamedEffects, which step the simulator: load(path, simulator)")
         estimator.restore(header["values"], simulator)
     names = header["feature_names"]
+    if names is not None and ("difference" in header or len(names) != columns):
+        raise ValueError(f"feature_names are {names!r:.60}, expected {columns} names or none")
     # Arrays that do not fit together show here, not in the middle of a study.
     mean, std = estimator.predict(np.zeros((1, estimator.n_features_in_)), return_std=True)
     if not (np.isfinite(mean).all() and np.isfinite(std).all()):

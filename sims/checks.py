@@ -2,34 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sims.effects.base import Effect
 from sims.effects.library import library, typical
+from sims.equations import EquationOfMotion
+from sims.findings import Finding, Findings, draw, example
 from sims.host import HostSimulator
-from sims.simulator import Array, Simulator, random_values
-
-
-@dataclasses.dataclass(frozen=True)
-class Finding:
-    """The outcome of one check.
-
-    Args:
-        check: What was checked.
-        ok: Whether it holds.
-        says: In words, with an example row if it does not hold.
-    """
-
-    check: str
-    ok: bool
-    says: str
-
-    def __str__(self) -> str:
-        return f"{'ok  ' if self.ok else 'FAIL'}  {self.check}: {self.says}"
+from sims.simulator import Array, Simulator
 
 
 def check_simulator(
@@ -37,7 +21,7 @@ def check_simulator(
     states: ArrayLike | None = None,
     actions: ArrayLike | None = None,
     rng: np.random.Generator | None = None,
-) -> list[Finding]:
+) -> Findings:
     """Test the contract of a simulator on some rows.
 
     Args:
@@ -47,22 +31,83 @@ def check_simulator(
         rng: Source of random rows; a fixed seed by default.
 
     Returns:
-        One finding per check. ``print(*findings, sep="\\n")`` is the report; the simulator
-        keeps the contract if ``all(finding.ok for finding in findings)``.
+        One finding per check. ``print(findings)`` is the report, a table; the simulator keeps
+        the contract if ``all(finding.ok for finding in findings)``.
     """
+    declared = Findings(_declared(simulator))
+    if not all(finding.ok for finding in declared):
+        return declared
     rng = rng or np.random.default_rng(0)
     if states is None or actions is None:
         given = actions if states is None else states
-        drawn = _draw(simulator, 24 if given is None else len(np.asarray(given)), rng)
+        drawn = draw(simulator, 24 if given is None else len(np.asarray(given)), rng)
         states = drawn[0] if states is None else states
         actions = drawn[1] if actions is None else actions
     states, actions = simulator.check_rows(states, actions)
-    findings = list(_contract(simulator, states, actions, rng))
+    findings = Findings((*declared, *_contract(simulator, states, actions, rng)))
     if all(finding.ok for finding in findings):
+        findings += _to_the_bounds(simulator, rng)
+        if isinstance(simulator, EquationOfMotion):
+            findings.append(_linear(simulator, states, actions))
         findings += _parameters(simulator, states, actions)
         if isinstance(simulator, HostSimulator):
             findings += _effects(simulator, rng)
     return findings
+
+
+def _declared(simulator: Simulator) -> Iterator[Finding]:
+    good = bool(np.isfinite(simulator.dt) and simulator.dt > 0)
+    says = f"every {simulator.dt:g} s" if good else f"dt is {simulator.dt!r}, expected seconds > 0"
+    yield Finding("period", good, says)
+    count = len(simulator.state_channels)
+    says = f"{count} of the state" if count else "there is no state channel: declare every column"
+    yield Finding("channels", bool(count), says)
+
+
+def _to_the_bounds(simulator: Simulator, rng: np.random.Generator) -> Iterator[Finding]:
+    """Bounds that channels declare are promises: what lies between them can be stepped."""
+    states, actions = draw(simulator, 64, rng)
+    wide = False
+    for rows, channels in (
+        (states, simulator.state_channels),
+        (actions, simulator.action_channels),
+    ):
+        for column, channel in enumerate(channels):
+            if np.isfinite([channel.low, channel.high]).all() and channel.kind != "memory":
+                rows[:, column] = rng.uniform(channel.low, channel.high, len(rows))
+                rows[:2, column] = channel.low, channel.high
+                wide = True
+    if not wide:
+        return
+    with np.errstate(all="ignore"):
+        following = np.asarray(simulator.step(states.copy(), actions.copy()))
+    bad = np.flatnonzero(~np.isfinite(following).all(axis=1))
+    says = f"all {len(states)} rows up to the channels' bounds stay finite"
+    if bad.size:
+        says = example("within the channels' bounds", bad, states, actions, following, following)
+    yield Finding("finite to the bounds", not bad.size, says)
+
+
+def _linear(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:
+    """Effects add forces, so twice the force must give twice the change of acceleration."""
+    names = [channel.name for channel in simulator.state_channels]
+    q = states[:, [names.index(joint.position) for joint in simulator.joints]]
+    v = states[:, [names.index(str(joint.rate)) for joint in simulator.joints]]
+    values = SimpleNamespace(**simulator.parameter_values())
+    for j, joint in enumerate(simulator.joints):
+        force = np.zeros((3, *q.shape))
+        force[1:, :, j] = np.array([[1.0], [2.0]]) * simulator.force_scale(joint)
+        rest, once, twice = (
+            simulator.acceleration(q.copy(), v.copy(), actions.copy(), each, values)
+            for each in force
+        )
+        error = np.abs((twice - rest) - 2 * (once - rest)).max()
+        if not error <= 1e-8 * np.abs([rest, once, twice]).max():
+            says = (
+                f"twice the force on {joint.name} does not change the acceleration by twice as much"
+            )
+            return Finding("linear in forces", False, says)
+    return Finding("linear in forces", True, "twice the force, twice the change of acceleration")
 
 
 def _contract(
@@ -83,14 +128,14 @@ def _contract(
     yield Finding(
         "finite",
         not bad.size,
-        _row("step gives", bad, states, actions, following, following)
+        example("step gives", bad, states, actions, following, following)
         if bad.size
         else f"all {len(states)} rows stay finite",
     )
 
     def same(check: str, again: Array, good: str, wrong: str) -> Finding:
         rows = np.flatnonzero((again != following).any(axis=1) & np.isfinite(following).all(axis=1))
-        says = _row(wrong, rows, states, actions, following, again) if rows.size else good
+        says = example(wrong, rows, states, actions, following, again) if rows.size else good
         return Finding(check, not rows.size, says)
 
     again = simulator.step(states, actions)
@@ -188,7 +233,7 @@ def _parameters(simulator: Simulator, states: Array, actions: Array) -> Iterator
 
 def _effects(simulator: HostSimulator, rng: np.random.Generator) -> Iterator[Finding]:
     plain = simulator.with_effects(())
-    states, actions = _draw(plain, 24, rng)
+    states, actions = draw(plain, 24, rng)
     before = plain.step(states, actions)
     for effect in library(plain):
         check = f"effect {effect}"
@@ -226,28 +271,3 @@ def _reaches(check: str, before: Array, after: Array, change: str) -> Finding:
     amounts = ", ".join(f"{amount:.2g}" for amount in moved)
     says = f"changed {change} it moves the channels by up to {amounts}"
     return Finding(check, ok, says if ok else f"changed {change} it does not reach the output")
-
-
-def _row(
-    what: str, rows: NDArray[np.intp], states: Array, actions: Array, first: Array, second: Array
-) -> str:
-    i = int(rows[0])
-    says = f"{what}; {len(rows)} of {len(states)} rows, for example state {states[i].tolist()}"
-    says += f", action {actions[i].tolist()} -> {first[i].tolist()}"
-    return says if first is second else f"{says} and then {second[i].tolist()}"
-
-
-def _draw(simulator: Simulator, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Random rows within the scales of the channels; memory as it would be after rest."""
-
-    actions = np.empty((n, len(simulator.action_channels)))  # a system may have none
-    for column, action in enumerate(simulator.action_channels):
-        actions[:, column] = random_values(action, n, rng)
-    states = [
-        np.zeros(n) if channel.kind == "memory" else random_values(channel, n, rng)
-        for channel in simulator.state_channels
-    ]
-    found = np.stack(states, axis=1)
-    if isinstance(simulator, HostSimulator):
-        found = simulator.augment(found[:, : len(simulator.physical_channels)], actions)
-    return found, actions

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from simgap_files import atomic_write_json, atomic_write_text, read_json
-from studies.running.command import Parser, fail
+from studies.running.command import Parser, check_output, fail, guarded
 from studies.timing.fit_scaling import write_figure
 from studies.timing.tables import SCALING, records, tables
 
@@ -129,9 +129,12 @@ def document(data: Mapping[str, Any], figure: bool = False) -> str:
     )
 
 
+@guarded(resumes=False)
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command; its exit code is 1 if a benchmark failed."""
     given = build_parser().parse_args(arguments)
+    if given.output:
+        check_output(Path(given.output).parent)
     if given.mujoco:
         robots(given.output)
         return

@@ -36,7 +36,7 @@ from sims.simulator import Hold, Simulator
 from studies.gap.files import CORRECTED, REPORT, check_folder, write_gap
 from studies.gap.progress import Heartbeat
 from studies.gap.summary import found_in_data, summary
-from studies.running.command import HelpFormatter, Parser, fail
+from studies.running.command import HelpFormatter, Parser, fail, guarded
 
 
 @dataclasses.dataclass(frozen=True)
@@ -228,6 +228,7 @@ def apart(
     return read(simulator, sorted(held_out), columns)
 
 
+@guarded(resumes=False)
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     parser = build_parser()

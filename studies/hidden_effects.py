@@ -45,7 +45,7 @@ from studies.hidden.report import summary, write_report
 from studies.hidden.rivals import one_step, regression, sparse
 from studies.hidden.scores import replaceable, score, score_names
 from studies.hidden.strengths import draw, truth
-from studies.running.command import HelpFormatter, Parser, fail
+from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
 from studies.running.progress import Progress
 from studies.running.trials import Execution, read_trials, run_trials, trial_folder
 
@@ -140,6 +140,7 @@ def _report(
         print(f"\n{dirty_summary(dirty)}\n\nreport: {output / 'dirty.md'}")
 
 
+@guarded()
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     parser = build_parser()
@@ -148,6 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     fields = [field.name for field in dataclasses.fields(HiddenStudy)]
     study = HiddenStudy(**{name: made[name] for name in fields})
     output = Path(given.output) if given.output else RESULTS
+    check_output(output)
     try:
         cells = trials_of(study)
     except ValueError as error:

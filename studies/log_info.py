@@ -15,7 +15,7 @@ import numpy as np
 
 from residual.logs.clocks import Signal
 from residual.logs.sources import signals_of
-from studies.running.command import HelpFormatter, Parser, fail
+from studies.running.command import HelpFormatter, Parser, fail, guarded
 
 
 def build_parser() -> Parser:
@@ -48,6 +48,7 @@ def _line(name: str, signal: Signal, width: int) -> str:
     return f"  {name:<{width}}  {len(known):>8}  {rate}  {span}"
 
 
+@guarded(resumes=False)
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     given = build_parser().parse_args(arguments)

@@ -24,7 +24,7 @@ from jsonargparse.typing import PositiveInt
 
 from sims.pendulum import IDEALISED_MASS, TRUE_MASS
 from studies.hidden.data import Truth, make_logs
-from studies.running.command import HelpFormatter, Parser, fail
+from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
 from studies.running.logs import write_log
 from studies.walks import write_walks
 
@@ -82,12 +82,14 @@ def write_logs(
     return paths
 
 
+@guarded(resumes=False)
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     parser = build_parser()
     given = parser.instantiate(parser.parse_args(arguments))
     folder, system, policy = given.pop("output"), given.pop("system"), given.pop("policy")
     walk, seed = given.pop("walk"), given.pop("seed")
+    check_output(folder)
     try:
         if system == "pendulum":
             paths = write_logs(folder, **vars(given), seed=seed)

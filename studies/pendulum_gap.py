@@ -25,7 +25,7 @@ from sims.system import System
 from studies.learning.command import run_command
 from studies.learning.settings import build_parser as parser_of
 from studies.learning.study import Study, Trial
-from studies.running.command import Parser
+from studies.running.command import Parser, guarded
 from studies.systems.pendulum import pendulum
 
 
@@ -54,6 +54,7 @@ def build_parser() -> Parser:
     return parser_of(STUDY)
 
 
+@guarded()
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     run_command(STUDY, arguments)

@@ -23,7 +23,7 @@ from simgap_files import atomic_write_json, atomic_write_text
 from studies.real.judge import Judged, ask
 from studies.real.rigs import RIGS
 from studies.reporting.markdown import markdown
-from studies.running.command import HelpFormatter, Parser, fail
+from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
 
 #: What a corrected simulator's error may be, in errors of the repair by hand, and processor
 #: time in s.
@@ -91,6 +91,7 @@ def summary(results: Sequence[Judged]) -> str:
     return "\n".join(lines)
 
 
+@guarded(resumes=False)
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     given = build_parser().parse_args(arguments)
@@ -102,6 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for rig in wanted:
         if not (given.data / rig.folder).is_dir():
             fail(f"--data {given.data}: no folder {rig.folder}, expected the rig's logs there")
+    check_output(given.output)
     results, failed = [], []
     for rig in wanted:
         begin = time.perf_counter()

@@ -15,9 +15,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from jinja2 import UndefinedError
+
 from simgap_files import read_json
 from studies.learning import command
-from studies.running.command import HelpFormatter, Parser, fail
+from studies.running.command import HelpFormatter, Parser, fail, guarded
 from studies.running.trials import PLAN
 
 
@@ -38,7 +40,7 @@ def study_of(folder: Path) -> str:
 
     Raises:
         FileNotFoundError: The folder holds no results.
-        ValueError: The name is none of a study.
+        ValueError: The name is none of a study, or the file is damaged.
     """
     path = folder / (PLAN if (folder / PLAN).exists() else "results.json")
     if not path.exists():
@@ -46,15 +48,30 @@ def study_of(folder: Path) -> str:
             f"{folder}: expected the output folder of a study, with {PLAN} or results.json in it"
         )
     found: Any = read_json(path)
-    if isinstance(found.get("trials"), list):
-        found = found["trials"][0]
+    if isinstance(found, dict) and isinstance(found.get("trials"), list):
+        found = (found["trials"] or [None])[0]
+    if not isinstance(found, dict):
+        raise ValueError(f"{path} is damaged: expected the results of a trial, a JSON object")
     name = str(found.get("study", f"{found.get('system', 'pendulum')}_gap"))
     # A name from a file is imported: it may only be that of a study.
     if not re.fullmatch(r"[a-z_]+", name) or not Path(__file__).with_name(f"{name}.py").exists():
-        raise ValueError(f"{path}: there is no study {name!r}")
+        raise ValueError(f"{path}: there is no study {name!r}, expected one of studies/")
     return name
 
 
+def _told(folder: Path, error: Exception) -> str:
+    """What is wrong with the files that a report was to be made from."""
+    if str(folder) in str(error):
+        return str(error)
+    path = folder / (PLAN if (folder / PLAN).exists() else "results.json")
+    wrong = f"a key {error}" if isinstance(error, KeyError) else f"values as written ({error})"
+    return (
+        f"{path}, or the results.json of a trial that it names, is damaged or of another version: "
+        f"expected {wrong}; give the command of the study again"
+    )
+
+
+@guarded(resumes=False)
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     folder: Path = build_parser().parse_args(arguments).folder
@@ -65,8 +82,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             command.rebuild(folder)
         else:
             module.rebuild(folder)
-    except (OSError, ValueError) as error:
-        fail(str(error))
+    except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, OSError,
+            UndefinedError) as error:  # fmt: skip
+        fail(_told(folder, error))
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ import numpy as np
 from jsonargparse.typing import NonNegativeInt, PositiveFloat, PositiveInt
 
 from studies.robots.cases import Answer, Case, ask, cases
-from studies.running.command import HelpFormatter, Parser, fail
+from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
 
 
 def build_parser() -> Parser:
@@ -44,9 +44,11 @@ def build_parser() -> Parser:
     return parser
 
 
+@guarded()
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     given = build_parser().parse_args(arguments)
+    check_output(given.output.parent)
     seeds = range(given.first, given.first + given.seeds)
     if given.hidden:
         wanted = [Case(given.robot, tuple(given.hidden), seed) for seed in seeds]

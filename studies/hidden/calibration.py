@@ -32,7 +32,7 @@ from simgap_files import atomic_write_text
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
-from studies.running.command import HelpFormatter, Parser
+from studies.running.command import HelpFormatter, Parser, check_output, guarded
 from studies.running.progress import Progress
 from studies.running.trials import Execution, run_trials, trial_folder
 
@@ -96,6 +96,7 @@ def table(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+@guarded()
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     parser = Parser(
@@ -109,6 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--output", type=Path, default=Path("results/hidden_calibration"))
     parser.add_argument("--jobs", type=PositiveInt, default=1, help="Processes.")
     given = parser.parse_args(arguments)
+    check_output(given.output)
     cells = itertools.product(range(given.sets), ("strong", "weak", "policy"), "ABC", given.runs)
     folders = {}
     for number, (_, excitation, noise, runs) in enumerate(cells):

@@ -20,7 +20,7 @@ from studies.learning.trial import code_of_trial, run_trial
 from studies.learnt.films import write_films
 from studies.learnt.many_trials import write_grid_report
 from studies.learnt.one_trial import policy_table, read_episodes, write_report
-from studies.running.command import expand_grid, fail
+from studies.running.command import check_output, expand_grid, fail
 from studies.running.curves import Curves
 from studies.running.progress import Bars, Progress, Several
 from studies.running.trials import Execution, Failures, read_trials, run_trials, trial_folder
@@ -48,6 +48,7 @@ def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
         study.system_of(instantiate(study, settings)).check()
     except ValueError as error:
         fail(str(error))
+    check_output(output or home)
     if grid:
         name = Path(str(given.config[0])).stem if given.config else "grid"
         target = Path(output) if output else home / name

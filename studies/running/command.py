@@ -1,4 +1,4 @@
-"""What every study's command line shares: typed settings, grids of trials, one-line errors."""
+"""What every study's command line shares: typed settings, grids of trials, one way to end."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ import importlib
 import inspect
 import itertools
 import json
+import os
 import platform
 import re
 import subprocess
 import sys
+import tempfile
+import traceback
 from argparse import RawDescriptionHelpFormatter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NoReturn
@@ -23,6 +26,9 @@ import yaml
 
 from sims.loading import model_settings
 
+_DEBUG, _DEBUG_VARIABLE = "--debug", "SIMGAP_DEBUG"
+# What a check of a disk writes before the work: less would fit on a disk that is full.
+_PROBE = bytes(2**16)
 _PACKAGES = ("torch", "scikit-learn", "gpytorch", "pymunk", "numpy", "scipy", "gymnasium")
 
 
@@ -32,6 +38,10 @@ class HelpFormatter(jsonargparse.DefaultHelpFormatter, RawDescriptionHelpFormatt
 
 class Parser(jsonargparse.ArgumentParser):
     """An argument parser whose errors are one line on stderr, with exit code 2."""
+
+    def __init__(self, *given: Any, **options: Any) -> None:
+        options.setdefault("epilog", f"{_DEBUG}, or {_DEBUG_VARIABLE}=1, shows where errors arise.")
+        super().__init__(*given, **options)
 
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, *rest: Any, **options: Any
@@ -82,6 +92,84 @@ def fail(message: str) -> NoReturn:
     """End the command with one line on stderr and exit code 2: the user can mend it."""
     sys.stderr.write(f"error: {' '.join(message.split())}\n")
     raise SystemExit(2)
+
+
+def guarded(
+    resumes: bool = True,
+) -> Callable[[Callable[[Sequence[str] | None], None]], Callable[..., None]]:
+    """Let a command end in one way, whatever happens.
+
+    Bad input and disks that fail end it with one line and exit code 2, Ctrl-C with 130, a fault
+    of ours with one line, a file that keeps the traceback, and exit code 1. ``--debug`` or
+    ``SIMGAP_DEBUG=1`` shows tracebacks.
+
+    Args:
+        resumes: Whether the same command continues what was stopped.
+    """
+
+    def decorate(main: Callable[[Sequence[str] | None], None]) -> Callable[..., None]:
+        @functools.wraps(main)
+        def run(arguments: Sequence[str] | None = None) -> None:
+            given = list(sys.argv[1:] if arguments is None else arguments)
+            debug = _DEBUG in given or os.environ.get(_DEBUG_VARIABLE, "") not in ("", "0")
+            try:
+                main([argument for argument in given if argument != _DEBUG])
+            except KeyboardInterrupt:
+                if debug:
+                    traceback.print_exc()
+                then = "goes on" if resumes else "begins anew"
+                sys.stderr.write(f"\nstopped; the same command {then}\n")
+                raise SystemExit(130) from None
+            except SystemExit as ended:
+                if debug and isinstance(ended.__context__, Exception):
+                    traceback.print_exception(ended.__context__)
+                raise
+            except OSError as error:
+                if debug:
+                    traceback.print_exc()
+                fail(str(error))
+            except Exception as error:
+                if debug:
+                    traceback.print_exc()
+                sys.stderr.write(_internal(error))
+                raise SystemExit(1) from error
+
+        return run
+
+    return decorate
+
+
+def _internal(error: Exception) -> str:
+    """Keep the traceback of a fault in a file, and say where."""
+    told = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+    text = traceback.format_exc()
+    try:
+        handle, path = tempfile.mkstemp(prefix="simgap-error-", suffix=".txt")
+        with open(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+    except OSError:
+        return f"{text}error: internal fault: {told}\n"
+    return f"error: internal fault: {told} (please report it with {path}, or see {_DEBUG})\n"
+
+
+def check_output(output: str | Path) -> None:
+    """End the command now if results cannot be written into a folder later; nothing is left.
+
+    Args:
+        output: A folder, there already or not.
+    """
+    folder = Path(output)
+    try:
+        there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+        if not there.is_dir():
+            fail(f"--output {folder}: {there} is a file, expected a folder")
+        with tempfile.TemporaryFile(prefix=".partial-", dir=there) as file:
+            file.write(_PROBE)
+            file.flush()
+            os.fsync(file.fileno())
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        fail(f"--output {folder} cannot be written: {reason}")
 
 
 def expand_grid(

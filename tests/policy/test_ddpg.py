@@ -192,7 +192,7 @@ def test_wrong_files_are_named(tmp_path):
     with pytest.raises(ValueError, match=r"expected 'simgap\.policy"):
         MlpPolicy.load(tmp_path / "agent")
     for load in (DDPG.load, MlpPolicy.load):
-        with pytest.raises(ValueError, match="not a safetensors file"):
+        with pytest.raises(ValueError, match="no safetensors file"):
             load(tmp_path / "text")
         with pytest.raises(FileNotFoundError):
             load(tmp_path / "absent")

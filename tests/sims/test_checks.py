@@ -141,3 +141,49 @@ def test_an_effect_that_does_not_reach_the_output_is_named():
     assert (
         "effect viscous_friction@pivot" in failed and "effect actuator_gain@voltage" not in failed
     )
+
+
+class Bounded(Good):
+    state_channels = (Channel("x", "m", "other", low=-5.0, high=5.0),)
+
+
+class BreakingFarOut(Bounded):
+    def step(self, states, actions):
+        following = super().step(states, actions)
+        following[np.abs(np.asarray(states)[:, 0]) > 3] = np.nan
+        return following
+
+
+class Timeless(Good):
+    dt = 0.0
+
+
+class Empty(Good):
+    state_channels = ()
+
+
+class Bent(PendulumEquation):
+    def acceleration(self, q, v, u, force, p):
+        return super().acceleration(q, v, u, force * np.abs(force), p)
+
+
+@pytest.mark.parametrize(
+    ("broken", "check"),
+    [
+        (BreakingFarOut, "finite to the bounds"),
+        (Timeless, "period"),
+        (Empty, "channels"),
+        (Bent, "linear in forces"),
+    ],
+)
+def test_broken_promises_beyond_the_contract_are_named(broken, check):
+    findings = check_simulator(broken())
+    assert [finding.check for finding in findings if not finding.ok][:1] == [check]
+
+
+def test_findings_print_as_a_table():
+    findings = check_simulator(Bounded())
+    lines = str(findings).splitlines()
+    assert len(lines) == len(findings) and all(finding.ok for finding in findings)
+    starts = {line.index(f.says) for line, f in zip(lines, findings, strict=True)}
+    assert len(starts) == 1

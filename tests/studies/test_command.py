@@ -1,10 +1,20 @@
-"""Grids expand as written and wrong ones are refused."""
+"""Grids expand as written and wrong ones are refused; commands end in one way."""
+
+import errno
+import importlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studies.running.command import expand_grid
+from studies.running.command import check_output, expand_grid, fail, guarded
 
 BASE = {"seed": 0, "budget": {"true_samples": 3750, "iterations": 2}, "estimator": {}}
 
@@ -41,3 +51,101 @@ def test_the_shared_settings_are_not_changed():
 def test_a_wrong_grid_names_the_block_and_the_setting(block, message):
     with pytest.raises(ValueError, match=message):
         expand_grid(BASE, [{"seed": [0]}, block])
+
+
+def ended(capsys, fault, arguments=(), **options):
+    """Exit code and what was said of a command that raises."""
+
+    @guarded(**options)
+    def command(given):
+        assert "--debug" not in given
+        raise fault
+
+    with pytest.raises(SystemExit) as stopped:
+        command([*arguments])
+    return stopped.value.code, capsys.readouterr().err
+
+
+def test_a_stopped_command_says_how_to_go_on(capsys):
+    code, said = ended(capsys, KeyboardInterrupt())
+    assert code == 130 and said == "\nstopped; the same command goes on\n"
+    assert "begins anew" in ended(capsys, KeyboardInterrupt(), resumes=False)[1]
+
+
+def test_an_internal_fault_is_one_line_and_a_file(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    code, said = ended(capsys, RuntimeError("deliberate"))
+    (kept,) = tmp_path.iterdir()
+    assert code == 1 and said.count("\n") == 1 and "deliberate" in said and str(kept) in said
+    assert "Traceback" in kept.read_text() and "RuntimeError: deliberate" in kept.read_text()
+
+
+@pytest.mark.parametrize("how", ["option", "variable"])
+def test_debug_shows_where(how, capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    if how == "variable":
+        monkeypatch.setenv("SIMGAP_DEBUG", "1")
+    given = ["--debug"] if how == "option" else []
+    assert "Traceback" in ended(capsys, RuntimeError("deliberate"), given)[1]
+
+    @guarded()
+    def command(arguments):
+        try:
+            raise ValueError("deliberate")
+        except ValueError as error:
+            fail(str(error))
+
+    with pytest.raises(SystemExit, match="2"):
+        command(given)
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_a_full_disk_is_one_line(capsys, tmp_path, monkeypatch):
+    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "here.csv")
+    assert ended(capsys, full) == (2, "error: [Errno 28] No space left on device: 'here.csv'\n")
+
+    def fsync(handle):
+        raise full
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    with pytest.raises(SystemExit, match="2"):
+        check_output(tmp_path / "new" / "folder")
+    assert "cannot be written: No space left" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+COMMANDS = {
+    "pendulum_gap": [],
+    "leo_gap": [],
+    "learn": ["--system", "studies.systems.pendulum.pendulum"],
+    "make_log": [],
+    "hidden_effects": [],
+    "hidden.calibration": [],
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    ("output", "says"), [(__file__, "expected a folder"), ("/proc/x/y", "cannot be written")]
+)
+def test_output_is_checked_before_anything_is_computed(name, output, says, capsys):
+    main = importlib.import_module(f"studies.{name}").main
+    with pytest.raises(SystemExit, match="2"):
+        main([*COMMANDS[name], "--output", output])
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "--output" in said and says in said
+
+
+def test_control_c_in_a_study(tmp_path):
+    command = [sys.executable, "-m", "studies.pendulum_gap", "--output", str(tmp_path / "out")]
+    root = Path(__file__).parents[2]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=root)
+    end = time.monotonic() + 120
+    while not (tmp_path / "out").exists():
+        assert time.monotonic() < end and process.poll() is None
+        time.sleep(0.1)
+    time.sleep(1)
+    process.send_signal(signal.SIGINT)
+    said = process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    assert said.endswith("stopped; the same command goes on\n") and "Traceback" not in said

@@ -112,3 +112,73 @@ def test_a_report_imports_nothing_that_a_file_names(finished, tmp_path, capsys):
     (tmp_path / "out" / "results.json").unlink()
     rebuild(tmp_path / "out")
     assert "report:" in capsys.readouterr().out
+
+
+DROPPED = object()
+WORDS = ("expected", "again", "there is no study", "is finished")
+WRONG = [DROPPED, None, 7, "text", [], {}, [None], {"x": None}]
+
+
+def places(node):
+    """Every key and index of nested JSON, outer ones first, few of long lists."""
+    for key in list(node)[:40] if isinstance(node, dict) else range(min(len(node), 2)):
+        yield node, key
+        if isinstance(node[key], dict | list):
+            yield from places(node[key])
+
+
+@pytest.fixture(scope="module")
+def single(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("single")
+    (folder / "one.yaml").write_text(TINY)
+    quick_gap.main(["--config", str(folder / "one.yaml"), "--output", str(folder / "out")])
+    return folder / "out"
+
+
+def check_one_line(folder, capsys):
+    """A report, or one line that names a file there and exit code 2."""
+    try:
+        main([str(folder)])
+    except SystemExit as stopped:
+        said = capsys.readouterr().err
+        assert stopped.code == 2, said
+        *others, last = said.splitlines()
+        assert last.startswith("error: ") and all(line.startswith("failed: ") for line in others)
+        assert "Traceback" not in said
+        capsys.readouterr()
+
+
+@pytest.mark.parametrize("file", ["results.json", "study.json", "a trial"])
+def test_damaged_results_are_one_line(file, single, finished, tmp_path, capsys):
+    source = single if file == "results.json" else finished
+    shutil.copytree(source, tmp_path / "out")
+    path = tmp_path / "out" / file
+    if file == "a trial":
+        path = next((tmp_path / "out").glob("*/results.json"))
+    # The little study of these tests is none that a file may name.
+    for written in (tmp_path / "out").rglob("*.json"):
+        plain = json.loads(written.read_text().replace("quick_gap", "pendulum_gap"))
+        if isinstance(plain, dict):
+            plain.pop("checksum", None)
+        written.write_text(json.dumps(plain))
+    text = path.read_text()
+    for share in (0, 0.3, 0.7, 0.99):
+        path.write_text(text[: int(share * len(text))])
+        check_one_line(tmp_path / "out", capsys)
+    for whole in ("[]", "null", "3", '"x"', "{}", '{"trials": []}', '{"trials": [3]}', "[" * 9999):
+        path.write_text(whole)
+        check_one_line(tmp_path / "out", capsys)
+    # A report that comes out well all the same draws its pictures, for seconds.
+    count = len(list(places(json.loads(text))))
+    chosen = range(0, count, max(1, count // (6 if file == "results.json" else 12)))
+    for turn, index in enumerate(chosen):
+        damaged = json.loads(text)
+        damaged.pop("checksum", None)
+        node, key = list(places(damaged))[index % len(list(places(damaged)))]
+        value = WRONG[turn % len(WRONG)]
+        if value is DROPPED:
+            del node[key]
+        else:
+            node[key] = value
+        path.write_text(json.dumps(damaged))
+        check_one_line(tmp_path / "out", capsys)
