@@ -98,7 +98,8 @@ def regression(
             regression of dynamics does) rather than from one step of the simulator.
     """
     samples = Samples.join(runs, simulator.substeps)
-    nodes = np.concatenate([states(run) for run in runs])
+    by_name = {run.name: run for run in runs}
+    nodes = np.concatenate([states(by_name[name]) for name in samples.names])
     rate = nodes[:, 1]
     matrix, owner = columns(simulator, offered, samples, nodes)
     ahead = Model(simulator).advance(samples, nodes[None], np.zeros((1, 0)))[0, :, 1]
