@@ -32,7 +32,7 @@ def span(squares: Array, draws: int = 400) -> Span:
     return Span(float(np.sqrt(known.mean())), float(low), float(high))
 
 
-def noise_floor(fitter: Fitter, fit: Fit, sigma: Array, draws: int = 2) -> Array:
+def noise_floor(fitter: Fitter, fit: Fit, sigma: Array, draws: int = 4) -> Array:
     """Mean squared errors of blocks if the fitted simulator were the truth, (B, m).
 
     Its own data plus noise go through the same forecasts.
