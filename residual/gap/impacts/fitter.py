@@ -156,7 +156,8 @@ class ImpactFitter:
         begins = np.arange(count) * length
         drawn = dataclasses.replace(
             samples, seen=seen, actions=samples.actions[flat], durations=samples.durations[flat],
-            times=samples.times[flat], names=("drawn",) * count,
+            # Rows beyond a run's end are its last one again, so times are counted anew.
+            times=np.tile(samples.step * np.arange(length), count), names=("drawn",) * count,
             runs=tuple((int(a), int(a) + length) for a in begins),
             recorded=tuple(Recorded(samples.actions[r], samples.durations[r]) for r in rows),
         )  # fmt: skip
