@@ -24,16 +24,16 @@ def bounded_step(
     p = len(right)
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     matrix = matrix / np.outer(size, size) + damping * np.eye(p)
-    right, low, high = right / size, low * size, high * size
+    right, least, most = right / size, low * size, high * size
     step = np.linalg.lstsq(matrix, right, rcond=None)[0]
-    if ((step < low) | (step > high)).any():
-        step = np.clip(step, low, high)
+    if ((step < least) | (step > most)).any():
+        step = np.clip(step, least, most)
         # One unknown after the other: the problem is convex, so this ends at its least value.
         for _ in range(PASSES):
             before = step.copy()
             for i in range(p):
                 rest = right[i] - matrix[i] @ step + matrix[i, i] * step[i]
-                step[i] = min(max(rest / matrix[i, i], low[i]), high[i])
+                step[i] = min(max(rest / matrix[i, i], least[i]), most[i])
             if np.abs(step - before).max() <= 1e-9 * np.abs(step).max():
                 break
-    return np.clip(step / size, low / size, high / size)
+    return np.clip(step / size, low, high)
