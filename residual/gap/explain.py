@@ -98,7 +98,7 @@ def explain(
             alone = noise_floor(fitter, search.tried[()], floor.sigma)
             search.currency = search.currency.only_where_wrong(alone)
         run(search, seeds)
-        key = _best_explained(search)
+        key = choose(search).key
         fresh, floor = weigh(fitter, search.tried[key])
         ratio = fresh.sigma / fitter.sigma
         if search.late or ((ratio > 1 / WORTH).all() and (ratio < WORTH).all()):
@@ -106,15 +106,10 @@ def explain(
         best = sorted(search.usable(), key=search.error)[:SEEDS]
         seeds = {k: search.tried[k].theta for k in {*best, key} if k}
         fitter = fresh
-    return settle(search, floor, key)
+    return settle(search, floor)
 
 
-def _best_explained(search: Search) -> Key:
-    """What channels are weighed by: the chosen set."""
-    return choose(search).key
-
-
-def settle(search: Search, floor: Noise, key: Key) -> Explanation:
+def settle(search: Search, floor: Noise) -> Explanation:
     """The final choice, after everything chosen has met its rivals."""
     fitter = search.fitter
     nominal_left = fitter.left(search.tried[()], floor)

@@ -26,10 +26,6 @@ from sims.simulator import Hold
 
 Array = NDArray[np.float64]
 
-#: Sets listed as evidence.
-EVIDENCE = 40
-#: Rise of the loss with inputs held the other way, as a share of it, that rules that out.
-OTHER_HOLD = 0.5
 #: Part of the time budget after which nothing new is tried.
 SEARCHING = 0.7
 
@@ -59,7 +55,7 @@ def find_gap(
         effects: Effects that may be missing; by default all that the simulator can host.
         hold: How inputs run between samples, ``"zero"`` (held, as commands are) or ``"linear"``
             (straight to the next, as most measured inputs are), for all or by input; by default
-            whichever the nominal simulator fits better.
+            as the channels say, unless what is found fits clearly better the other way.
         measured_input: True if the logged inputs were measured at the actuator's output; what
             happens before that (dead zone, saturation, lag) is then no candidate.
         horizon: Forecast length in seconds; by default a third of the usual period of the motion,
@@ -89,7 +85,9 @@ def find_gap(
     for says in quality:
         tell(says)
     horizon = horizon or usual_horizon(simulator, runs)
-    kept = _asked(simulator, offered)
+    groups, sets = aliases(simulator, offered)
+    # Of effects that make the same motion the first stands for all.
+    kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
 
     def explained(simulator: HostSimulator) -> tuple[Prepared, Explanation]:
         ready = prepare(simulator, runs, horizon)
@@ -120,7 +118,6 @@ def find_gap(
                 )
         clock.lap("search")
         tell("confirming")
-        groups, sets = aliases(simulator, offered)
         answer = confirm(found, groups, matters(found, tolerance))
         clock.lap("confirm")
         table = summed_up(answer)
@@ -129,12 +126,6 @@ def find_gap(
             apart = judged_apart(answer, prepared, examine(simulator, held).trajectories, table)
         clock.lap("forecast")
     return told(answer, table, apart, sets, tolerance, quality, clock.laps)
-
-
-def _asked(simulator: HostSimulator, offered: Sequence[Effect]) -> list[Effect]:
-    """The first of every group of effects that make the same motion."""
-    groups, _ = aliases(simulator, offered)
-    return [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
 
 
 class Clock:
