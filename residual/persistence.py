@@ -26,6 +26,8 @@ _CLASSES = {
     "Linear": "residual.linear",
     "NamedEffects": "residual.named_effects",
 }
+#: Where a class's arrays or arguments changed since its first files.
+_FORMATS = {"DropoutNet": 2}
 # Steps the simulator itself; not imported here, since it brings the whole search for effects.
 _OF_SIMULATOR = "NamedEffects"
 # Far more columns than any system has; a larger number in a file is damage.
@@ -65,7 +67,7 @@ def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
             "difference models of those can be saved; any other estimator must be fitted again "
             "from its data"
         )
-    header["class"] = name
+    header["class"], header["class_format"] = name, _FORMATS.get(name, 1)
     header["params"] = {
         key: _plain(f"{name}.{key}", value)
         for key, value in estimator.get_params(deep=False).items()
@@ -120,6 +122,11 @@ def _restore(
     name = header["class"]
     if name not in _CLASSES:
         raise FileError(f"holds a {name!r}; only {', '.join(_CLASSES)} can be loaded")
+    if header.get("class_format", 1) != _FORMATS.get(name, 1):
+        raise FileError(
+            f"holds a {name} of format {header.get('class_format', 1)!r}, this release reads "
+            f"{_FORMATS.get(name, 1)}: fit it again from its data and save it"
+        )
     columns = arrays["n_features_in_"].item()
     if type(columns) is not int or not 1 <= columns <= _MOST_COLUMNS:
         raise ValueError(f"n_features_in_ is {columns}, expected 1 to {_MOST_COLUMNS}")

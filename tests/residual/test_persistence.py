@@ -27,7 +27,7 @@ OURS = [
     GaussianProcess(max_iter=5, random_state=0),
     GaussianProcess(max_iter=5, max_points=40, inducing=20, kernel="matern", random_state=0),
     DropoutNet(hidden=(16, 8), epochs=3, random_state=0),
-    DropoutNet(hidden=[16], epochs=3, dropout=0.0, patience=2),
+    DropoutNet(hidden=[16], epochs=3, dropout=0.0, fine_tuning=0.0),
 ]
 
 
@@ -131,7 +131,8 @@ def edited(path, change, tensors=None):
     ("change", "message"),
     [
         (lambda h: h.update({"class": "os.system"}), "holds a 'os.system'; only DropoutNet"),
-        (lambda h: h.update({"class": "DropoutNet"}), "damaged"),
+        (lambda h: h.update({"class": "DropoutNet"}), "DropoutNet of format 1, this release reads"),
+        (lambda h: h.update({"class": "DropoutNet", "class_format": 2}), "damaged"),
         (lambda h: h["params"].update(surprise=1), "damaged"),
         (lambda h: h["params"].update(degree=7), "damaged"),
         (lambda h: h["params"].update(angles=["__import__('os')"]), "damaged"),
