@@ -51,6 +51,7 @@ def run_trial(
         progress,
         trial.replay,
         trial.uncertainty_penalty,
+        trial.smoothing,
         study.describe(config),
     )
     learnt = run_loop(steps, trial.budget, trial.corrected)
