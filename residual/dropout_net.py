@@ -17,11 +17,6 @@ _BLOCK = 4
 _CHUNK = 4096
 #: Gradient steps of any training: few rows need more than some passes, very many rows fewer.
 _FEWEST, _MOST = 600, 8000
-#: What the authors' published training does (docs/deviations.md).
-_PAPER = {
-    "epochs": 300, "batch_size": 32, "learning_rate": 0.02, "accumulator": 0.1,
-    "fine_tuning": 0.0, "decay": 0.0,
-}  # fmt: skip
 
 
 class DropoutNet(Estimator):
@@ -110,17 +105,22 @@ class DropoutNet(Estimator):
         self._calibrate(error, self._spread(inputs[check]))
 
     def _plan(self, rows: int) -> Plan:
-        chosen = {
-            "epochs": self.epochs, "batch_size": self.batch_size,
-            "learning_rate": self.learning_rate, "accumulator": 0.0,
-            "fine_tuning": self.fine_tuning, "decay": 0.3,
-        }  # fmt: skip
+        hidden = tuple(map(int, self.hidden))
         if self.paper:
-            chosen = dict(_PAPER)
-        steps = int(chosen.pop("epochs")) * math.ceil(rows / chosen["batch_size"])
-        if not self.paper:
-            steps = min(max(steps, _FEWEST), _MOST)
-        return Plan(tuple(map(int, self.hidden)), self.dropout, steps, **chosen)
+            # 300 epochs with batches of 32: facts of the authors' code (docs/deviations.md).
+            steps = 300 * math.ceil(rows / 32)
+            return Plan(hidden, self.dropout, steps, 32, 0.02, 0.1, fine_tuning=0.0, decay=0.0)
+        steps = int(self.epochs) * math.ceil(rows / self.batch_size)
+        return Plan(
+            hidden,
+            self.dropout,
+            min(max(steps, _FEWEST), _MOST),
+            int(self.batch_size),
+            self.learning_rate,
+            accumulator=0.0,
+            fine_tuning=self.fine_tuning,
+            decay=0.3,
+        )
 
     def _check_params(self) -> None:
         if not (len(self.hidden) and all(int(width) == width >= 1 for width in self.hidden)):

@@ -105,7 +105,7 @@ class System:
     elsewhere: Callable[[np.random.Generator], tuple[Array, Array]] | None = None
     published: Mapping[str, str] = dataclasses.field(default_factory=dict)
     cold_noise_sigma: float = 0.20
-    measurement: Measurement = Measurement()
+    measurement: Measurement = dataclasses.field(default_factory=Measurement)
 
     def __post_init__(self) -> None:
         if not isinstance(self.nominal, Simulator):
