@@ -10,6 +10,7 @@ from sims.loading import corrected_settings, simulator_settings
 from sims.pendulum import Pendulum
 from sims.tasks import SwingUp
 from studies import pendulum_gap
+from studies.learning.settings import build_parser
 
 
 def test_the_difference_study_takes_a_corrected_simulator(tmp_path):
@@ -17,7 +18,7 @@ def test_the_difference_study_takes_a_corrected_simulator(tmp_path):
     path = tmp_path / "corrected.yaml"
     path.write_text(json.dumps(corrected_settings(simulator_settings(
         "sims.pendulum.Pendulum"), effects)))  # fmt: skip
-    parser = pendulum_gap.build_parser()
+    parser = build_parser(pendulum_gap.STUDY)
     chosen = parser.instantiate(parser.parse_args(["--simulator", str(path)])).simulator
     assert chosen.effects == tuple(effects)
     mine, plain = (SimulatorEnv(s, SwingUp()) for s in (chosen, Pendulum()))

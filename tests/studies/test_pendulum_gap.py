@@ -77,7 +77,7 @@ def test_the_results_are_complete(undisturbed):
         assert set(accuracy[where]["multi_step"]) == {"0.25 s", "1 s"}
         assert 0 <= accuracy[where]["coverage90"] <= 1
     assert found["versions"]["torch"] and found["config"]["budget"]["iterations"] == 1
-    assert "difference model, update 1" in out
+    assert "Linear, update 1" in out
 
 
 def test_the_folder_holds_all_that_was_made(undisturbed):
@@ -85,7 +85,7 @@ def test_the_folder_holds_all_that_was_made(undisturbed):
     made = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     assert made >= {
         "results.json", "report.html", "config.yaml", "figures/trajectories.png",
-        "figures/trajectories.csv", "figures/accuracy.png", "policies/idealised.safetensors",
+        "figures/trajectories.csv", "figures/updates.png", "policies/idealised.safetensors",
         "policies/difference-1.safetensors", "models/difference-1.safetensors",
     }  # fmt: skip
     page = (folder / "report.html").read_text()
