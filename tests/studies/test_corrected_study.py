@@ -24,8 +24,8 @@ def test_the_difference_study_takes_a_corrected_simulator(tmp_path):
     mine, plain = (SimulatorEnv(s, SwingUp()) for s in (chosen, Pendulum()))
     assert mine.observation_space == plain.observation_space
     arguments = [
-        "--simulator", str(path), "--budget.iterations", "0", "--budget.idealised_steps", "1100",
-        "--ddpg.hidden", "[16, 16]", "--output", str(tmp_path / "policy"),
+        "--simulator", str(path), "--budget.iterations", "0", "--budget.idealised_steps", "300",
+        "--ddpg.hidden", "[16, 16]", "--ddpg.warm_up", "100", "--output", str(tmp_path / "policy"),
     ]  # fmt: skip
     pendulum_gap.main(arguments)
     config = json.loads((tmp_path / "policy" / "results.json").read_text())["config"]
