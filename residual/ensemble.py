@@ -6,7 +6,7 @@ import inspect
 from typing import Any, Self
 
 import numpy as np
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.linear_model import BayesianRidge
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.utils import check_random_state
@@ -45,7 +45,7 @@ class Ensemble(Estimator):
 
     def __init__(
         self,
-        regressor: Any = None,
+        regressor: BaseEstimator | None = None,
         n: int = 5,
         bootstrap: bool = True,
         random_state: int | None = None,
