@@ -142,7 +142,7 @@ def widened(
     for j, k in zip(own, there, strict=True):
         knob = fit.model.knobs[j]
         number = claim.numbers[knob.field]
-        # Quadrature: the errors of the data and of the parameters have nothing to do with each other.
+        # In quadrature: errors of the data have nothing to do with those of the parameters.
         low = number.value - np.hypot(number.value - number.low, shifts[j])
         high = number.value + np.hypot(number.high - number.value, shifts[j])
         if usable:
