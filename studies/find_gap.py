@@ -57,8 +57,8 @@ class GapStudy:
         horizon: Forecast length in s that matters to you; by default a quarter of the usual
             period of the motion.
         parameter_tolerance: How well the parameters of the simulator are known, as a share of
-            each. While more than noise is left, an effect is certain only if they cannot stand in
-            for it within that, and its interval allows for them; 0 takes them for exact.
+            each: an effect is certain only if they cannot stand in for it within that, and its
+            interval allows for them; 0 takes them for exact.
         minutes: Budget of processor time; what has not been tried by then is left out.
     """
 

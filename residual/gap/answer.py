@@ -90,8 +90,7 @@ def confirm(
         blocks = len(search.fitter.blocks)
         lost = [claim for claim in made if not nameable(search, claim, blocks)]
         if not lost:
-            if not found.adequate:
-                made = allow_for_parameters(search, key, made, parameter_tolerance)
+            made = allow_for_parameters(search, key, made, found.adequate, parameter_tolerance)
             return Answer(found, key, tuple(made), leads)
         # The one that matters least goes first: what is left may have fewer rivals.
         gone = lost[-1].number

@@ -62,9 +62,9 @@ def find_gap(
             happens before that (dead zone, saturation, lag) is then no candidate.
         horizon: Forecast length in seconds; by default a third of the usual period of the motion,
             see ``residual.gap.horizon``.
-        parameter_tolerance: How well the simulator's parameters are known, as a share of each.
-            While more than noise is left, an effect is certain only if they cannot stand in for it
-            within that, and its interval allows for them.
+        parameter_tolerance: How well the simulator's parameters are known, as a share of each: an
+            effect is certain only if they cannot stand in for it within that, and its interval
+            allows for them. 0 takes them for exact, so that intervals are of the data alone.
         minutes: Budget of processor time, so that a busy machine finds the same: the search for
             further explanations ends in time.
         n_jobs: Processes for a simulator that steps row by row.

@@ -1,8 +1,8 @@
 """What parameters of the nominal simulator do to an answer, if they are a little off.
 
-No parameter is known exactly. While a remainder is left, an effect is certain only if forecasts
-need it also where every parameter may differ by its tolerance, and the interval of a number says
-how far it may lie off because they do. Where nothing but noise is left, chance alone decides.
+No parameter is known exactly, so an effect is certain only if it is needed also where every
+parameter may differ by its tolerance, and the interval of a number says how far it may lie off
+because they do.
 """
 
 from __future__ import annotations
@@ -13,13 +13,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.bounded import bounded_step
 from residual.gap.candidates import Candidate, candidates
-from residual.gap.confirmation import CLEARLY, Claim, where_it_matters
+from residual.gap.confirmation import CLEARLY, Claim, tie, where_it_matters
 from residual.gap.fitting import Fit
 from residual.gap.intervals import deviations
 from residual.gap.model import Model
 from residual.gap.result import Number
 from residual.gap.search import Key, Search
+from residual.gap.significance import size
 from residual.gap.validation import validate
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
@@ -28,12 +30,14 @@ Array = NDArray[np.float64]
 
 #: How well a parameter is taken to be known, as a share of it.
 KNOWN = 0.03
+#: Errors of a forecast count up to so many times the usual one of the nominal simulator.
+BEYOND = 3.0
 #: Parameters that are allowed for, those that matter most.
 MOST = 12
 
 
 def allow_for_parameters(
-    search: Search, key: Key, claims: Sequence[Claim], tolerance: float
+    search: Search, key: Key, claims: Sequence[Claim], adequate: bool, tolerance: float
 ) -> list[Claim]:
     """The claims with parameters allowed for.
 
@@ -41,26 +45,27 @@ def allow_for_parameters(
         search: With the chosen set.
         key: The chosen set.
         claims: Of its members.
+        adequate: Whether only noise is left, so that chance decides.
         tolerance: How well parameters are known, as a share of each.
     """
-    if not claims:
-        return []
+    parameters = allowed(search, tolerance) if claims else []
+    if not parameters:
+        return list(claims)
     search.add_without_each(key)
-    parameters = allowed(search, tolerance)
-    if parameters:
-        fit, errors = calibrated(search, key, parameters)
-        told = []
-        for claim in claims:
-            if claim.sure:
-                rest = tuple(i for i in key if i != claim.number)
+    beside = calibrated(search, key, parameters)
+    told = []
+    for claim in claims:
+        if claim.sure:
+            without = calibrated(search, tuple(i for i in key if i != claim.number), parameters)
+            if adequate:
+                price = np.log(size(search)) * len(claim.numbers) + tie(search)
+                enough = without.fit.merit <= beside.fit.merit + price
+            else:
                 group = where_it_matters(search, key, claim.number)
-                _, without = calibrated(search, rest, parameters)
-                enough = without[group] <= CLEARLY * errors[group]
-                claim = dataclasses.replace(claim, calibration=bool(enough))
-            told.append(claim)
-        shifts = by_parameters(fit, len(search.tried[key].theta), parameters)
-    else:
-        told, shifts = list(claims), np.zeros(len(search.tried[key].theta))
+                enough = without.errors[group] <= CLEARLY * beside.errors[group]
+            claim = dataclasses.replace(claim, calibration=bool(enough))
+        told.append(claim)
+    shifts = by_parameters(beside.fit, len(search.tried[key].theta))
     return [widened(search, key, claim, told, shifts) for claim in told]
 
 
@@ -88,19 +93,31 @@ def allowed(search: Search, tolerance: float) -> list[Candidate]:
     return [found[i] for i in np.sort(np.argsort(-matters)[:MOST])]
 
 
-def calibrated(search: Search, key: Key, parameters: Sequence[Candidate]) -> tuple[Fit, Array]:
-    """A set with all parameters free within their tolerance: its fit, and errors by joint, (g,)."""
+@dataclasses.dataclass(frozen=True)
+class Calibrated:
+    """A set beside which all parameters are free within their tolerance.
+
+    Attributes:
+        fit: Its fit, the numbers of the set first.
+        errors: Cross-validated forecast errors by joint, (g,).
+    """
+
+    fit: Fit
+    errors: Array
+
+
+def calibrated(search: Search, key: Key, parameters: Sequence[Candidate]) -> Calibrated:
+    """A set fitted with all parameters free within their tolerance."""
     chosen = [search.candidates[i] for i in key]
     names = {candidate.label for candidate in chosen}
     free = [candidate for candidate in parameters if candidate.label not in names]
     start = np.append(search.tried[key].theta, np.zeros(len(free)))
-    model = Model(search.simulator, [*chosen, *free])
-    fit = search.fitter.fit(model, start, search.tried[key])
+    fit = search.fitter.fit(Model(search.simulator, [*chosen, *free]), start, search.tried[key])
     squares = validate(search.fitter, fit).squares
-    return fit, search.currency.by_group(squares)
+    return Calibrated(fit, search.currency.by_group(squares))
 
 
-def by_parameters(fit: Fit, count: int, parameters: Sequence[Candidate]) -> Array:
+def by_parameters(fit: Fit, count: int) -> Array:
     """How far the first numbers of a fit lie off if its last ones do by their tolerance, (count,).
 
     Errors of the parameters are taken to be independent.
@@ -121,6 +138,9 @@ def widened(
 ) -> Claim:
     """A claim with intervals that hold with and without its companions that are not certain.
 
+    They hold, too, for the numbers that forecast best. Of a model that is right, those are the
+    numbers of the fit; of one that leaves a remainder, each weighs that in its own way.
+
     Args:
         search: With the chosen set.
         key: The chosen set.
@@ -134,6 +154,7 @@ def widened(
     )
     search.add({smaller: theta})
     fit, alone = search.tried[key], search.tried[smaller]
+    best = best_forecasts(search, smaller)
     own = np.flatnonzero(fit.model.owner == key.index(claim.number))
     there = np.flatnonzero(alone.model.owner == smaller.index(claim.number))
     half = 1.96 * deviations(alone, search.fitter.blocks)
@@ -147,8 +168,31 @@ def widened(
         high = number.value + np.hypot(number.high - number.value, shifts[j])
         if usable:
             reach = float(np.hypot(half[k], shifts[j]))
-            low, high = min(low, alone.theta[k] - reach), max(high, alone.theta[k] + reach)
+            least, most = sorted((alone.theta[k], best[k]))
+            low, high = min(low, least - reach), max(high, most + reach)
         numbers[knob.field] = dataclasses.replace(
             number, low=max(float(low), knob.low), high=min(float(high), knob.high)
         )
     return dataclasses.replace(claim, numbers=numbers)
+
+
+def best_forecasts(search: Search, key: Key) -> Array:
+    """Numbers with which a set's forecasts are best in least squares, (p,), a step from its fit."""
+    fitter, fit = search.fitter, search.tried[key]
+    samples, windows = fitter.samples, fitter.blocks.windows
+    seen = samples.seen[windows.index][..., samples.measured]
+    usual = np.sqrt(np.nanmean(search.validated[()].foretold.squares, axis=0))
+    everywhere = np.zeros(len(windows), np.int64)
+
+    def errors(theta: Array) -> Array:
+        shown = fitter.foretell(fit.model, theta[None], everywhere, fit).shown
+        wrong = np.where(windows.inside[..., None], (seen - shown) / usual, 0.0)
+        return np.nan_to_num(np.clip(wrong, -BEYOND, BEYOND)).ravel()
+
+    theta, step = fit.theta, np.maximum(0.02 * np.abs(fit.theta), 0.1 * fit.model.step)
+    step = np.where(theta + step > fit.model.high, -step, step)
+    here = errors(theta)
+    slopes = [(errors(theta + np.eye(len(theta))[j] * h) - here) / h for j, h in enumerate(step)]
+    slope = np.stack(slopes, axis=1)
+    low, high = fit.model.low - theta, fit.model.high - theta
+    return theta + bounded_step(slope.T @ slope, -slope.T @ here, low, high)
