@@ -8,7 +8,6 @@ import json
 import math
 import os
 import secrets
-import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -72,12 +71,6 @@ def atomic_write_json(path: str | Path, value: Any) -> None:
     """
     text = json.dumps(jsonable(value), indent=2, ensure_ascii=False, allow_nan=False)
     atomic_write_text(path, text + "\n")
-
-
-def copy_file(source: str | Path, target: str | Path) -> None:
-    """Copy a file, whole or not at all; missing folders are made."""
-    with atomic_path(target) as temporary:
-        shutil.copyfile(source, temporary)
 
 
 def read_json(path: str | Path) -> Any:

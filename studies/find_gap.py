@@ -33,10 +33,10 @@ from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Hold, Simulator
-from studies.gap.files import CORRECTED, REPORT, check_folder, write_gap
+from studies.gap.files import CORRECTED, REPORT, write_gap
 from studies.gap.progress import Heartbeat
 from studies.gap.summary import found_in_data, summary
-from studies.running.command import HelpFormatter, Parser, fail, guarded
+from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,7 +130,8 @@ def run(
 
     Raises:
         ValueError: A log, the simulator or an effect cannot be used; the message is one line.
-        SystemExit: A setting is wrong; one line on stderr says which.
+        SystemExit: A setting is wrong, or the folder cannot be written; one line on stderr says
+            which.
     """
     begin = time.perf_counter()
     tell = progress or (lambda _: None)
@@ -145,7 +146,7 @@ def run(
     simulator = hosting(study.simulator)
     hold = holds(simulator, study.hold)
     effects = not_upstream(chosen_effects(simulator, chosen.effects), hold)
-    check_folder(Path(output))
+    check_output(output)
     # In whatever order the files come, not one digit of the answer changes.
     data = read(simulator, sorted(chosen.logs), study.columns)
     held = apart(simulator, chosen.logs, chosen.held_out or [], study.columns)

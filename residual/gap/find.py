@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,8 @@ from residual.gap.tolerance import KNOWN
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
-from sims.effects.library import library
 from sims.host import HostSimulator
+from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Hold
 
 Array = NDArray[np.float64]
@@ -37,7 +38,7 @@ def find_gap(
     *,
     held: Sequence[Trajectory] = (),
     tolerance: float | None = None,
-    effects: Iterable[Effect] | None = None,
+    effects: Iterable[Effect | str | Mapping[str, Any]] | None = None,
     hold: Hold | Mapping[str, Hold] | None = None,
     measured_input: bool = False,
     horizon: float | None = None,
@@ -54,7 +55,8 @@ def find_gap(
         held: Runs that are used for the final table only.
         tolerance: Forecast error that does not matter, in the unit of the first measured
             position; below it the verdict is "nothing that matters".
-        effects: Effects that may be missing; by default all that the simulator can host.
+        effects: Effects that may be missing, as objects or by name (``sims.loading.
+            chosen_effects``); by default all that the simulator can host.
         hold: How inputs run between samples, ``"zero"`` (held, as commands are) or ``"linear"``
             (straight to the next, as most measured inputs are), for all or by input; by default
             as the channels say, unless what is found fits clearly better the other way.
@@ -81,7 +83,7 @@ def find_gap(
     clock = Clock()
     tell = progress or (lambda _: None)
     until = time.process_time() + 60 * minutes * SEARCHING
-    offered = tuple(library(simulator) if effects is None else effects)
+    offered = chosen_effects(simulator, [LIBRARY] if effects is None else list(effects))
     if measured_input:
         offered = tuple(e for e in offered if not e.upstream_of_sensor)
     examined = examine(simulator, trajectories)

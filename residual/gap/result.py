@@ -80,6 +80,9 @@ class Verdict:
     doubts: tuple[Doubt, ...] = ()
     follows: str = ""
 
+    def __repr__(self) -> str:
+        return f"Verdict({self.kind}: {self.says})"[:180]
+
 
 @dataclasses.dataclass(frozen=True)
 class Step:
@@ -249,3 +252,8 @@ class GapResult:
     blind: tuple[Blind, ...]
     adequate: bool
     seconds: dict[str, float]
+
+    def __repr__(self) -> str:
+        kinds = "; ".join(f"{v.effect} {v.kind}".strip() for v in self.verdicts[:4])
+        before, after = self.gap.before.value, self.gap.after.value
+        return f"{type(self).__name__}({kinds}; error {before:.3g} -> {after:.3g})"[:180]
