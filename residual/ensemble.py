@@ -58,7 +58,8 @@ class Ensemble(Estimator):
     @available_if(lambda self: hasattr(self.regressor, "for_simulator"))
     def for_simulator(self, simulator: Simulator) -> Self:
         """An unfitted copy whose regressor is configured for this simulator's raw rows."""
-        return clone(self).set_params(regressor=self.regressor.for_simulator(simulator))
+        regressor: Any = self.regressor
+        return clone(self).set_params(regressor=regressor.for_simulator(simulator))
 
     def _fit(self, X: Array, y: Array) -> None:
         if not self.n >= 2:
