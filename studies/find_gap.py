@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import yaml
-from jsonargparse.typing import PositiveFloat, PositiveInt
+from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
 from residual.logs import LogData, LogFormat, read_logs
@@ -56,6 +56,9 @@ class GapStudy:
             happens before an input said to be "linear" (dead zone, lag) is no candidate.
         horizon: Forecast length in s that matters to you; by default a quarter of the usual
             period of the motion.
+        parameter_tolerance: How well the parameters of the simulator are known, as a share of
+            each: an effect is certain only if they cannot stand in for it within that, and its
+            interval allows for them; 0 takes them for exact.
         minutes: Budget of processor time; what has not been tried by then is left out.
     """
 
@@ -64,6 +67,7 @@ class GapStudy:
     tolerance: PositiveFloat | None = None
     hold: Literal["auto", "zero", "linear"] | dict[str, Literal["zero", "linear"]] = "auto"
     horizon: PositiveFloat | None = None
+    parameter_tolerance: NonNegativeFloat = 0.03
     minutes: PositiveFloat = 2.0
 
 
@@ -157,6 +161,7 @@ def run(
         effects=effects,
         hold=hold or None,
         horizon=study.horizon,
+        parameter_tolerance=study.parameter_tolerance,
         minutes=study.minutes,
         n_jobs=jobs,
         progress=tell,

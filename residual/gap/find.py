@@ -18,6 +18,7 @@ from residual.gap.horizon import usual_horizon
 from residual.gap.numerics import fits_better, forecast_error, held_as, held_otherwise, how_held
 from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import GapResult
+from residual.gap.tolerance import KNOWN
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
@@ -41,6 +42,7 @@ def find_gap(
     hold: Hold | Mapping[str, Hold] | None = None,
     measured_input: bool = False,
     horizon: float | None = None,
+    parameter_tolerance: float = KNOWN,
     minutes: float = 2.0,
     n_jobs: int = 1,
     progress: Callable[[str], None] | None = None,
@@ -62,6 +64,9 @@ def find_gap(
             happens before that (dead zone, saturation, lag) is then no candidate.
         horizon: Forecast length in seconds; by default a third of the usual period of the motion,
             see ``residual.gap.horizon``.
+        parameter_tolerance: How well the simulator's parameters are known, as a share of each: an
+            effect is certain only if they cannot stand in for it within that, and its interval
+            allows for them. 0 takes them for exact, so that intervals are of the data alone.
         minutes: Budget of processor time, so that a busy machine finds the same: the search for
             further explanations ends in time.
         n_jobs: Processes for a simulator that steps row by row.
@@ -120,7 +125,7 @@ def find_gap(
                 )
         clock.lap("search")
         tell("confirming")
-        answer = confirm(found, groups, matters(found, tolerance))
+        answer = confirm(found, groups, matters(found, tolerance), parameter_tolerance)
         clock.lap("confirm")
         table = summed_up(answer)
         apart = None
