@@ -171,6 +171,12 @@ class System:
                 f"({', '.join(c.name for c in self.nominal.state_channels)}): {error}"
             ) from error
 
+    def code(self) -> list[Any]:
+        """The objects and functions whose code says what the system is."""
+        inside = getattr(self.true, "unwrapped", None)
+        given = [self.true, inside, self.state_of, self.measures, self.elsewhere]
+        return [self.nominal, self.task, *(part for part in given if part is not None)]
+
     def channel_groups(self) -> dict[str, tuple[str, ...]]:
         """State channels by the name under which their errors are averaged."""
         if self.groups is not None:
@@ -203,11 +209,20 @@ def physical(channels: tuple[Channel, ...]) -> tuple[Channel, ...]:
     return tuple(channel for channel in channels if channel.kind != "memory")
 
 
-def check_same_channels(nominal: Simulator, other: Simulator, what: str) -> None:
-    """Raise ``ValueError`` unless both have the same channels, memory apart, and one period."""
+def check_same_channels(
+    nominal: Simulator, other: Simulator, what: str, memory: bool = False
+) -> None:
+    """Raise ``ValueError`` unless both have one period and the same channels.
+
+    Args:
+        nominal, other: The two.
+        what: The other one in words.
+        memory: Whether the hidden memory of effects counts.
+    """
     for kind in ("state_channels", "action_channels"):
         own, others = (
-            [channel.name for channel in physical(getattr(one, kind))] for one in (nominal, other)
+            [c.name for c in getattr(one, kind) if memory or c.kind != "memory"]
+            for one in (nominal, other)
         )
         if own != others:
             raise ValueError(

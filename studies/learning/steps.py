@@ -263,17 +263,10 @@ class Steps:
             "seed": self.seed,
         }
 
-    @cached_property
-    def _code(self) -> list[Any]:
-        system = self.system
-        inside = getattr(system.true, "unwrapped", None)
-        given = (system.true, inside, system.state_of, system.measures, system.elsewhere)
-        parts = [Steps, system.nominal, system.task, self.algorithm.kind()]
-        return parts + [part for part in given if part is not None]
-
     def _kept(self, name: str, settings: Any, compute: Any, load: Any, *code: Any) -> Any:
         if self.keeper is None:
             return compute()
         everything = {**self._common, **settings}
-        roots = [*self._code, *code, *sorted(modules_in(everything))]
+        roots = [Steps, self.algorithm.kind(), *self.system.code(), *code]
+        roots += sorted(modules_in(everything))
         return self.keeper.run(name, everything, roots, compute, load)

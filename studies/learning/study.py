@@ -16,7 +16,7 @@ from policy.config import DDPGConfig
 from policy.learner import OURS, Algorithm
 from residual import DropoutNet
 from sims.simulator import Simulator
-from sims.system import System
+from sims.system import System, check_same_channels
 from studies.learning.budget import Budget
 from studies.learning.warm_start import ReplayRule
 
@@ -100,7 +100,9 @@ class Study:
             system = system.with_nominal(trial.simulator)
         trial.budget.check(trial.algorithm, trial.replay == "all", trial.corrected is not None)
         if trial.corrected is not None:
-            _check_corrected(system.nominal, trial.corrected)
+            # Delay, lag and play have a memory, which is more state than the nominal one has.
+            named = f"corrected: {trial.corrected.name} (--simulator takes any)"
+            check_same_channels(system.nominal, trial.corrected, named, memory=True)
         memory = [c.name for c in system.nominal.state_channels if c.kind == "memory"]
         if memory and trial.budget.iterations:
             raise ValueError(
@@ -119,21 +121,3 @@ class Study:
         """Plain settings behind the system of a trial."""
         shared = {field.name for field in dataclasses.fields(Trial)} - {"simulator"}
         return {name: config.get(name) for name in self.settings if name not in shared}
-
-
-def _check_corrected(nominal: Simulator, corrected: Simulator) -> None:
-    """Delay, lag and play have a memory, which is more state than the nominal simulator has."""
-    for what in ("state_channels", "action_channels"):
-        own, others = (
-            [channel.name for channel in getattr(one, what)] for one in (nominal, corrected)
-        )
-        if own != others:
-            raise ValueError(
-                f"corrected: {corrected.name} has {what.replace('_', ' ')} {', '.join(others)}, "
-                f"expected {', '.join(own)} as {nominal.name}; --simulator trains on any simulator"
-            )
-    if nominal.dt != corrected.dt:
-        raise ValueError(
-            f"corrected: {corrected.name} has dt {corrected.dt:g} s, expected {nominal.dt:g} s as "
-            f"{nominal.name}; --simulator trains on any simulator"
-        )

@@ -24,15 +24,15 @@ from studies.running.progress import Progress
 
 
 def run_trial(
-    study: Study, config: Config, folder: Path, kept: Path, progress: Progress
+    study: Study, kept: Path, config: Config, folder: Path, progress: Progress
 ) -> dict[str, Any]:
     """One trial of a study.
 
     Args:
         study: Which one.
+        kept: Where finished steps are kept and found again.
         config: The settings of the study's trial as plain values, as the parser dumps them.
         folder: For policies, models and rollouts.
-        kept: Where finished steps are kept and found again.
         progress: Told of every step.
 
     Returns:
@@ -79,10 +79,9 @@ def code_of_trial(study: Study, config: Config) -> str:
     """A hash of the code behind a trial's result: when it changes, the result is not right."""
     trial = instantiate(study, config)
     system = study.system_of(trial)
-    given = [system.true, system.state_of, system.measures, system.elsewhere, trial.corrected]
-    parts = [part for part in given if part is not None]
+    corrected = [] if trial.corrected is None else [trial.corrected]
     code = code_of(
-        run_trial, study.trial, study.system, system.nominal, system.task, trial.estimator,
-        trial.algorithm.kind(), *parts,
+        run_trial, study.trial, study.system, *system.code(), trial.estimator,
+        trial.algorithm.kind(), *corrected,
     )  # fmt: skip
     return hashlib.sha256(json.dumps(code).encode()).hexdigest()

@@ -105,8 +105,8 @@ def write_report(
         drawings.append((
             "updates", updates_figure(once), "Return by update",
             "Return on the true system after each update, with and without a difference model.",
-            "Mean over seeds and its 95 % interval, in tests on the true system that are not "
-            "counted as samples; dashed, learnt on the true system.",
+            "In tests on the true system that are not counted as samples; of several seeds the "
+            "mean and its 95 % interval; dashed, learnt on the true system.",
         ))  # fmt: skip
     if len(results) == 1:
         drawings.append((

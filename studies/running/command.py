@@ -40,6 +40,7 @@ class Parser(jsonargparse.ArgumentParser):
     """An argument parser whose errors are one line on stderr, with exit code 2."""
 
     def __init__(self, *given: Any, **options: Any) -> None:
+        options.setdefault("formatter_class", HelpFormatter)
         options.setdefault("epilog", f"{_DEBUG}, or {_DEBUG_VARIABLE}=1, shows where errors arise.")
         super().__init__(*given, **options)
 
