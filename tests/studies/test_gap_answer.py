@@ -99,7 +99,7 @@ def test_a_wide_interval_says_how_narrow_it_would_be_for_an_exact_simulator():
         verdict = dataclasses.replace(MASS, parameters={"change": change})
         lines = notes(verdict, result(verdict))
         exact = [line for line in lines if "if all else in the simulator is exact" in line]
-        assert exact == (["0.03490 to 0.03510 kg if all else in the simulator is exact"] * said)
+        assert exact == (["0.034900 to 0.035100 kg if all else in the simulator is exact"] * said)
 
 
 def test_a_provisional_answer_says_how_much_more_data_would_do():
