@@ -21,13 +21,18 @@ Doubt = Literal["not_needed", "unsteady", "numerics", "at_bound", "calibration",
 
 @dataclasses.dataclass(frozen=True)
 class Number:
-    """A fitted number with its 95 % interval and unit; at a bound it has none that means much."""
+    """A fitted number with its 95 % interval and unit; at a bound it has none that means much.
+
+    ``if_exact`` is the interval if everything else in the simulator were exactly right; None if
+    the simulator was taken for exact anyway.
+    """
 
     value: float
     low: float
     high: float
     unit: str
     at_bound: bool = False
+    if_exact: tuple[float, float] | None = None
 
 
 @dataclasses.dataclass(frozen=True)

@@ -171,7 +171,10 @@ def widened(
             least, most = sorted((alone.theta[k], best[k]))
             low, high = min(low, least - reach), max(high, most + reach)
         numbers[knob.field] = dataclasses.replace(
-            number, low=max(float(low), knob.low), high=min(float(high), knob.high)
+            number,
+            low=max(float(low), knob.low),
+            high=min(float(high), knob.high),
+            if_exact=(number.low, number.high),
         )
     return dataclasses.replace(claim, numbers=numbers)
 
