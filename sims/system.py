@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 
 from sims.environment import SimulatorEnv
+from sims.measured import MeasuredEnv, Measurement
 from sims.sampled import SampledEnv, StateOf
 from sims.simulator import Array, Channel, Simulator
 from sims.tasks import Task
@@ -83,6 +84,8 @@ class System:
             true system is a simulator.
         published: For tables: what others published, by kind of policy.
         cold_noise_sigma: Exploration noise of policies that are learnt from nothing.
+        measurement: What sensors show of the true system: all that policies, collecting and
+            testing see of it. Rewards, and what is reported, are of the true states.
 
     Raises:
         ValueError: Two parts do not fit together; the message says which.
@@ -102,6 +105,7 @@ class System:
     elsewhere: Callable[[np.random.Generator], tuple[Array, Array]] | None = None
     published: Mapping[str, str] = dataclasses.field(default_factory=dict)
     cold_noise_sigma: float = 0.20
+    measurement: Measurement = dataclasses.field(default_factory=Measurement)
 
     def __post_init__(self) -> None:
         if not isinstance(self.nominal, Simulator):
@@ -138,8 +142,10 @@ class System:
             true = true()
         if isinstance(true, Simulator):
             check_same_channels(self.nominal, true, f"system {self.name}: the true system")
-            return SimulatorEnv(true, self.task)
-        return SampledEnv(true, self.nominal, self.task, self.state_of)
+            env: gymnasium.Env[Any, Any] = SimulatorEnv(true, self.task)
+        else:
+            env = SampledEnv(true, self.nominal, self.task, self.state_of)
+        return MeasuredEnv(env, self.nominal, self.measurement) if self.measurement else env
 
     @property
     def can_learn_on_truth(self) -> bool:

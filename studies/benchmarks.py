@@ -50,7 +50,7 @@ NOTES = """\
   B (40, 18), 1 % noise (`tests/benchmarks/fit_at_scale.py`); held-out error is RMS error over RMS
   target at 4000 other rows without noise. Each fit has a process of its own and is run once;
   seconds are wall time on one thread. Peak memory is the whole process's, libraries and data
-  included. DropoutNet stops after 3 passes without a lower held-out error.
+  included.
 - Predictions are means, fitted on 3750 points, reached through `DifferenceModel` as the corrected
   simulator reaches them; features and checks of the input are part of the time, for peers too.
   The length scales of GaussianProcessRegressor are given here, they do not change the time.

@@ -15,6 +15,7 @@ from sklearn.base import BaseEstimator
 from policy.config import DDPGConfig
 from policy.learner import OURS, Algorithm
 from residual import DropoutNet
+from sims.measured import Measurement
 from sims.simulator import Simulator
 from sims.system import System, check_same_channels
 from studies.learning.budget import Budget
@@ -45,6 +46,10 @@ class Trial:
             such as the corrected.yaml of find_gap.
         corrected: A simulator with what it lacked, such as the corrected.yaml of find_gap: a
             policy is trained on it too, from the idealised one, without a true sample.
+        measure: What sensors show of the true system, to the policy and to the difference model;
+            by default all of the state, without error.
+        smoothing: Learn the difference from smoothed paths where states are measured; false takes
+            one measured state from the next.
     """
 
     estimator: BaseEstimator = dataclasses.field(default_factory=DropoutNet)
@@ -57,6 +62,8 @@ class Trial:
     replay: ReplayRule = "first"
     simulator: Simulator | None = None
     corrected: Simulator | None = None
+    measure: Measurement = dataclasses.field(default_factory=Measurement)
+    smoothing: bool = True
 
     @property
     def algorithm(self) -> Algorithm:
@@ -98,6 +105,12 @@ class Study:
         system = self.system(trial)
         if trial.simulator is not None:
             system = system.with_nominal(trial.simulator)
+        trial.measure.check(system.nominal)
+        if trial.measure.unmeasured and not trial.smoothing:
+            raise ValueError(
+                "smoothing is false, but measure.unmeasured leaves no state to take differences of"
+            )
+        system = dataclasses.replace(system, measurement=trial.measure)
         trial.budget.check(trial.algorithm, trial.replay == "all", trial.corrected is not None)
         if trial.corrected is not None:
             # Delay, lag and play have a memory, which is more state than the nominal one has.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import json
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 import threadpoolctl
 import torch
 
-from residual.persistence import save
+from residual.persistence import is_ours, save
 from simgap_files import atomic_path
 from studies.learning.fingerprint import code_of
 from studies.learning.kept import OnDisk
@@ -51,6 +52,7 @@ def run_trial(
         progress,
         trial.replay,
         trial.uncertainty_penalty,
+        trial.smoothing,
         study.describe(config),
     )
     learnt = run_loop(steps, trial.budget, trial.corrected)
@@ -60,8 +62,8 @@ def run_trial(
             arrays: dict[str, Any] = training.episode
             np.savez_compressed(path, **arrays)
     for number, model in enumerate(learnt.models, start=1):
-        # Other libraries' estimators have no file format but pickle.
-        if type(model.estimator).__module__.startswith("residual."):
+        # Another library's estimator needs skops, which may not be there.
+        if is_ours(model.fitted()) or importlib.util.find_spec("skops"):
             save(model, folder / "models" / f"difference-{number}.safetensors")
     return {
         "study": study.name,

@@ -74,8 +74,8 @@ def write_report(
     sections: list[Section] = headline(once, errors, about, best)
     if failures:
         text = "\n".join(f"{path}\n{failure}" for path, failure in failures.items())
-        told = f"{len(failures)} trials failed and are in no mean"
-        sections.append(Code(text, summary=told, heading="Failed trials"))
+        count = f"{len(failures)} trials failed and are in no mean"
+        sections.append(Code(text, summary=count, heading="Failed trials"))
     drawings = []
     if episodes:
         titles = _shown(results[0])
@@ -131,7 +131,9 @@ def write_report(
         own = [results[0].get("label", ""), f"seed {results[0].get('seed', 0)}"]
         subtitle = ", ".join(filter(None, own))
     Report(title, subtitle, sections).write(folder / name)
-    return summary.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
+    # What others published makes lines too long for a terminal.
+    told = summary.drop(columns="published", errors="ignore")
+    return told.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
 
 
 def _shown(results: Results) -> dict[str, str]:
