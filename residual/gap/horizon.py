@@ -19,8 +19,8 @@ TURNING = np.pi / np.sqrt(3)
 PART = 1 / 3
 #: Windows that the records should at least be good for.
 WINDOWS = 8
-#: Least samples of a window.
-SAMPLES = 8
+#: Least samples of a window, and of a forecast of a system that strikes the ground.
+SAMPLES, STRIDE = 8, 10
 
 
 def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> float:
@@ -54,7 +54,8 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
     part = 2 * PART if simulator.has_contacts else PART
     wanted = part * float(np.median(periods)) if periods else 20 * simulator.dt
     most = (1 - LEAD) * min(total / WINDOWS, longest)
-    return float(max(min(wanted, most), (1 - LEAD) * SAMPLES * step))
+    least = STRIDE if simulator.has_contacts else (1 - LEAD) * SAMPLES
+    return float(max(min(wanted, most), least * step))
 
 
 def _period(trajectories: Sequence[Trajectory], column: int, angle: bool) -> float:
