@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import hashlib
 import json
 import math
 import os
@@ -15,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+FORMAT = 2
 _PARTIAL = ".partial-"
 
 
@@ -72,6 +74,39 @@ def atomic_write_json(path: str | Path, value: Any) -> None:
     """
     text = json.dumps(jsonable(value), indent=2, ensure_ascii=False, allow_nan=False)
     atomic_write_text(path, text + "\n")
+
+
+def write_sealed(path: str | Path, value: Mapping[str, Any]) -> None:
+    """Write an object to ``path`` as JSON with a format version and a checksum of its content."""
+    plain = jsonable({**value, "format": FORMAT})
+    atomic_write_json(path, {**plain, "checksum": _checksum(plain)})
+
+
+def read_sealed(path: str | Path) -> dict[str, Any]:
+    """What ``write_sealed`` wrote; a file without version and checksum is of an earlier release.
+
+    Raises:
+        ValueError: It is damaged, or of another release; the message names it.
+    """
+    found = read_json(path)
+    if not isinstance(found, dict):
+        raise ValueError(f"{path} is damaged: expected a JSON object")
+    checksum = found.pop("checksum", None)
+    if found.get("format", FORMAT) != FORMAT:
+        raise ValueError(
+            f"{path} has format version {found['format']!r:.40}, this release reads {FORMAT}: give "
+            "the command that wrote it again"
+        )
+    if checksum is None and "format" in found:
+        raise ValueError(f"{path} is damaged: its checksum is missing")
+    if checksum is not None and checksum != _checksum(found):
+        raise ValueError(f"{path} is damaged: its content does not have its checksum")
+    found.pop("format", None)
+    return found
+
+
+def _checksum(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
 def copy_file(source: str | Path, target: str | Path) -> None:

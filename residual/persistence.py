@@ -109,7 +109,10 @@ def load(path: str | Path, simulator: Simulator | None = None) -> Any:
             f"({type(error).__name__}: {error}): save the model again"
         ) from error
     if simulator is not None and isinstance(model, DifferenceModel):
-        model.check_fits(simulator)
+        try:
+            model.check_fits(simulator)
+        except ValueError as error:
+            raise FileError(f"{path}: {error}") from None
         model.simulator = simulator
     return model
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from simgap_files import atomic_write_json, atomic_write_text, read_json, remove_partial_files
+from simgap_files import atomic_write_text, read_sealed, remove_partial_files, write_sealed
 from studies.learning.settings import ALIASES, build_parser, instantiate, resolve, trial_label
 from studies.learning.study import Config, Study
 from studies.learning.trial import code_of_trial, run_trial
@@ -76,7 +76,7 @@ def run_single(
     results["seconds"] = time.perf_counter() - begin
     atomic_write_text(output / "config.yaml", yaml.safe_dump(settings, sort_keys=False))
     write_films(results, output, study.system_of(instantiate(study, settings)).nominal)
-    atomic_write_json(output / "results.json", results)
+    write_sealed(output / "results.json", results)
     report_single(results, output)
 
 
@@ -114,7 +114,7 @@ def run_grid(
         fail(str(error))
     # For later reports, which load nothing that a file names.
     if best := study.system(instantiate(study, configs[0])).best:
-        atomic_write_json(output / BEST, {"return": best()})
+        write_sealed(output / BEST, {"return": best()})
     failures = report_grid(output)
     if failures:
         raise SystemExit(1)
@@ -124,7 +124,7 @@ def report_grid(folder: Path) -> Failures:
     """Tables and report of a grid from the trials in its folder; returns the failed ones."""
     results, failures = read_trials(folder)
     if results:
-        best = read_json(folder / BEST)["return"] if (folder / BEST).exists() else None
+        best = read_sealed(folder / BEST)["return"] if (folder / BEST).exists() else None
         print(f"\n{write_grid_report(results, failures, folder, best)}")
         print(f"\nreport: {folder / 'report.html'}")
     for path, failure in failures.items():
@@ -141,7 +141,7 @@ def rebuild(folder: Path) -> None:
         ValueError: An earlier version wrote it.
     """
     path = folder / "results.json"
-    results = read_json(path) if path.exists() else {}
+    results = read_sealed(path) if path.exists() else {}
     if "policies" not in results and not read_trials(folder)[0]:
         raise FileNotFoundError(f"{folder}: no trial in it is finished")
     first = results if "policies" in results else read_trials(folder)[0][0]

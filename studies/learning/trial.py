@@ -7,12 +7,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import threadpoolctl
 import torch
 
 from residual.persistence import save
-from simgap_files import atomic_path
+from simgap_npz import write_npz
 from studies.learning.fingerprint import code_of
 from studies.learning.kept import OnDisk
 from studies.learning.loop import run_loop
@@ -56,9 +55,7 @@ def run_trial(
     learnt = run_loop(steps, trial.budget, trial.corrected)
     for name, training in learnt.trainings.items():
         training.learner.save(folder / "policies" / f"{name}.safetensors")
-        with atomic_path(folder / "rollouts" / f"{name}.npz") as path:
-            arrays: dict[str, Any] = training.episode
-            np.savez_compressed(path, **arrays)
+        write_npz(folder / "rollouts" / f"{name}.npz", training.episode)
     for number, model in enumerate(learnt.models, start=1):
         # Other libraries' estimators have no file format but pickle.
         if type(model.estimator).__module__.startswith("residual."):

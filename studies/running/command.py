@@ -54,7 +54,10 @@ class Parser(jsonargparse.ArgumentParser):
                 given[i] = f"--simulator={_simulator(value)}"
             elif name == "--simulator" and i + 1 < len(given):
                 given[i + 1] = _simulator(given[i + 1])
-        return super().parse_args(given, *rest, **options)
+        try:
+            return super().parse_args(given, *rest, **options)
+        except UnicodeDecodeError as error:
+            self.error(f"a settings file is not UTF-8 text ({error}): save it as UTF-8", error)
 
     def parse_object(self, cfg_obj: Any, *rest: Any, **options: Any) -> Any:
         """As usual; a robot's model file may stand where a simulator is expected."""
@@ -75,6 +78,14 @@ class Parser(jsonargparse.ArgumentParser):
             if settings := model_settings(beside if path and beside.is_file() else value):
                 content = yaml.safe_dump({**given, "simulator": settings})
         return super().parse_string(content, path, *rest, **options)
+
+    def instantiate(self, cfg: Any, *rest: Any, **options: Any) -> Any:
+        """As usual; whatever a class of the user's does not like of its settings is one line."""
+        try:
+            return super().instantiate(cfg, *rest, **options)
+        except Exception as error:
+            said = str(error) if isinstance(error, ValueError) else _typed(error)
+            self.error(f"the settings do not make what they name: {said}", error)
 
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
         """Say what is wrong and how to learn more, in one line."""
@@ -139,9 +150,13 @@ def guarded(
     return decorate
 
 
+def _typed(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"
+
+
 def _internal(error: Exception) -> str:
     """Keep the traceback of a fault in a file, and say where."""
-    told = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+    told = " ".join(_typed(error).split())[:200]
     text = traceback.format_exc()
     try:
         handle, path = tempfile.mkstemp(prefix="simgap-error-", suffix=".txt")
