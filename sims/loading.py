@@ -13,6 +13,7 @@ from typing import Any
 import jsonargparse
 import yaml
 
+import simgap_yaml
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
@@ -228,7 +229,7 @@ def _not_found(source: str | Mapping[str, Any]) -> str:
     if isinstance(source, str) and Path(source).suffix in (".yaml", ".yml"):
         if not Path(source).is_file():
             return "there is no such file"
-        settings = yaml.safe_load(Path(source).read_text(encoding="utf-8"))
+        settings = simgap_yaml.load(Path(source).read_text(encoding="utf-8"))
     for path in _class_paths(settings):
         module = path.partition(".")[0]
         if module and importlib.util.find_spec(module) is None:

@@ -29,6 +29,7 @@ from jsonargparse.typing import PositiveFloat, PositiveInt
 from residual.gap import GapResult, find_gap
 from residual.logs import LogData, LogFormat, read_logs
 from residual.step_check import advice
+from sims.contract import refuse_unsound
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
@@ -196,8 +197,9 @@ def hosting(simulator: Simulator) -> HostSimulator:
     """The simulator, if effects can be added to it.
 
     Raises:
-        ValueError: It hosts none.
+        ValueError: It hosts none, or is unsound (``sims.contract``).
     """
+    refuse_unsound(simulator)
     if isinstance(simulator, HostSimulator):
         return simulator
     raise ValueError(

@@ -13,6 +13,7 @@ import platform
 import re
 import subprocess
 import sys
+import sysconfig
 import tempfile
 import traceback
 from argparse import RawDescriptionHelpFormatter
@@ -24,11 +25,14 @@ from typing import Any, NoReturn
 import jsonargparse
 import yaml
 
+import simgap_yaml
 from sims.loading import model_settings
 
 _DEBUG, _DEBUG_VARIABLE = "--debug", "SIMGAP_DEBUG"
 # What a check of a disk writes before the work: less would fit on a disk that is full.
 _PROBE = bytes(2**16)
+_HOME = Path(__file__).parents[2]
+_LIBRARIES = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "purelib", "platlib")]
 _PACKAGES = ("torch", "scikit-learn", "gpytorch", "pymunk", "numpy", "scipy", "gymnasium")
 
 
@@ -69,7 +73,7 @@ class Parser(jsonargparse.ArgumentParser):
     def parse_string(self, content: str, path: Any = "", *rest: Any, **options: Any) -> Any:
         """As usual; a robot's model file, also one beside the config, may be the simulator."""
         try:
-            given = yaml.safe_load(content)
+            given = simgap_yaml.load(content)
         except yaml.YAMLError:
             given = None  # whoever reads it next says what is wrong
         value = given.get("simulator") if isinstance(given, dict) else None
@@ -142,12 +146,30 @@ def guarded(
             except Exception as error:
                 if debug:
                     traceback.print_exc()
+                if place := users_code(error):
+                    fail(f"{place} raised {_typed(error)} (mend it, or see {_DEBUG})")
                 sys.stderr.write(_internal(error))
                 raise SystemExit(1) from error
 
         return run
 
     return decorate
+
+
+def users_code(error: BaseException) -> str:
+    """File, line and function of the user's that an error comes from; empty if it is ours.
+
+    Libraries in between, which only pass on what they were given, do not count.
+    """
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        path = Path(frame.filename)
+        if not path.is_file() or any(path.is_relative_to(place) for place in _LIBRARIES):
+            continue
+        ours = path.parent == _HOME or (path.is_relative_to(_HOME) and (
+            path.relative_to(_HOME).parts[0] in ("sims", "policy", "residual", "studies")
+        ))  # fmt: skip
+        return "" if ours else f"{path}, line {frame.lineno}, in {frame.name}"
+    return ""
 
 
 def _typed(error: BaseException) -> str:

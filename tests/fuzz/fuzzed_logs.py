@@ -91,9 +91,10 @@ def _ended(kind: str, log: object, target: Path | None, layout: LogFormat) -> st
         return SAME
     if {one.kind for one in found if one.kind != "sampling"} - _usual(kind):
         return TOLD
-    if kind in CHECKED:
+    usual = layout == LAYOUTS.get(kind, LogFormat())
+    if kind in CHECKED and usual:
         raise Defect("other numbers without a finding")
-    if kind in TEXT and layout == LAYOUTS.get(kind, LogFormat()):
+    if kind in TEXT and usual:
         assert target is not None
         if not _says(data.trajectories, target, *TEXT[kind]):
             raise Defect("numbers that are not those of the file, without a finding")

@@ -79,7 +79,8 @@ def main() -> None:
             f"| {kind} | {counted.total()} | " + " | ".join(f"{counted[c]}" for c in columns) + " |"
         )
     seconds = time.process_time() - begin
-    print(f"\n{given.count} in {seconds:.0f} s of processor time, the longest {longest:.1f} s; {defects} defects")
+    print(f"\n{given.count} in {seconds:.0f} s of processor time, longest {longest:.1f} s")
+    print(f"{defects} defects")
     raise SystemExit(bool(defects))
 
 
