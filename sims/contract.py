@@ -66,10 +66,11 @@ def acceleration_keeps(simulator: EquationOfMotion, states: Array, actions: Arra
     names = [channel.name for channel in simulator.state_channels]
     q = states[:, [names.index(joint.position) for joint in simulator.joints]]
     v = states[:, [names.index(str(joint.rate)) for joint in simulator.joints]]
-    given = [q, v, actions.copy(), np.zeros_like(q)]
+    given = (q, v, actions.copy(), np.zeros_like(q))
     before = [array.copy() for array in given]
     with np.errstate(all="ignore"):
-        simulator.acceleration(*given, SimpleNamespace(**simulator.parameter_values()))
+        values = SimpleNamespace(**simulator.parameter_values())
+        simulator.acceleration(*given, values)
     kept = all(map(np.array_equal, given, before))
     says = "are left as they were" if kept else "are overwritten"
     return Finding("arguments of acceleration", kept, says)
@@ -85,7 +86,7 @@ def declared(simulator: Simulator) -> Iterator[Finding]:
     says = wrong or f"{len(simulator.state_channels)} of the state"
     yield Finding("channels", not wrong, says)
     if not isinstance(getattr(simulator, "parameters", {}), Mapping):
-        says = f"parameters is a {type(simulator.parameters).__name__}, expected them by name"  # type: ignore[attr-defined]
+        says = f"parameters is a {type(simulator.parameters).__name__}, expected them by name"
         yield Finding("parameters", False, says)
 
 

@@ -229,7 +229,10 @@ def _not_found(source: str | Mapping[str, Any]) -> str:
     if isinstance(source, str) and Path(source).suffix in (".yaml", ".yml"):
         if not Path(source).is_file():
             return "there is no such file"
-        settings = simgap_yaml.load(Path(source).read_text(encoding="utf-8"))
+        try:
+            settings = simgap_yaml.load(Path(source).read_text(encoding="utf-8"))
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            return f"it is no YAML: {_one_line(error)}"
     for path in _class_paths(settings):
         module = path.partition(".")[0]
         if module and importlib.util.find_spec(module) is None:

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from simgap_files import atomic_write_text, write_sealed
+from simgap_files import atomic_write_json, atomic_write_text
 from studies.real.judge import Judged, ask
 from studies.real.rigs import RIGS
 from studies.reporting.markdown import markdown
@@ -119,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"{rig.folder} failed:\n{traceback.format_exc()}", file=sys.stderr)
             continue
         results.append(found)
-        write_sealed(given.output / rig.name / "judged.json", found)
+        atomic_write_json(given.output / rig.name / "judged.json", found)
         print("\n".join(f"{rig.folder}: {line}" for line in (*found.said, *found.repair)))
     if results:
         made = table(results)

@@ -83,10 +83,10 @@ class Parser(jsonargparse.ArgumentParser):
                 content = yaml.safe_dump({**given, "simulator": settings})
         return super().parse_string(content, path, *rest, **options)
 
-    def instantiate(self, cfg: Any, *rest: Any, **options: Any) -> Any:
+    def instantiate(self, namespace: Any, *rest: Any, **options: Any) -> Any:
         """As usual; whatever a class of the user's does not like of its settings is one line."""
         try:
-            return super().instantiate(cfg, *rest, **options)
+            return super().instantiate(namespace, *rest, **options)
         except Exception as error:
             said = str(error) if isinstance(error, ValueError) else _typed(error)
             self.error(f"the settings do not make what they name: {said}", error)

@@ -67,7 +67,7 @@ ANSWERS = {
     "Lacking": lambda x, rows: rows.no_such_thing,
     "NeverReady": lambda x, rows: _raise(NotImplementedError()),
     "Leaving": lambda x, rows: _raise(OSError("the device is gone")),
-    "Slow": lambda x, rows: time.sleep(0.002) or x,
+    "Slow": lambda x, rows: time.sleep(0.0005) or x,
     "Wrapping": lambda x, rows: np.angle(np.exp(1j * x)),
     "Coarse": lambda x, rows: np.round(x, 1),
     "StateAsMask": lambda x, rows: x[rows[:, 0] > 0],
