@@ -9,7 +9,6 @@ import json
 import math
 import os
 import secrets
-import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -76,6 +75,7 @@ def atomic_write_json(path: str | Path, value: Any) -> None:
     atomic_write_text(path, text + "\n")
 
 
+<<<<<<< HEAD
 def write_sealed(path: str | Path, value: Mapping[str, Any]) -> None:
     """Write an object to ``path`` as JSON with a format version and a checksum of its content."""
     plain = jsonable({**value, "format": FORMAT})
@@ -115,6 +115,8 @@ def copy_file(source: str | Path, target: str | Path) -> None:
         shutil.copyfile(source, temporary)
 
 
+=======
+>>>>>>> main
 def read_json(path: str | Path) -> Any:
     """What ``atomic_write_json`` wrote.
 

@@ -17,7 +17,7 @@ from policy.config import DDPGConfig, whole
 from policy.files import content_of, read_arrays, write_arrays
 from policy.mlp import MlpPolicy
 from policy.noise import OrnsteinUhlenbeck
-from policy.replay import Replay
+from policy.replay import Replay, Seen
 
 FORMAT = "simgap.ddpg.1"
 
@@ -188,26 +188,14 @@ class DDPG:
         """One update of the critic and the actor from one batch of the replay."""
         self._networks.update(self.replay.sample(self.config.batch, self._rng))
 
-    def remember(
-        self,
-        observations: ArrayLike,
-        actions: ArrayLike,
-        rewards: ArrayLike,
-        next_observations: ArrayLike,
-        terminated: ArrayLike,
-    ) -> None:
-        """Add n transitions to the replay as if they had been seen in ``learn``.
-
-        Args:
-            observations, next_observations: shape (n, n_o).
-            actions: In the units of the action space, shape (n, n_a).
-            rewards: shape (n,).
-            terminated: Whether the episode ended there, and not by time, shape (n,).
-        """
+    def remember(self, seen: Seen) -> None:
+        """Add transitions to the replay as if they had been seen in ``learn``."""
         low, high = self.policy.low, self.policy.high
-        normalised = 2 * (np.asarray(actions, float) - low) / (high - low) - 1
-        scaled = self.config.reward_scale * np.asarray(rewards, float)
-        self.replay.extend(observations, normalised, scaled, next_observations, terminated)
+        normalised = 2 * (np.asarray(seen.actions, float) - low) / (high - low) - 1
+        scaled = self.config.reward_scale * np.asarray(seen.rewards, float)
+        self.replay.extend(
+            seen.observations, normalised, scaled, seen.next_observations, seen.terminated
+        )
 
     def networks(self) -> dict[str, NDArray[np.float32]]:
         """A copy of all networks, targets and optimiser moments by name, for ``restore``."""

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import gymnasium
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from policy.config import DDPGConfig
 from policy.ddpg import DDPG, Progress
 from policy.evaluate import Policy
 from policy.files import OtherForm, read_arrays
+from policy.replay import Seen
 
 OURS = "policy.DDPG"
 
@@ -43,14 +44,7 @@ class Learner(Protocol):
         """Act in ``env`` and learn."""
         ...
 
-    def remember(
-        self,
-        observations: ArrayLike,
-        actions: ArrayLike,
-        rewards: ArrayLike,
-        next_observations: ArrayLike,
-        terminated: ArrayLike,
-    ) -> None:
+    def remember(self, seen: Seen) -> None:
         """Add transitions to the replay."""
         ...
 

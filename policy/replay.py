@@ -25,6 +25,21 @@ class Batch(NamedTuple):
     next_observations: Array
 
 
+class Seen(NamedTuple):
+    """n transitions of an environment, for an algorithm to learn from.
+
+    ``observations`` and ``next_observations`` have shape (n, n_o), ``actions``, in the units of
+    the action space, (n, n_a), ``rewards`` and ``terminated``, whether the episode ended there
+    and not by time, (n,).
+    """
+
+    observations: ArrayLike
+    actions: ArrayLike
+    rewards: ArrayLike
+    next_observations: ArrayLike
+    terminated: ArrayLike
+
+
 class Replay:
     """The last ``capacity`` transitions; the oldest is overwritten first.
 

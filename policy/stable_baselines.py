@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from policy.ddpg import Progress
 from policy.files import write_arrays
+from policy.replay import Seen
 
 if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
@@ -115,20 +116,13 @@ class StableBaselines:
             self.model.set_random_seed(self._seed)
             self.model.learn(steps, Watch(), reset_num_timesteps=True)
 
-    def remember(
-        self,
-        observations: ArrayLike,
-        actions: ArrayLike,
-        rewards: ArrayLike,
-        next_observations: ArrayLike,
-        terminated: ArrayLike,
-    ) -> None:
-        """Add n transitions to the replay; of more than fit the last remain."""
+    def remember(self, seen: Seen) -> None:
+        """Add transitions to the replay; of more than fit the last remain."""
         memory: Any = self.model.replay_buffer
         rows = zip(
-            np.asarray(observations), np.asarray(next_observations),
-            self.model.policy.scale_action(np.asarray(actions)), np.asarray(rewards),
-            np.asarray(terminated), strict=True,
+            np.asarray(seen.observations), np.asarray(seen.next_observations),
+            self.model.policy.scale_action(np.asarray(seen.actions)), np.asarray(seen.rewards),
+            np.asarray(seen.terminated), strict=True,
         )  # fmt: skip
         for observation, following, action, reward, ended in rows:
             memory.add(

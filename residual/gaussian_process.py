@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,9 @@ from sklearn.utils import check_random_state
 
 from residual.calibration import FEWEST_ROWS, left_out, neighbourhoods, spread_factor
 from residual.estimator import Array, Estimator, spread
+from residual.kernels import KERNELS, Kernel, best_noise, correlation, covariance
 from residual.likelihood import BOUNDS, maximise_likelihood
 
-_KERNELS = ("rbf", "matern")
 _CHUNK = 2048
 _CANDIDATES = 5000
 _KEPT_BYTES = 2**29
@@ -75,7 +75,7 @@ class GaussianProcess(Estimator):
 
     def __init__(
         self,
-        kernel: Literal["rbf", "matern"] = "rbf",
+        kernel: Kernel = "rbf",
         max_points: int = 4000,
         inducing: int = 600,
         hyper_points: int = 600,
@@ -92,8 +92,8 @@ class GaussianProcess(Estimator):
         self.random_state = random_state
 
     def _fit(self, X: Array, y: Array) -> None:
-        if self.kernel not in _KERNELS:
-            raise ValueError(f"kernel={self.kernel!r}: choose one of {', '.join(_KERNELS)}")
+        if self.kernel not in KERNELS:
+            raise ValueError(f"kernel={self.kernel!r}: choose one of {', '.join(KERNELS)}")
         for name in ("max_points", "inducing", "hyper_points", "max_iter"):
             if not getattr(self, name) >= 1:
                 raise ValueError(f"{name}={getattr(self, name)!r}: give a whole number from 1")
@@ -134,10 +134,11 @@ class GaussianProcess(Estimator):
         most = np.quantile(away, _ORDINARY)
 
         def unexplained(lengthscale: Array, outputscale: float, noise: float, _: int) -> float:
-            matrix = self._covariance(X, X, lengthscale, outputscale)
+            matrix = covariance(X, X, lengthscale, outputscale, self.kernel)
             matrix[np.diag_indices(len(X))] += noise
             weights = np.linalg.solve(matrix, y)
-            errors = other_y - self._covariance(other_X, X, lengthscale, outputscale) @ weights
+            cross = covariance(other_X, X, lengthscale, outputscale, self.kernel)
+            errors = other_y - cross @ weights
             return float(np.minimum(errors**2, most).sum() / max(away.clip(max=most).sum(), 1e-300))
 
         share = unexplained(*found)
@@ -218,7 +219,7 @@ class GaussianProcess(Estimator):
                 gram += cross @ cross.T
                 moment += cross @ y[rows, k]
             lost = max(len(X) * self.outputscale_[k] - np.trace(gram), 0.0)
-            self.noise_[k] = _best_noise(gram, moment, float(y[:, k] @ y[:, k]), lost, len(X))
+            self.noise_[k] = best_noise(gram, moment, float(y[:, k] @ y[:, k]), lost, len(X))
             gram[np.diag_indices(m)] += self.noise_[k]
             inner = cholesky(gram, lower=True, check_finite=False)
             half = solve_triangular(inner, moment, lower=True, check_finite=False)
@@ -230,24 +231,7 @@ class GaussianProcess(Estimator):
 
     def _kernel(self, a: Array, b: Array, k: int) -> Array:
         """Covariances of output k between rows a and rows b, shape (len(a), len(b))."""
-        return self._covariance(a, b, self.lengthscale_[k], self.outputscale_[k])
-
-    def _covariance(self, a: Array, b: Array, lengthscale: Array, outputscale: float) -> Array:
-        a, b = a / lengthscale, b / lengthscale
-        matrix = a @ b.T
-        matrix *= -2
-        matrix += np.sum(a**2, axis=1)[:, None]
-        matrix += np.sum(b**2, axis=1)
-        return outputscale * self._shape(matrix)
-
-    def _shape(self, squared: Array) -> Array:
-        """Correlation at a squared scaled distance, in place."""
-        if self.kernel == "rbf":
-            squared *= -0.5
-            return np.exp(np.minimum(squared, 0, out=squared), out=squared)
-        squared *= 5
-        root = np.sqrt(np.maximum(squared, 0, out=squared))
-        return (1 + root + squared / 3) * np.exp(-root)
+        return covariance(a, b, self.lengthscale_[k], self.outputscale_[k], self.kernel)
 
     def _prepare(self) -> None:
         if "_kept" not in self.__dict__:
@@ -273,7 +257,7 @@ class GaussianProcess(Estimator):
             squared = (self._doubled @ row).reshape(self._squares.shape)
             squared += self._squares
             squared += (self._inverse @ (row * row))[:, None]
-            mean[k] = np.einsum("ij,ij->i", self._shape(squared), self._scaled_weights)
+            mean[k] = np.einsum("ij,ij->i", correlation(squared, self.kernel), self._scaled_weights)
         return mean, self._std(X) if return_std else None
 
     def _std(self, X: Array) -> Array:
@@ -292,23 +276,3 @@ class GaussianProcess(Estimator):
                     variance[rows, k] += self.noise_[k] * np.sum(inner**2, axis=0)
         variance = np.maximum(variance, 0) * self.spread_factor_**2
         return np.sqrt(variance + self.noise_)
-
-
-def _best_noise(gram: Array, moment: Array, energy: float, lost: float, rows: int) -> float:
-    """Noise variance that maximises Titsias' bound, by a fine logarithmic grid.
-
-    Args:
-        gram: A A^T with A = L^-1 K(points, rows), K(points) = L L^T, shape (m, m).
-        moment: A y, shape (m,).
-        energy: y^T y.
-        lost: trace of what the points do not explain of K(rows).
-        rows: Number of rows.
-    """
-    eigenvalues, vectors = np.linalg.eigh(gram)
-    eigenvalues = np.maximum(eigenvalues, 0)
-    projected = vectors.T @ moment
-    grid = np.geomspace(*BOUNDS["noise"], 201)
-    inverse = 1 / (eigenvalues + grid[:, None])
-    misfit = np.maximum(energy - inverse @ projected**2, 1e-14 * energy)
-    volume = np.sum(np.log1p(eigenvalues / grid[:, None]), axis=1) + rows * np.log(grid)
-    return float(grid[np.argmin(volume + (misfit + lost) / grid)])

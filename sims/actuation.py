@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sims import drive as path
 from sims.effects.actuator import ActuatorEffect
@@ -35,6 +36,44 @@ def memory_channels(simulator: HostSimulator) -> Iterator[Channel]:
         for i, _ in enumerate(path.lags(simulator.actuator_effects(channel.name))):
             name = f"{channel.name} lagged" + (f" {i + 1}" if i else "")
             yield Channel(name, channel.unit, "memory", scale=channel.scale)
+
+
+def clipped(simulator: HostSimulator, actions: Array) -> Array:
+    """Commands within the bounds of their channels."""
+    low = [channel.low for channel in simulator.action_channels]
+    return np.clip(actions, low, [channel.high for channel in simulator.action_channels])
+
+
+def driven(
+    simulator: HostSimulator,
+    actions: ArrayLike,
+    durations: ArrayLike,
+    substeps: int | None,
+    hold: Hold | Sequence[Hold] | None,
+    before: ArrayLike | None,
+    rises: bool,
+) -> Array:
+    """Effective inputs of a recorded trajectory; see ``HostSimulator.drive``."""
+    actions, durations = np.asarray(actions, float), np.asarray(durations, float)
+    expected = (len(durations), len(simulator.action_channels))
+    if actions.shape != expected or not (durations > 0).all():
+        raise ValueError(
+            f"actions have shape {actions.shape}, expected {expected}: a row for each of "
+            "the durations, which must be positive, and a column for each input"
+        )
+    if hold is None or isinstance(hold, str):
+        hold = [hold or channel.hold for channel in simulator.action_channels]
+    if len(hold) != len(simulator.action_channels):
+        count = len(simulator.action_channels)
+        raise ValueError(f"hold has {len(hold)} entries for {count} inputs")
+    earlier = np.empty((0, actions.shape[1])) if before is None else np.asarray(before, float)
+    k = len(earlier)
+    durations = np.concatenate([np.full(k, durations[:1]), durations])
+    commands = clipped(simulator, np.concatenate([earlier, actions]))
+    inputs = recorded_inputs(simulator, commands, durations, substeps or simulator.substeps, hold)
+    inputs = inputs[:, k:] if rises else inputs[:, k:, ..., 0]
+    rows = {e.rows for e in simulator.effects if isinstance(e, ActuatorEffect)} - {None}
+    return np.broadcast_to(inputs, (rows.pop() or 1, *inputs.shape[1:])) if rows else inputs[0]
 
 
 def with_memory(simulator: HostSimulator, states: Array, actions: Array) -> Array:

@@ -16,7 +16,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sims.actuation import memory_channels, next_inputs, recorded_inputs, with_memory
+from sims.actuation import clipped, driven, memory_channels, next_inputs, with_memory
 from sims.drive import lagged
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
@@ -214,7 +214,7 @@ class HostSimulator(Simulator):
         last = actions.shape[1] - 1
         for k in range(last + 1):
             now = self.check_rows(states[:, k], actions[:, k])
-            upcoming = self._clip(actions[:, min(k + 1, last)])
+            upcoming = clipped(self, actions[:, min(k + 1, last)])
             states[:, k + 1] = self._step(*now, upcoming)
         return states[0] if single else states
 
@@ -266,25 +266,7 @@ class HostSimulator(Simulator):
         Raises:
             ValueError: The shapes do not fit, or a duration is not positive.
         """
-        actions, durations = np.asarray(actions, float), np.asarray(durations, float)
-        expected = (len(durations), len(self.action_channels))
-        if actions.shape != expected or not (durations > 0).all():
-            raise ValueError(
-                f"actions have shape {actions.shape}, expected {expected}: a row for each of "
-                "the durations, which must be positive, and a column for each input"
-            )
-        if hold is None or isinstance(hold, str):
-            hold = [hold or channel.hold for channel in self.action_channels]
-        if len(hold) != len(self.action_channels):
-            raise ValueError(f"hold has {len(hold)} entries for {len(self.action_channels)} inputs")
-        earlier = np.empty((0, actions.shape[1])) if before is None else np.asarray(before, float)
-        k = len(earlier)
-        durations = np.concatenate([np.full(k, durations[:1]), durations])
-        commands = self._clip(np.concatenate([earlier, actions]))
-        inputs = recorded_inputs(self, commands, durations, substeps or self.substeps, hold)
-        inputs = inputs[:, k:] if rises else inputs[:, k:, ..., 0]
-        rows = {e.rows for e in self.effects if isinstance(e, ActuatorEffect)} - {None}
-        return np.broadcast_to(inputs, (rows.pop() or 1, *inputs.shape[1:])) if rows else inputs[0]
+        return driven(self, actions, durations, substeps, hold, before, rises)
 
     def sense(self, states: Array) -> Array:
         """What the sensors read of true states, (n, n_i) -> (n, n_i)."""
@@ -308,8 +290,4 @@ class HostSimulator(Simulator):
         states = np.asarray(states, float)
         if actions is None:
             actions = np.zeros((len(states), len(self.action_channels)))
-        return with_memory(self, states, self._clip(np.asarray(actions, float)))
-
-    def _clip(self, actions: Array) -> Array:
-        low = [channel.low for channel in self.action_channels]
-        return np.clip(actions, low, [channel.high for channel in self.action_channels])
+        return with_memory(self, states, clipped(self, np.asarray(actions, float)))

@@ -122,7 +122,7 @@ def effect_settings(effect: Effect) -> dict[str, Any]:
 
 
 def chosen_effects(
-    simulator: HostSimulator, wanted: Sequence[str | Mapping[str, Any]]
+    simulator: HostSimulator, wanted: Sequence[Effect | str | Mapping[str, Any]]
 ) -> tuple[Effect, ...]:
     """The effects that a list names.
 
@@ -131,7 +131,7 @@ def chosen_effects(
         wanted: ``"library"``; effects of the library by name, ``"viscous_friction"`` or, at one
             place, ``"viscous_friction@pivot"``, parameters as ``"mass"``; a class of your own by
             import path, ``"my_file.FanTorque"``, at every place that can host it or at one; or
-            ``class_path`` and ``init_args``.
+            ``class_path`` and ``init_args``; or an effect itself.
 
     Raises:
         ValueError: Something is not known, or cannot act in this simulator.
@@ -139,7 +139,9 @@ def chosen_effects(
     known = {str(effect): effect for effect in library(simulator)}
     found: dict[str, Effect] = {}
     for entry in wanted:
-        if isinstance(entry, Mapping):
+        if isinstance(entry, Effect):
+            own = [entry]
+        elif isinstance(entry, Mapping):
             own = [_effect(entry)]
             own[0].measures(simulator)
         elif entry == LIBRARY:

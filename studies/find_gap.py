@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import yaml
-from jsonargparse.typing import PositiveFloat, PositiveInt
+from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
 from residual.logs import LogData, LogFormat, read_logs
@@ -34,10 +34,10 @@ from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Hold, Simulator
-from studies.gap.files import CORRECTED, REPORT, check_folder, write_gap
+from studies.gap.files import CORRECTED, REPORT, write_gap
 from studies.gap.progress import Heartbeat
 from studies.gap.summary import found_in_data, summary
-from studies.running.command import HelpFormatter, Parser, fail, guarded
+from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +57,9 @@ class GapStudy:
             happens before an input said to be "linear" (dead zone, lag) is no candidate.
         horizon: Forecast length in s that matters to you; by default a quarter of the usual
             period of the motion.
+        parameter_tolerance: How well the parameters of the simulator are known, as a share of
+            each: an effect is certain only if they cannot stand in for it within that, and its
+            interval allows for them; 0 takes them for exact.
         minutes: Budget of processor time; what has not been tried by then is left out.
     """
 
@@ -65,6 +68,7 @@ class GapStudy:
     tolerance: PositiveFloat | None = None
     hold: Literal["auto", "zero", "linear"] | dict[str, Literal["zero", "linear"]] = "auto"
     horizon: PositiveFloat | None = None
+    parameter_tolerance: NonNegativeFloat = 0.03
     minutes: PositiveFloat = 2.0
 
 
@@ -127,7 +131,8 @@ def run(
 
     Raises:
         ValueError: A log, the simulator or an effect cannot be used; the message is one line.
-        SystemExit: A setting is wrong; one line on stderr says which.
+        SystemExit: A setting is wrong, or the folder cannot be written; one line on stderr says
+            which.
     """
     begin = time.perf_counter()
     tell = progress or (lambda _: None)
@@ -142,7 +147,7 @@ def run(
     simulator = hosting(study.simulator)
     hold = holds(simulator, study.hold)
     effects = not_upstream(chosen_effects(simulator, chosen.effects), hold)
-    check_folder(Path(output))
+    check_output(output)
     # In whatever order the files come, not one digit of the answer changes.
     data = read(simulator, sorted(chosen.logs), study.columns)
     held = apart(simulator, chosen.logs, chosen.held_out or [], study.columns)
@@ -161,6 +166,7 @@ def run(
         effects=effects,
         hold=hold or None,
         horizon=study.horizon,
+        parameter_tolerance=study.parameter_tolerance,
         minutes=study.minutes,
         n_jobs=jobs,
         progress=tell,

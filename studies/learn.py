@@ -19,15 +19,12 @@ A killed run continues where it stopped when the same command is given again.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 
 from policy.learner import imported
 from sims.system import System
 from studies.learning.budget import Budget
-from studies.learning.command import run_command
-from studies.learning.settings import build_parser as parser_of
+from studies.learning.command import command
 from studies.learning.study import Study, Trial
-from studies.running.command import Parser, guarded
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,17 +60,7 @@ def system_of(trial: LearnTrial) -> System:
 
 
 STUDY = Study("learn", __doc__, LearnTrial, system_of, "residual.GaussianProcess")
-
-
-def build_parser() -> Parser:
-    """The command line of this study."""
-    return parser_of(STUDY)
-
-
-@guarded()
-def main(arguments: Sequence[str] | None = None) -> None:
-    """The command."""
-    run_command(STUDY, arguments)
+main = command(STUDY)
 
 
 if __name__ == "__main__":

@@ -18,16 +18,13 @@ own: python -m studies.learn --help.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 
 from policy.config import DDPGConfig
 from sims.system import System
 from studies.learning.budget import Budget
-from studies.learning.command import run_command
-from studies.learning.settings import build_parser as parser_of
+from studies.learning.command import command
 from studies.learning.study import Study, Trial
 from studies.learning.warm_start import ReplayRule
-from studies.running.command import Parser, guarded
 from studies.systems.leo import SYSTEM
 
 
@@ -58,17 +55,7 @@ def system_of(trial: LeoTrial) -> System:
 
 
 STUDY = Study("leo_gap", __doc__, LeoTrial, system_of)
-
-
-def build_parser() -> Parser:
-    """The command line of this study."""
-    return parser_of(STUDY)
-
-
-@guarded()
-def main(arguments: Sequence[str] | None = None) -> None:
-    """The command."""
-    run_command(STUDY, arguments)
+main = command(STUDY)
 
 
 if __name__ == "__main__":

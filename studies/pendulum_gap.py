@@ -19,13 +19,10 @@ python -m studies.learn --help.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 
 from sims.system import System
-from studies.learning.command import run_command
-from studies.learning.settings import build_parser as parser_of
+from studies.learning.command import command
 from studies.learning.study import Study, Trial
-from studies.running.command import Parser, guarded
 from studies.systems.pendulum import pendulum
 
 
@@ -47,17 +44,7 @@ def system_of(trial: PendulumTrial) -> System:
 
 
 STUDY = Study("pendulum_gap", __doc__, PendulumTrial, system_of)
-
-
-def build_parser() -> Parser:
-    """The command line of this study."""
-    return parser_of(STUDY)
-
-
-@guarded()
-def main(arguments: Sequence[str] | None = None) -> None:
-    """The command."""
-    run_command(STUDY, arguments)
+main = command(STUDY)
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ import pandas as pd
 from simgap_files import atomic_write_json, atomic_write_text
 from studies.real.judge import Judged, ask
 from studies.real.rigs import RIGS
-from studies.reporting.markdown import markdown
+from studies.reporting.markdown import frame_markdown
 from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
 
 #: What a corrected simulator's error may be, in errors of the repair by hand, and processor
@@ -123,7 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print("\n".join(f"{rig.folder}: {line}" for line in (*found.said, *found.repair)))
     if results:
         made = table(results)
-        atomic_write_text(given.output / "rigs.md", markdown(made))
+        atomic_write_text(given.output / "rigs.md", frame_markdown(made))
         print(f"\n{made.drop(columns='verdicts').to_string(index=False)}\n\n{summary(results)}")
         print(f"\ntable: {given.output / 'rigs.md'}")
     if failed:

@@ -17,6 +17,7 @@ from residual.gap.numerics import other_numerics
 from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import Blind, Gap, GapResult, Rival, Verdict
 from residual.gap.search import Key
+from residual.gap.tolerance import KNOWN, allow_for_parameters
 from residual.gap.verdicts import (
     blind_verdict,
     dependent,
@@ -62,13 +63,19 @@ def matters(found: Explanation, tolerance: float | None) -> bool:
     return bool(np.sqrt(np.nanmean(squares[:, main])) > tolerance)
 
 
-def confirm(found: Explanation, groups: dict[str, tuple[str, ...]], asked: bool = True) -> Answer:
+def confirm(
+    found: Explanation,
+    groups: dict[str, tuple[str, ...]],
+    asked: bool = True,
+    parameter_tolerance: float = KNOWN,
+) -> Answer:
     """Claims of the chosen effects; what cannot be named is left out, and the rest asked again.
 
     Args:
         found: The choice.
         groups: Exact twins by label.
         asked: False if the gap does not matter, so that nothing is named.
+        parameter_tolerance: How well the simulator's parameters are known, as a share of each.
     """
     search, key = found.search, found.key if asked else ()
     leads: tuple[str, ...] = ()
@@ -83,6 +90,7 @@ def confirm(found: Explanation, groups: dict[str, tuple[str, ...]], asked: bool 
         blocks = len(search.fitter.blocks)
         lost = [claim for claim in made if not nameable(search, claim, blocks)]
         if not lost:
+            made = allow_for_parameters(search, key, made, found.adequate, parameter_tolerance)
             return Answer(found, key, tuple(made), leads)
         # The one that matters least goes first: what is left may have fewer rivals.
         gone = lost[-1].number

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
 
-from residual.gap.blocks import Blocks
 from residual.gap.choice import AT_ONE
-from residual.gap.fitting import Fit
+from residual.gap.intervals import at_bound, bounded, deviations
 from residual.gap.result import Number
 from residual.gap.search import Key, Search
 from residual.gap.significance import score
@@ -45,6 +43,7 @@ class Claim:
         sound: Whether it survives other numerics.
         bounded: Whether a strength lies at its bound.
         share: Part of the nominal squared error that it takes off, with a 95 % interval.
+        calibration: Whether parameters of the simulator, all within their tolerance, do as well.
     """
 
     number: int
@@ -58,6 +57,13 @@ class Claim:
     sound: bool
     bounded: bool
     share: tuple[float, float, float]
+    calibration: bool = False
+
+    @property
+    def sure(self) -> bool:
+        """Whether nothing speaks against it."""
+        against = (self.bounded, self.calibration, self.rivals, self.alike)
+        return self.needed and self.steady and self.sound and not any(against)
 
 
 def claims(
@@ -196,21 +202,6 @@ def survives(value: float, half: float, others: Sequence[float]) -> bool:
     return all(abs(other - value) <= max(STEADY * abs(value), half) for other in others)
 
 
-def at_bound(fit: Fit, j: int) -> bool:
-    """Whether a number lies at its bound."""
-    knob, value = fit.model.knobs[j], float(fit.theta[j])
-    close = 1e-6 * max(abs(value), 1e-3 * knob.step)
-    return bool(abs(value - knob.low) <= close or abs(value - knob.high) <= close)
-
-
-def bounded(fit: Fit, j: int, half: float, numerics: Sequence[Array]) -> Number:
-    """A number with its interval, widened to what half the step makes of it."""
-    knob, value = fit.model.knobs[j], float(fit.theta[j])
-    fine = float(numerics[0][j]) if len(numerics) else value
-    low, high = min(value, fine) - half, max(value, fine) + half
-    return Number(value, max(low, knob.low), min(high, knob.high), knob.unit, at_bound(fit, j))
-
-
 def share(search: Search, key: Key, number: int) -> tuple[float, float, float]:
     """Part of the nominal squared error that an effect takes off, last of all in its set."""
     rest = tuple(i for i in key if i != number)
@@ -219,37 +210,3 @@ def share(search: Search, key: Key, number: int) -> tuple[float, float, float]:
     return search.currency.share(
         squares[base].squares, squares[key].squares, np.random.default_rng(0)
     )
-
-
-def deviations(fit: Fit, blocks: Blocks) -> Array:
-    """Standard deviation of the numbers, (p,): the larger of two.
-
-    One is Gauss-Newton's with start states projected out, times the residual variance; the other
-    the sandwich over blocks, which allows for errors that go together within a block, with
-    Student's t for few blocks. Source: White, "Maximum likelihood estimation of misspecified
-    models", Econometrica 50 (1982).
-    """
-    p = len(fit.theta)
-    if not p:
-        return np.zeros(0)
-    root = np.sqrt(fit.weights)[:, None]
-    rows, residual = fit.by_knob * root[..., None], fit.projected * root
-    scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
-    unit = rows / scale
-    inverse = np.linalg.pinv(np.einsum("wri,wrj->ij", unit, unit), rcond=1e-12)
-    used = int((np.abs(residual) > 0).sum())
-    freedom = max(used - fit.basis.shape[2] * len(residual) - p, 1)
-    variance = max(1.0, float((residual**2).sum()) / freedom)
-    plain = variance * np.diag(inverse)
-    count = len(blocks)
-    if count <= p + 1:
-        return np.sqrt(plain) / scale
-    per_window = np.einsum("wri,wr->wi", unit, residual)
-    scores = np.stack([per_window[blocks.block == b].sum(axis=0) for b in range(count)])
-    sandwich = np.diag(inverse @ (scores.T @ scores) @ inverse) * count / (count - p)
-    return np.sqrt(np.maximum(plain, sandwich)) * _student(count - p) / scale
-
-
-def _student(freedom: int) -> float:
-    """Student's 95 % quantile over the normal one."""
-    return float(t.ppf(0.975, freedom) / 1.96)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,13 @@ from residual.gap.horizon import usual_horizon
 from residual.gap.numerics import fits_better, forecast_error, held_as, held_otherwise, how_held
 from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import GapResult
+from residual.gap.tolerance import KNOWN
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
 from sims.contract import refuse_unsound
 from sims.effects.base import Effect
-from sims.effects.library import library
 from sims.host import HostSimulator
+from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Hold
 
 Array = NDArray[np.float64]
@@ -37,10 +39,11 @@ def find_gap(
     *,
     held: Sequence[Trajectory] = (),
     tolerance: float | None = None,
-    effects: Iterable[Effect] | None = None,
+    effects: Iterable[Effect | str | Mapping[str, Any]] | None = None,
     hold: Hold | Mapping[str, Hold] | None = None,
     measured_input: bool = False,
     horizon: float | None = None,
+    parameter_tolerance: float = KNOWN,
     minutes: float = 2.0,
     n_jobs: int = 1,
     progress: Callable[[str], None] | None = None,
@@ -53,7 +56,8 @@ def find_gap(
         held: Runs that are used for the final table only.
         tolerance: Forecast error that does not matter, in the unit of the first measured
             position; below it the verdict is "nothing that matters".
-        effects: Effects that may be missing; by default all that the simulator can host.
+        effects: Effects that may be missing, as objects or by name (``sims.loading.
+            chosen_effects``); by default all that the simulator can host.
         hold: How inputs run between samples, ``"zero"`` (held, as commands are) or ``"linear"``
             (straight to the next, as most measured inputs are), for all or by input; by default
             as the channels say, unless what is found fits clearly better the other way.
@@ -61,6 +65,9 @@ def find_gap(
             happens before that (dead zone, saturation, lag) is then no candidate.
         horizon: Forecast length in seconds; by default a third of the usual period of the motion,
             see ``residual.gap.horizon``.
+        parameter_tolerance: How well the simulator's parameters are known, as a share of each: an
+            effect is certain only if they cannot stand in for it within that, and its interval
+            allows for them. 0 takes them for exact, so that intervals are of the data alone.
         minutes: Budget of processor time, so that a busy machine finds the same: the search for
             further explanations ends in time.
         n_jobs: Processes for a simulator that steps row by row.
@@ -78,7 +85,7 @@ def find_gap(
     clock = Clock()
     tell = progress or (lambda _: None)
     until = time.process_time() + 60 * minutes * SEARCHING
-    offered = tuple(library(simulator) if effects is None else effects)
+    offered = chosen_effects(simulator, [LIBRARY] if effects is None else list(effects))
     if measured_input:
         offered = tuple(e for e in offered if not e.upstream_of_sensor)
     examined = examine(simulator, trajectories)
@@ -120,7 +127,7 @@ def find_gap(
                 )
         clock.lap("search")
         tell("confirming")
-        answer = confirm(found, groups, matters(found, tolerance))
+        answer = confirm(found, groups, matters(found, tolerance), parameter_tolerance)
         clock.lap("confirm")
         table = summed_up(answer)
         apart = None

@@ -14,8 +14,9 @@ from sims.host import HostSimulator
 Array = NDArray[np.float64]
 Kind = Literal["confirmed", "ambiguous", "minor", "needs_data", "unexplained", "no_gap"]
 #: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
-#: between folds or with the numerics, lies at its bound, or an effect of another kind does as well.
-Doubt = Literal["not_needed", "unsteady", "numerics", "at_bound", "rivals"]
+#: between folds or with the numerics, lies at its bound, parameters within their tolerance do as
+#: well, or an effect of another kind does.
+Doubt = Literal["not_needed", "unsteady", "numerics", "at_bound", "calibration", "rivals"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,6 +79,9 @@ class Verdict:
     form: tuple[str, ...] = ()
     doubts: tuple[Doubt, ...] = ()
     follows: str = ""
+
+    def __repr__(self) -> str:
+        return f"Verdict({self.kind}: {self.says})"[:180]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -248,3 +252,8 @@ class GapResult:
     blind: tuple[Blind, ...]
     adequate: bool
     seconds: dict[str, float]
+
+    def __repr__(self) -> str:
+        kinds = "; ".join(f"{v.effect} {v.kind}".strip() for v in self.verdicts[:4])
+        before, after = self.gap.before.value, self.gap.after.value
+        return f"{type(self).__name__}({kinds}; error {before:.3g} -> {after:.3g})"[:180]

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from residual.gap.aliases import aliases
 from residual.gap.candidates import candidates
-from residual.gap.confirmation import deviations
 from residual.gap.explain import explain
+from residual.gap.intervals import deviations
 from residual.gap.prepare import prepare
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect

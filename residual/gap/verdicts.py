@@ -47,11 +47,7 @@ def effect_verdict(
         together: Sets of effects that make the same motion in one exact proportion.
     """
     effect = search.candidates[claim.number].effect
-    sure = (
-        claim.needed and claim.steady and claim.sound and not claim.bounded
-        and not claim.rivals and not claim.alike and blocks >= TOO_FEW
-    )  # fmt: skip
-    kind: Kind = "confirmed" if sure else "ambiguous"
+    kind: Kind = "confirmed" if claim.sure and blocks >= TOO_FEW else "ambiguous"
     family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""
     numbers = ", ".join(
         f"{name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}"
@@ -70,6 +66,8 @@ def effect_verdict(
     if together:
         sets = " or ".join(" with ".join(names) for names in together[:2])
         says.append(f"{sets}, in one exact proportion, would move alike")
+    if claim.calibration:
+        says.append("parameters that are a few percent off would do as well")
     if not claim.needed:
         says.append("forecasts are not clearly worse without it")
     if not claim.steady:
@@ -93,6 +91,7 @@ def doubts(claim: Claim) -> tuple[Doubt, ...]:
         "unsteady": not claim.steady,
         "numerics": not claim.sound,
         "at_bound": claim.bounded,
+        "calibration": claim.calibration,
         "rivals": bool(claim.rivals or claim.alike),
     }
     return tuple(doubt for doubt, there in why.items() if there)

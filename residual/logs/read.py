@@ -26,6 +26,11 @@ class LogData:
     trajectories: tuple[Trajectory, ...]
     findings: tuple[Finding, ...]
 
+    def __repr__(self) -> str:
+        rows = sum(len(run.times) for run in self.trajectories)
+        count, told = len(self.trajectories), len(self.findings)
+        return f"LogData({count} trajectories, {rows} samples, {told} findings)"
+
 
 def read_logs(
     paths: Sequence[Any],

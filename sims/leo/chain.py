@@ -10,7 +10,6 @@ of a hundred sub-steps is too slow through properties.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import threading
 from collections.abc import Callable, Sequence
@@ -18,18 +17,8 @@ from collections.abc import Callable, Sequence
 import pymunk
 from pymunk._chipmunk_cffi import lib
 
-from sims.leo.body import (
-    FOOT,
-    GROUND,
-    HEEL,
-    PARENT,
-    PIVOT,
-    SHANK,
-    THIGH,
-    TOE,
-    WHEEL,
-    torso_with_load,
-)
+from sims.leo.body import GROUND, HEEL, PARENT, PIVOT, TOE, WHEEL
+from sims.leo.build import Build, links_of
 
 ITERATIONS = 10
 # The first sub-step starts from no impulses; unsolved rests of it would let a foot creep.
@@ -44,22 +33,6 @@ _set_limit = lib.cpConstraintSetMaxForce
 
 # Joint stops of the robot, hips, knees, ankles, in rad.
 STOPS = ((-0.785398, 2.548181), (-2.617994, 0.034907), (-1.570796, 1.448623))
-
-
-@dataclasses.dataclass(frozen=True)
-class Build:
-    """What one row of a batch is made of; SI units, see ``sims.leo.simulator.leo_parameters``."""
-
-    torso_mass: float
-    torso_inertia: float
-    arm_mass: float
-    thigh_mass: float
-    shank_mass: float
-    foot_mass: float
-    boom_mass: float
-    gravity: float
-    slope: float
-    ground_friction: float
 
 
 class Chain:
@@ -139,11 +112,7 @@ class Chain:
         if build == self._build:
             return
         self._build = build
-        torso = torso_with_load(
-            build.torso_mass, build.torso_inertia, build.arm_mass, build.boom_mass
-        )
-        legs = [(THIGH, build.thigh_mass), (SHANK, build.shank_mass), (FOOT, build.foot_mass)]
-        links = [(torso, torso.mass), *(leg for leg in legs for _ in range(2))]
+        links = links_of(build)
         self._centres = [link.centre for link, _ in links]
         for body, (link, mass) in zip(self._bodies, links, strict=True):
             body.mass, body.moment = mass, link.inertia

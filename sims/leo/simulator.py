@@ -11,7 +11,8 @@ import numpy as np
 from sims.effects.base import Effect
 from sims.host import HostSimulator, Joint
 from sims.leo.body import ARM, COORDINATES, FOOT, GEAR, MOTORS, SHANK, THIGH, TORSO
-from sims.leo.chain import Build, chain
+from sims.leo.build import Build
+from sims.leo.chain import chain
 from sims.leo.forces import Forces
 from sims.leo.render import LeoRenderer
 from sims.simulator import Array, Channel, Parameter

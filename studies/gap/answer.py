@@ -32,6 +32,7 @@ DOUBTS: dict[Doubt, str] = {
     "unsteady": "its size differs between parts of the data",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
+    "calibration": "parameters that are a few percent off would do nearly as well",
     "rivals": "an effect of another kind does nearly as well",
 }
 

@@ -28,7 +28,7 @@ NARROW = 4.0
 
 
 @styled()
-def shrinking(result: GapResult, path: Path) -> Drawing:
+def shrinking(result: GapResult, path: Path | None = None) -> Drawing:
     """One bar per step from the nominal simulator on, and a line for the noise."""
     gap = result.gap
     rows = [row for row in gap_rows(gap) if row[0] != FLOOR]
@@ -56,7 +56,8 @@ def shrinking(result: GapResult, path: Path) -> Drawing:
         [{"step": name, "value": s.value, "low": s.low, "high": s.high}
          for name, s in gap_rows(gap)]
     )  # fmt: skip
-    save_figure(figure, path, data)
+    if path:
+        save_figure(figure, path, data)
     return figure
 
 

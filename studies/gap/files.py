@@ -7,7 +7,6 @@ import dataclasses
 import os
 import secrets
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -87,23 +86,6 @@ def gap_record(
         "versions": versions(),
         "config": config,
     }
-
-
-def check_folder(folder: Path) -> None:
-    """Find out before the work whether its results can be written.
-
-    Raises:
-        ValueError: They cannot.
-    """
-    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-    if not there.is_dir():
-        raise ValueError(f"--output {folder}: {there} is a file, expected a folder")
-    try:
-        with tempfile.TemporaryDirectory(prefix=".partial-", dir=there):
-            pass
-    except OSError as error:
-        reason = error.strerror or error
-        raise ValueError(f"--output {folder} cannot be written: {reason}") from None
 
 
 @contextlib.contextmanager

@@ -18,13 +18,16 @@ from studies.reporting import Code, Prose, Report, Section, Table
 FINDINGS = 12
 
 
-def write_report(result: GapResult, record: Mapping[str, Any], folder: Path) -> Path:
-    """Figures as PNG with their numbers as CSV, and ``report.html``, into ``folder``.
+def write_report(
+    result: GapResult, record: Mapping[str, Any], folder: Path, name: str = "report.html"
+) -> Path:
+    """Figures as PNG with their numbers as CSV, and one page, into ``folder``.
 
     Args:
         result: What was found.
         record: What ``gap.json`` holds.
         folder: Where to.
+        name: Of the page.
     """
     figures = folder / "figures"
     sections: list[Section] = [
@@ -49,7 +52,7 @@ def write_report(result: GapResult, record: Mapping[str, Any], folder: Path) -> 
         sections,
         footer(record),
     )
-    return report.write(folder / "report.html")
+    return report.write(folder / name)
 
 
 def quality(result: GapResult, record: Mapping[str, Any]) -> list[Section]:

@@ -7,7 +7,7 @@ import importlib.util
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +18,25 @@ from studies.learning.settings import ALIASES, build_parser, instantiate, resolv
 from studies.learning.study import Config, Study
 from studies.learning.trial import code_of_trial, run_trial
 from studies.learnt.films import write_films
-from studies.learnt.many_trials import write_grid_report
-from studies.learnt.one_trial import policy_table, read_episodes, write_report
-from studies.running.command import check_output, expand_grid, fail
+from studies.learnt.report import read_episodes, write_report
+from studies.learnt.tables import write_tables
+from studies.running.command import check_output, expand_grid, fail, guarded
 from studies.running.curves import Curves
 from studies.running.progress import Bars, Progress, Several
 from studies.running.trials import Execution, Failures, read_trials, run_trials, trial_folder
 from studies.running.workers import WorkersError
 
 BEST = "best.json"
+
+
+def command(study: Study) -> Callable[..., None]:
+    """The function ``main(arguments=None)`` of a study's file."""
+
+    @guarded()
+    def main(arguments: Sequence[str] | None) -> None:
+        run_command(study, arguments)
+
+    return main
 
 
 def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
@@ -83,8 +93,8 @@ def run_single(
 def report_single(results: dict[str, Any], folder: Path) -> None:
     """Table and report of one trial from what it left in its folder."""
     films = {path.stem: path for path in sorted((folder / "films").glob("*.gif"))}
-    page = write_report(results, folder, read_episodes(results, folder), films)
-    print(f"\n{policy_table(results)}\n\nreport: {page}")
+    table = write_report([results], folder, read_episodes(results, folder), films)
+    print(f"\n{table}\n\nreport: {folder / 'report.html'}")
 
 
 def run_grid(
@@ -125,8 +135,9 @@ def report_grid(folder: Path) -> Failures:
     results, failures = read_trials(folder)
     if results:
         best = read_sealed(folder / BEST)["return"] if (folder / BEST).exists() else None
-        print(f"\n{write_grid_report(results, failures, folder, best)}")
-        print(f"\nreport: {folder / 'report.html'}")
+        write_tables(results, folder)
+        table = write_report(results, folder, failures=failures, best=best)
+        print(f"\n{table}\n\nreport: {folder / 'report.html'}")
     for path, failure in failures.items():
         reason = failure.strip().splitlines()[-1]
         print(f"failed: {path}: {reason} (see error.txt there)", file=sys.stderr)

@@ -38,44 +38,6 @@ class Result(Protocol):
 R = TypeVar("R", bound=Result)
 
 
-class Keeper(Protocol):
-    """Computes steps, or finds them again."""
-
-    def run(
-        self,
-        name: str,
-        settings: Mapping[str, Any],
-        code: Sequence[Any],
-        compute: Callable[[], R],
-        load: Callable[[Path, str], R],
-    ) -> R:
-        """The result of a step.
-
-        Args:
-            name: What the step does, for its folder.
-            settings: All that its result depends on, plain values; of earlier steps their keys.
-            code: Classes and functions that make it.
-            compute: Makes it.
-            load: Reads it from its folder, and takes its key.
-        """
-        ...
-
-
-class InMemory:
-    """Keeps nothing: every step is computed."""
-
-    def run(
-        self,
-        name: str,
-        settings: Mapping[str, Any],
-        code: Sequence[Any],
-        compute: Callable[[], R],
-        load: Callable[[Path, str], R],
-    ) -> R:
-        """Compute it."""
-        return compute()
-
-
 class OnDisk:
     """A folder of finished steps.
 
@@ -95,7 +57,15 @@ class OnDisk:
         compute: Callable[[], R],
         load: Callable[[Path, str], R],
     ) -> R:
-        """Read it if it is there, whole and of this code; else compute and keep it."""
+        """The result of a step: read if it is there, whole and of this code, else computed.
+
+        Args:
+            name: What the step does, for its folder.
+            settings: All that its result depends on, plain values; of earlier steps their keys.
+            code: Classes and functions that make it.
+            compute: Makes it.
+            load: Reads it from its folder, and takes its key.
+        """
         made_by = {"settings": settings, "code": code_of(*code)}
         try:
             described = json.dumps(made_by, sort_keys=True, indent=1)
@@ -103,10 +73,8 @@ class OnDisk:
             raise TypeError(f"step {name}: its settings are no plain values: {error}") from None
         key = f"{name}-{hashlib.sha256(described.encode()).hexdigest()[:12]}"
         folder = self.root / key
-        if folder.exists() and not damage(folder, described):
-            return load(folder, key)
+        # Whoever else needs it waits until it is there.
         with filelock.FileLock(self.root / f".{key}.lock"):
-            # Another process may have finished it while this one waited.
             if folder.exists() and (wrong := damage(folder, described)):
                 aside = self._set_aside(folder)
                 _log.warning("%s is damaged: set aside as %s, computed anew", wrong, aside)

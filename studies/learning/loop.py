@@ -26,7 +26,7 @@ from sims.simulator import Simulator
 from sims.system import EvaluationProtocol, System
 from sims.tasks import Task
 from studies.learning.budget import Budget
-from studies.learning.kept import InMemory, OnDisk
+from studies.learning.kept import OnDisk
 from studies.learning.outcome import Learnt
 from studies.learning.steps import Steps
 from studies.learning.warm_start import ReplayRule, WarmStart
@@ -142,7 +142,7 @@ def learn_by_difference(
         estimator or GaussianProcess(),
         algorithm,
         seed,
-        OnDisk(keep) if keep else InMemory(),
+        OnDisk(keep) if keep else None,
         progress or Bars(),
         replay,
         uncertainty_penalty,

@@ -12,6 +12,7 @@ from residual.difference import DifferenceModel
 from sims.system import System
 from studies.learning.results import Measured, Model
 from studies.learning.training import Training
+from studies.learnt.words import record_key
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,18 +94,21 @@ class Learnt:
         return policy_frame(self.policies)
 
     def plot(self) -> Figure:
-        """The return on the true system against the true samples used."""
-        from studies.learnt.figures import returns_figure
+        """The return on the true system after each update."""
+        from studies.learnt.figures import updates_figure
+        from studies.learnt.sections import policies_once
+        from studies.learnt.tables import tables_of
 
-        return returns_figure(self.results())[0]
+        return updates_figure(policies_once(tables_of([self.results()])[0]))[0]
 
     def report(self, path: str | Path) -> Path:
         """Write one HTML page (and figures beside it) and return its path."""
-        from studies.learnt.one_trial import write_report
+        from studies.learnt.report import write_report
 
         path = Path(path)
         episodes = {name: training.episode for name, training in self.trainings.items()}
-        return write_report(self.results(), path.parent, episodes, {}, path.name)
+        write_report([self.results()], path.parent, episodes, name=path.name)
+        return path
 
     def __repr__(self) -> str:
         if not self.policies:
@@ -171,9 +175,3 @@ def note_on(summary: Mapping[str, Any]) -> dict[str, str]:
     if held := summary.get("held"):
         notes.append(f"state held in {held} steps")
     return {"note": ", ".join(notes)} if notes else {}
-
-
-def record_key(record: Mapping[str, Any]) -> str:
-    """Name of a policy's files."""
-    name = record["name"]
-    return f"{name}-{record['iteration']}" if name in ("difference", "control") else name

@@ -30,7 +30,7 @@ from studies.learning.training import Training, exploration, train, transitions,
 from studies.learning.warm_start import Recorder, ReplayRule, WarmStart
 
 if TYPE_CHECKING:
-    from studies.learning.kept import Keeper
+    from studies.learning.kept import OnDisk
     from studies.running.progress import Progress
 
 # Policies learnt from nothing begin with random actions, the baselines too.
@@ -56,7 +56,7 @@ class Steps:
         estimator: Learns the difference; cloned, never changed.
         algorithm: Learns the policies.
         seed: Everything random follows from it.
-        keeper: Keeps the steps, or does not.
+        keeper: Keeps the steps; None keeps none.
         progress: Told what is going on.
         replay: See ``WarmStart``.
         uncertainty_penalty: See ``residual.uncertainty_penalty``.
@@ -67,7 +67,7 @@ class Steps:
     estimator: BaseEstimator
     algorithm: Algorithm
     seed: int
-    keeper: Keeper
+    keeper: OnDisk | None
     progress: Progress
     replay: ReplayRule = "first"
     uncertainty_penalty: float = 0.0
@@ -272,6 +272,8 @@ class Steps:
         return parts + [part for part in given if part is not None]
 
     def _kept(self, name: str, settings: Any, compute: Any, load: Any, *code: Any) -> Any:
+        if self.keeper is None:
+            return compute()
         everything = {**self._common, **settings}
         roots = [*self._code, *code, *sorted(modules_in(everything))]
         return self.keeper.run(name, everything, roots, compute, load)

@@ -16,6 +16,7 @@ import gymnasium
 import numpy as np
 
 from policy.learner import Learner
+from policy.replay import Seen
 from residual.corrected import CorrectedSimulator
 from residual.difference import DifferenceModel
 from sims.environment import SimulatorEnv, observe
@@ -89,11 +90,13 @@ class WarmStart:
                 elif self.rule == "all" and isinstance(simulator, CorrectedSimulator):
                     following = simulator.correct(states, actions, following)
                 learner.remember(
-                    observe(simulator, states),
-                    actions,
-                    task.reward(states, actions, following),
-                    observe(simulator, following),
-                    task.terminal(following),
+                    Seen(
+                        observe(simulator, states),
+                        actions,
+                        task.reward(states, actions, following),
+                        observe(simulator, following),
+                        task.terminal(following),
+                    )
                 )
                 done += len(states)
                 tell(done)

@@ -1,4 +1,4 @@
-"""Figures of one trial, of any system: each with the numbers behind it."""
+"""Figures of one trial or many, of any system: each with the numbers behind it."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from studies.learnt.words import Results, by_name, grouped, policy_name
-from studies.reporting.figures import draw_lines, draw_over_time, new_figure, styled
+from studies.learnt.statistics import mean
+from studies.learnt.words import Results, policy_name
+from studies.reporting.figures import PALETTE, draw_lines, draw_over_time, new_figure, styled
 
 Drawn = tuple[Figure, pd.DataFrame]
 
 #: So much of an episode is drawn, in s.
 SECONDS = 10.0
+#: Errors below are drawn here, or a model without error would flatten all others.
+LEAST_SHOWN = 1e-5
 _DASHED: Any = {"color": "#6e7781", "linestyle": (0, (4, 3)), "linewidth": 1.2}
 
 
@@ -53,75 +56,12 @@ def plain_ticks(axis: Axis) -> None:
 
 
 @styled()
-def returns_figure(results: Results) -> Drawn:
-    """Return on the true system against the true samples used, and of what it is compared with."""
-    figure, axes = new_figure(height=3.8)
-    axis = axes[0, 0]
-    start = results["policies"][0]
-    loop = [start, *by_name(results, "difference")]
-    series = {"difference model": [(r["true_samples"], r["return_true"]) for r in loop]}
-    if control := by_name(results, "control"):
-        # The control uses no true samples: it is drawn where its update is.
-        places = [r["true_samples"] for r in loop]
-        series["as long without it"] = [(0, start["return_true"])] + [
-            (place, r["return_true"]) for place, r in zip(places[1:], control, strict=False)
-        ]
-    for record in (*by_name(results, "cold"), *by_name(results, "warm")):
-        series[policy_name(record)] = [(step, value) for step, value in record["curve"]]
-    target, true = results["about"]["target"], by_name(results, "true")
-    levels = [("the target", target)] if target is not None else []
-    levels += [(policy_name(record), record["return_true"]) for record in true]
-    every = [value for points in series.values() for _, value in points]
-    factor = scale_of_returns(axis, [*every, *(level for _, level in levels)])
-    rows = []
-    drawn = {}
-    for name, points in series.items():
-        x, y = np.array(points, float).T
-        drawn[name] = (x, factor * y)
-        rows += [{"policy": name, "true_samples": a, "return": b} for a, b in points]
-    draw_lines(axis, drawn)
-    for words, level in levels:
-        reference_line(axis, factor * level, words)
-    axis.set_xlabel("true samples")
-    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
-    figure.legend(loc="outside upper left", ncols=2, handlelength=1.4)
-    return figure, pd.DataFrame(rows)
-
-
-@styled()
-def accuracy_figure(results: Results) -> Drawn:
-    """One-step error per update and group of channels, where the policy goes and elsewhere."""
-    groups = results["about"]["groups"]
-    rows = [
-        {"true_samples": record["true_samples"], "where": words, "channels": name, "error": error}
-        for record in results["accuracy"]
-        for where, words in (("visited", "where the policy goes"), ("uniform", "anywhere"))
-        if where in record
-        for name, error in grouped(record[where]["one_step"], groups).items()
-    ]
-    table = pd.DataFrame(rows, columns=["true_samples", "where", "channels", "error"])
-    names = list(dict.fromkeys(table["channels"])) or ["error"]
-    figure, axes = new_figure(len(names), 1, share_x=True, height=1.0 + 1.4 * len(names))
-    for axis, name in zip(axes[:, 0], names, strict=True):
-        for where, part in table[table["channels"] == name].groupby("where", sort=False):
-            axis.plot(part["true_samples"], part["error"], marker="o", label=where)
-        axis.set_ylabel(name)
-        if (table["error"] > 0).any():
-            axis.set_yscale("log")
-        axis.set_xticks(sorted(set(table["true_samples"])))
-    axes[-1, 0].set_xlabel("true samples")
-    handles = axes[0, 0].get_legend_handles_labels()
-    figure.legend(*handles, loc="outside upper left", ncols=2, handlelength=1.4)
-    return figure, table
-
-
-@styled()
 def curves_figure(results: Results) -> Drawn:
     """Test returns while learning, in what each policy learnt in."""
     series = {
         policy_name(record): tuple(np.array(record["curve"], float).T)
         for record in results["policies"]
-        if len(record["curve"]) > 1 and record["name"] not in ("cold", "warm")
+        if len(record["curve"]) > 1
     }
     figure, axes = new_figure(height=3.8)
     values = [value for _, y in series.values() for value in y]
@@ -139,14 +79,15 @@ def curves_figure(results: Results) -> Drawn:
 
 
 @styled()
-def episodes_figure(results: Results, episodes: Mapping[str, Mapping[str, np.ndarray]]) -> Drawn:
+def episodes_figure(
+    about: Mapping[str, Any], episodes: Mapping[str, Mapping[str, np.ndarray]]
+) -> Drawn:
     """The channels that the system shows, over the first seconds of each policy's episode.
 
     Args:
-        results: What ``results.json`` holds.
+        about: The system.
         episodes: ``states`` and ``actions`` by name of the policy.
     """
-    about = results["about"]
     names = [channel["name"] for channel in about["states"]]
     steps = round(SECONDS / about["dt"])
     wanted: list[tuple[str, int, dict[str, Any]]] = [
@@ -171,3 +112,82 @@ def episodes_figure(results: Results, episodes: Mapping[str, Mapping[str, np.nda
         rows[label] = series
     draw_over_time(figure, axes[:, 0], rows)
     return figure, pd.concat(data, ignore_index=True)
+
+
+@styled()
+def updates_figure(rows: pd.DataFrame) -> Drawn:
+    """Return per update by estimator, and of the control; ``rows`` hold every policy once."""
+    figure, axes = new_figure(height=3.8)
+    axis = axes[0, 0]
+    begin = rows[rows["name"] == "idealised"].drop_duplicates("seed")["return_true"].tolist()
+    loops = list(rows[rows["name"] == "difference"].groupby("estimator"))
+    if len(control := rows[rows["name"] == "control"]):
+        loops.append(("no difference model", control))
+    true = rows[rows["name"] == "true"].drop_duplicates("seed")["return_true"]
+    factor = scale_of_returns(axis, rows["return_true"].tolist())
+    numbers = []
+    for colour, (label, part) in zip(PALETTE * 2, loops, strict=False):
+        means = {0: mean(begin)} | {
+            int(group["iteration"].iloc[0]): mean(group["return_true"].tolist())
+            for _, group in part.groupby("iteration")
+        }
+        values = list(means.values())
+        axis.plot(list(means), [factor * m.value for m in values], "o-", color=colour, label=label)
+        bounds = [[factor * m.low for m in values], [factor * m.high for m in values]]
+        axis.fill_between(list(means), *bounds, color=colour, alpha=0.15, linewidth=0)
+        numbers += [
+            {"method": label, "update": k, "return": m.value, "half_width": m.half_width}
+            for k, m in means.items()
+        ]
+    if len(true):
+        reference_line(axis, factor * true.mean(), "learnt on the true system")
+    axis.set_xlabel("update")
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+    figure.legend(loc="outside upper left", ncols=3, handlelength=1.4)
+    return figure, pd.DataFrame(numbers)
+
+
+@styled()
+def budgets_figure(
+    rows: pd.DataFrame, errors: pd.DataFrame, about: Mapping[str, Any], best: float | None
+) -> Drawn:
+    """Return and one-step error after one update, against the true samples by estimator."""
+    figure, axes = new_figure(2, 1, height=6.4, share_x=True)
+    first = rows[(rows["name"] == "difference") & (rows["iteration"] == 1)]
+    visited = errors[(errors["where"] == "visited") & (errors["iteration"] == 1)]
+    groups = list(first.groupby("estimator", sort=False))
+    factor = scale_of_returns(axes[0, 0], first["return_true"].tolist())
+    numbers = []
+    for place, (colour, (estimator, part)) in enumerate(zip(PALETTE * 2, groups, strict=False)):
+        part = part.drop_duplicates(["true_samples", "seed"])
+        means = {
+            n: mean(group["return_true"].tolist()) for n, group in part.groupby("true_samples")
+        }
+        # Beside each other, or the intervals hide one another.
+        beside = 1.06 ** (place - (len(groups) - 1) / 2)
+        axes[0, 0].errorbar(
+            [n * beside for n in means], [factor * m.value for m in means.values()],
+            [m.half_width for m in means.values()], fmt="o-", color=colour, label=estimator,
+            elinewidth=1.2, capsize=2,
+        )  # fmt: skip
+        own = visited[visited["estimator"] == estimator]
+        channels = [f"one_step_{name}" for part in about["groups"].values() for name in part]
+        error = own.groupby("samples_per_update")[channels].mean().mean(axis=1)
+        axes[1, 0].plot(error.index * beside, np.maximum(error, LEAST_SHOWN), "o-", color=colour)
+        numbers += [
+            {"estimator": estimator, "true_samples": n, "return": m.value,
+             "half_width": m.half_width, "worst": m.worst, "one_step": error.get(n)}
+            for n, m in means.items()
+        ]  # fmt: skip
+    if best is not None:
+        reference_line(axes[0, 0], factor * best, "the best possible")
+    axes[0, 0].set_xscale("log")
+    axes[1, 0].set(
+        ylabel=f"one-step error / gap\n(at least {LEAST_SHOWN:g})",
+        yscale="log", xlabel="true samples",
+    )  # fmt: skip
+    axes[1, 0].set_xticks(sorted(first["true_samples"].unique()), minor=False)
+    axes[1, 0].set_xticks([], minor=True)
+    plain_ticks(axes[1, 0].xaxis)
+    figure.legend(loc="outside upper left", ncols=3, handlelength=1.4)
+    return figure, pd.DataFrame(numbers)

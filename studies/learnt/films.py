@@ -11,7 +11,7 @@ import numpy as np
 from simgap_files import atomic_write_bytes
 from sims.render import renderer_for
 from sims.simulator import Simulator
-from studies.learnt.one_trial import read_episodes
+from studies.learnt.report import read_episodes
 from studies.reporting.media import encode_gif
 
 SECONDS = 6.0

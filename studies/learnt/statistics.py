@@ -36,10 +36,16 @@ class Mean:
         return self.value + np.nan_to_num(self.half_width)
 
     def __str__(self) -> str:
-        return self.text(0 if abs(self.value) >= 100 else 1)
+        return self._decimals(0 if abs(self.value) >= 100 else 1)
 
     def text(self, digits: int) -> str:
-        """The mean and its interval with so many decimals."""
+        """The mean to so many digits, and its interval."""
+        if not np.isfinite(self.value):
+            return ""
+        size = np.floor(np.log10(abs(self.value))) if self.value else 0
+        return self._decimals(int(max(0, digits - 1 - size)))
+
+    def _decimals(self, digits: int) -> str:
         if self.count == 1:
             return f"{self.value:.{digits}f}"
         # With spaces that do not break a line.

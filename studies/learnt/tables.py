@@ -37,8 +37,7 @@ def write_tables(
     Returns:
         The two tables.
     """
-    named = apart(results)
-    rows, errors = policy_rows(named), accuracy_rows(named)
+    rows, errors = tables_of(results)
     for name, table in (("results", rows), ("accuracy", errors)):
         atomic_write_text(folder / f"{name}.csv", table.to_csv(index=False))
         with atomic_path(folder / f"{name}.parquet") as path:
@@ -47,14 +46,22 @@ def write_tables(
     return rows, errors
 
 
+def tables_of(results: Sequence[Mapping[str, Any]]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """One row per policy of every trial, and one per measurement of accuracy."""
+    named = apart(results)
+    return policy_rows(named), accuracy_rows(named)
+
+
 def apart(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """The trials, those with other settings told apart by their label.
 
     A mean over the trials of one label must not mix settings. Whatever differs between trials,
     beside what the tables have columns for, becomes part of the label and is kept as
-    ``settings``.
+    ``settings``. Those learnt from Python have neither label, seed nor settings.
     """
-    flat = [_flat(trial["config"]) for trial in results]
+    plain: dict[str, Any] = {"label": "difference model", "seed": 0, "config": {}}
+    trials = [plain | dict(trial) for trial in results]
+    flat = [_flat(trial["config"]) for trial in trials]
     names = dict.fromkeys(name for settings in flat for name in settings)
     differing = [
         name
@@ -64,10 +71,10 @@ def apart(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         and len({json.dumps(settings.get(name)) for settings in flat}) > 1
     ]
     named = []
-    for trial, settings in zip(results, flat, strict=True):
+    for trial, settings in zip(trials, flat, strict=True):
         text = ", ".join(f"{name}={settings.get(name)}" for name in differing)
         more = {"label": f"{trial['label']}, {text}", "settings": text} if text else {}
-        named.append(dict(trial) | more)
+        named.append(trial | more)
     return named
 
 
@@ -104,6 +111,7 @@ def accuracy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
             _trial(trial)
             | {
                 "iteration": record["iteration"],
+                "true_samples": record["true_samples"],
                 "where": where,
                 "fit_seconds": record["fit_seconds"],
                 "coverage90": record[where]["coverage90"],
@@ -126,7 +134,7 @@ def _trial(trial: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "estimator": trial["label"],
         "seed": trial["seed"],
-        "samples_per_update": trial["config"]["budget"]["true_samples"],
+        "samples_per_update": trial["config"].get("budget", {}).get("true_samples"),
         "made_by": trial.get("versions", {}).get("simgap", ""),
         **({"settings": trial["settings"]} if "settings" in trial else {}),
     }

@@ -75,7 +75,6 @@ def new_figure(
     width: float = 6.4,
     height: float = 3.2,
     share_x: bool = False,
-    share_y: bool = False,
 ) -> tuple[Figure, np.ndarray]:
     """An empty figure in our style, without pyplot and its global list of figures.
 
@@ -88,40 +87,27 @@ def new_figure(
         width: In inches, of the whole figure.
         height: In inches, of the whole figure.
         share_x: One x axis for all.
-        share_y: One y axis for all.
 
     Returns:
         The figure, and its axes in an array of shape (rows, columns).
     """
     with styled():
         figure = Figure(figsize=(width, height))
-        axes = figure.subplots(rows, columns, sharex=share_x, sharey=share_y, squeeze=False)
+        axes = figure.subplots(rows, columns, sharex=share_x, squeeze=False)
     return figure, axes
 
 
-def draw_lines(
-    axis: Axes,
-    series: Mapping[str, tuple[ArrayLike, ArrayLike]],
-    *,
-    bands: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
-) -> None:
-    """Draw curves, and a shaded band around those that have one, into one axis.
+def draw_lines(axis: Axes, series: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> None:
+    """Draw curves into one axis.
 
     Args:
         axis: Of a figure of ours.
         series: x and y by name, each of shape (n,); a NaN makes a gap.
-        bands: Lower and upper y by name, for some or all of ``series``.
     """
     for name, (x, y) in series.items():
         x, y = np.asarray(x, float), np.asarray(y, float)
         few = len(x) <= 12
-        (curve,) = axis.plot(x, y, label=name, marker="o" if few else None, markersize=4.5)
-        if bands and name in bands:
-            low, high = bands[name]
-            axis.fill_between(
-                x, np.asarray(low, float), np.asarray(high, float),
-                color=curve.get_color(), alpha=0.18, linewidth=0,
-            )  # fmt: skip
+        axis.plot(x, y, label=name, marker="o" if few else None, markersize=4.5)
 
 
 def draw_over_time(

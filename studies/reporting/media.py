@@ -25,7 +25,6 @@ _SIGNATURES = (
     (b"\x89PNG\r\n\x1a\n", "image/png"),
     (b"\xff\xd8\xff", "image/jpeg"),
     (b"GIF8", "image/gif"),
-    (b"\x1a\x45\xdf\xa3", "video/webm"),
 )
 
 
@@ -48,18 +47,13 @@ class Media:
         """A ``data:`` address that holds the content."""
         return f"data:{self.kind};base64,{base64.b64encode(self.data).decode('ascii')}"
 
-    @property
-    def is_video(self) -> bool:
-        """True if it needs a player."""
-        return self.kind.startswith("video/")
-
 
 def load_media(source: Figure | Media | bytes | str | Path) -> Media:
     """A figure, the bytes of a file, or its path, as ``Media``.
 
     Raises:
         OSError: The file cannot be read.
-        ValueError: It is none of PNG, JPEG, GIF, SVG, MP4, WebM.
+        ValueError: It is none of PNG, JPEG, GIF, SVG.
     """
     if isinstance(source, Media):
         return source
@@ -73,11 +67,9 @@ def load_media(source: Figure | Media | bytes | str | Path) -> Media:
     for signature, kind in _SIGNATURES:
         if data.startswith(signature):
             return Media(data, kind)
-    if data[4:8] == b"ftyp":
-        return Media(data, "video/mp4")
     if b"<svg" in data[:2000]:
         return Media(data, "image/svg+xml")
-    raise ValueError(f"{name} is none of PNG, JPEG, GIF, SVG, MP4, WebM")
+    raise ValueError(f"{name} is none of PNG, JPEG, GIF, SVG")
 
 
 def narrowed(source: object) -> Media | None:

@@ -70,15 +70,12 @@ class Figure(Section):
         source: A matplotlib figure, or the bytes or path of a PNG, SVG or JPEG.
         alt: What it shows, for those who cannot see it: the finding, not "a plot".
         caption: Text under it; markup as in ``Prose``.
-        narrow: Shown instead on screens up to 640 px wide, where the text of a wide figure becomes
-            too small; a matplotlib figure of one column is laid out anew by itself.
     """
 
     template: ClassVar[str] = "figure.html"
     source: Source
     alt: str
     caption: str = ""
-    narrow: Source | None = None
 
     @property
     def picture(self) -> Media:
@@ -87,13 +84,12 @@ class Figure(Section):
 
     @property
     def narrow_picture(self) -> Media | None:
-        """``narrow``, or the figure laid out anew, ready to be put into the page."""
-        return narrowed(self.source) if self.narrow is None else load_media(self.narrow)
+        """A matplotlib figure of one column laid out anew for screens up to 640 px wide."""
+        return narrowed(self.source)
 
     def small(self) -> Figure:
         """The same with its narrow picture at any width."""
-        picture = self.narrow_picture or self.picture
-        return dataclasses.replace(self, source=picture, narrow=None)
+        return dataclasses.replace(self, source=self.narrow_picture or self.picture)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,7 +106,7 @@ class Animation(Section):
     """A moving picture; readers who ask their system for less motion see one still of it.
 
     Args:
-        source: Bytes or path of a GIF, MP4 or WebM; see ``media.encode_gif``.
+        source: Bytes or path of a GIF; see ``media.encode_gif``.
         alt: What happens in it.
         caption: Text under it; markup as in ``Prose``.
     """
@@ -127,7 +123,7 @@ class Animation(Section):
 
     @property
     def still(self) -> Media | None:
-        """The middle frame of a GIF; None for a video, which waits for the reader anyway."""
+        """The middle frame."""
         return still(self.picture)
 
     def small(self) -> Animation:

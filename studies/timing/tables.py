@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from studies.reporting.markdown import markdown
 from studies.timing import fit_scaling
 
 PEERS = {"GaussianProcess": "GaussianProcessRegressor", "DropoutNet": "MLPRegressor"}
@@ -215,15 +216,6 @@ def _simulators(found: Sequence[Record]) -> str:
     ]
     head = ["simulator", "rows", "control steps/s", "Gymnasium Pendulum-v1, steps/s", "times"]
     return markdown([*head, "one-step error, rad", "rad/s"], rows)
-
-
-def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A Markdown table; nothing if there are no rows."""
-    body = [" | ".join(row) for row in rows]
-    if not body:
-        return ""
-    lines = [" | ".join(head), " | ".join("---" for _ in head), *body]
-    return "\n".join(f"| {line} |" for line in lines)
 
 
 def _of(found: Sequence[Record], test: str) -> list[Record]:

@@ -75,7 +75,8 @@ def test_a_mujoco_environment_is_the_true_system(folder, learner):
     pytest.importorskip("imageio")
     command = blocks("bash")[1 if learner == "ddpg" else 2]
     small = "{policy_kwargs: {net_arch: [16, 16]}, learning_starts: 100}"
-    more = SMALL_DDPG if learner == "ddpg" else ["--learner_options", small]
+    few = ["--budget.idealised_steps", "500", "--budget.difference_steps", "300"]
+    more = SMALL_DDPG if learner == "ddpg" else ["--learner_options", small, *few]
     found = learnt(folder, command, more)
     _first, second = found["policies"]
     assert second["true_samples"] == 150 and second["updates"] > 0

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from policy import DDPG, Algorithm, DDPGConfig, action_of, learn_and_select, load_policy, rollout
+from policy.replay import Seen
 from tests.policy.tiny import Reach
 
 pytest.importorskip("stable_baselines3")
@@ -38,7 +39,7 @@ def test_what_is_remembered_is_learnt_from_at_once():
     learner = ALGORITHMS[0].make(Reach(), 0)
     rng = np.random.default_rng(1)
     rows = rng.normal(size=(60, 2)), rng.uniform(-2, 1, (60, 1)), rng.normal(size=60)
-    learner.remember(*rows, rng.normal(size=(60, 2)), np.zeros(60, bool))
+    learner.remember(Seen(*rows, rng.normal(size=(60, 2)), np.zeros(60, bool)))
     assert learner.model.replay_buffer.size() == 60
     kept = learner.model.replay_buffer.actions[:60, 0]
     np.testing.assert_allclose(kept, 2 * (rows[1] + 2) / 3 - 1, atol=1e-6)
@@ -51,7 +52,7 @@ def test_ours_and_theirs_remember_the_same_actions():
     rng = np.random.default_rng(1)
     actions = rng.uniform(-2, 1, (5, 1))
     zeros = np.zeros((5, 2))
-    agent.remember(zeros, actions, np.ones(5), zeros, np.zeros(5, bool))
+    agent.remember(Seen(zeros, actions, np.ones(5), zeros, np.zeros(5, bool)))
     np.testing.assert_allclose(agent.replay.stored()[:, 2:3], 2 * (actions + 2) / 3 - 1, atol=1e-6)
     np.testing.assert_allclose(agent.replay.stored()[:, 3], agent.config.reward_scale)
 

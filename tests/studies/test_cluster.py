@@ -15,16 +15,16 @@ from safetensors.numpy import load_file
 
 # budgets.yaml with tiny steps, budgets and networks.
 GRID = """
-budget: {iterations: 1, idealised_steps: 1050, difference_steps: 400}
+budget: {iterations: 1, idealised_steps: 500, difference_steps: 400}
 ddpg: {hidden: [16, 16], warm_up: 300}
 grid:
-- seed: [0, 1]
-  budget.true_samples: [40, 60]
+- seed: [0, 1, 2]
+  budget.true_samples: [40]
   estimator:
   - {class_path: residual.Linear}
   - {class_path: residual.DropoutNet, init_args: {hidden: [16], epochs: 2}}
 """
-TRIALS = 8
+TRIALS = 6
 
 
 def arguments(folder, *more):

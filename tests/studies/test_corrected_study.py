@@ -10,6 +10,7 @@ from sims.loading import corrected_settings, simulator_settings
 from sims.pendulum import Pendulum
 from sims.tasks import SwingUp
 from studies import pendulum_gap
+from studies.learning.settings import build_parser
 
 
 def test_the_difference_study_takes_a_corrected_simulator(tmp_path):
@@ -17,14 +18,14 @@ def test_the_difference_study_takes_a_corrected_simulator(tmp_path):
     path = tmp_path / "corrected.yaml"
     path.write_text(json.dumps(corrected_settings(simulator_settings(
         "sims.pendulum.Pendulum"), effects)))  # fmt: skip
-    parser = pendulum_gap.build_parser()
+    parser = build_parser(pendulum_gap.STUDY)
     chosen = parser.instantiate(parser.parse_args(["--simulator", str(path)])).simulator
     assert chosen.effects == tuple(effects)
     mine, plain = (SimulatorEnv(s, SwingUp()) for s in (chosen, Pendulum()))
     assert mine.observation_space == plain.observation_space
     arguments = [
-        "--simulator", str(path), "--budget.iterations", "0", "--budget.idealised_steps", "1100",
-        "--ddpg.hidden", "[16, 16]", "--output", str(tmp_path / "policy"),
+        "--simulator", str(path), "--budget.iterations", "0", "--budget.idealised_steps", "300",
+        "--ddpg.hidden", "[16, 16]", "--ddpg.warm_up", "100", "--output", str(tmp_path / "policy"),
     ]  # fmt: skip
     pendulum_gap.main(arguments)
     config = json.loads((tmp_path / "policy" / "results.json").read_text())["config"]

@@ -14,7 +14,7 @@ from sims.tasks import SwingUp
 from studies.learning import steps as steps_module
 from studies.learning import streams, training
 from studies.learning.budget import Budget
-from studies.learning.kept import InMemory, OnDisk
+from studies.learning.kept import OnDisk
 from studies.learning.loop import learn_by_difference, run_loop
 from studies.learning.steps import Steps
 from studies.running.progress import Silent
@@ -104,7 +104,7 @@ def timeless(records):
 
 def test_in_memory_is_the_same_as_kept_on_disk(learnt):
     rule, outcome = learnt
-    memory = learnt_with(InMemory(), rule)
+    memory = learnt_with(None, rule)
     assert timeless(memory.policies) == timeless(outcome.policies)
     assert timeless(memory.accuracy) == timeless(outcome.accuracy)
     for name, kept in outcome.trainings.items():
@@ -123,7 +123,7 @@ def test_no_two_steps_share_a_random_stream(monkeypatch):
 
     for module in (steps_module, training):
         monkeypatch.setattr(module, "stream", watched)
-    learnt_with(InMemory())
+    learnt_with(None)
     purposes = {purpose for _, purpose in drawn}
     # Nothing is drawn twice, and no two purposes begin within reach of each other.
     assert len(drawn) == len(purposes) >= 30

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from studies import leo_gap
-from studies.learnt.many_trials import write_grid_report
+from studies.learnt.report import write_report
 from studies.learnt.statistics import mean
 from studies.learnt.words import grouped
 from studies.systems.leo import EVALUATION, GROUPS
@@ -65,7 +65,7 @@ def test_the_report_shows_it_walking_and_carries_everything(folder):
     page = (folder / "report.html").read_text()
     assert page.count("data:image/gif") == 3
     assert "http://" not in page.replace("http://www.w3.org", "")
-    for name in ("trajectories", "returns", "curves"):
+    for name in ("trajectories", "updates", "curves"):
         assert (folder / "figures" / f"{name}.png").stat().st_size > 1000
 
 
@@ -75,15 +75,15 @@ def test_a_table_over_trials(results, tmp_path):
     learnt = next(p for p in other["policies"] if p["name"] == "difference")
     control["return_true"] = learnt["return_true"] - 100.0
     mine = {p["name"]: p["return_true"] for p in results["policies"]}
-    text = write_grid_report([results, other], {}, tmp_path)
+    text = write_report([results, other], tmp_path)
     pairs = mean([mine["difference"] - mine["control"], 100.0])
     assert str(pairs) in text
     assert "Linear, update 1" in text and "no difference model, update 1" in text
     page = (tmp_path / "report.html").read_text()
-    for words in ("309 766", "Samples to a return", "Linear returns"):
+    for words in ("309 766", "Samples to a return", "Linear, update 1"):
         assert words in page
     errors = grouped(results["accuracy"][0]["visited"]["one_step"], GROUPS)
-    assert "Accuracy where the policies go" in page and f"{errors['base']:.3f}" in page
+    assert "Where the difference model is right" in page and f"{errors['base']:.3g}"[:4] in page
 
 
 def test_a_wrong_budget_is_one_line(capsys, tmp_path):

@@ -63,10 +63,10 @@ def wave():
     return {"measured": (t, np.sin(t)), "nominal": (t, np.cos(t))}
 
 
-def drawn(series, width=6.4, **more):
+def drawn(series, width=6.4):
     with figures.styled():
         figure, axes = figures.new_figure(width=width)
-        figures.draw_lines(axes[0, 0], series, **more)
+        figures.draw_lines(axes[0, 0], series)
         axes[0, 0].set(xlabel="time (s)", ylabel="angle (rad)")
         figure.legend(loc="outside upper left", ncols=4)
     return figure
@@ -263,7 +263,7 @@ def test_saved_figure_has_its_numbers_beside_it(tmp_path):
 
 def test_drawing_leaves_no_global_state_behind():
     before = dict(matplotlib.rcParams)
-    drawn(wave(), bands={"nominal": (np.zeros(50), np.ones(50))})
+    drawn(wave())
     assert dict(matplotlib.rcParams) == before
     if "matplotlib.pyplot" in sys.modules:
         assert not sys.modules["matplotlib.pyplot"].get_fignums()

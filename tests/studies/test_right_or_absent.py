@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -64,29 +65,49 @@ def bytes_of(folder, output):
     return {path.name: path.read_bytes() for path in files}
 
 
-def test_an_edited_estimator_is_fitted_and_trained_with_again(tmp_path):
-    (tmp_path / "mine.py").write_text(ESTIMATOR)
-    first = run(tmp_path, "run")
+@pytest.fixture(scope="module")
+def first(tmp_path_factory):
+    """A folder with an estimator of one's own, and a run with it in a process of its own."""
+    folder = tmp_path_factory.mktemp("first")
+    (folder / "mine.py").write_text(ESTIMATOR)
+    return folder, run(folder, "run")
+
+
+@pytest.fixture
+def here(first, monkeypatch):
+    monkeypatch.syspath_prepend(first[0])
+    monkeypatch.chdir(first[0])
+    return first[0]
+
+
+def test_the_same_run_computes_nothing_anew(first, here):
+    before = kept(here, "run")
+    quick_gap.main([*TINY, "--output", "run"])
+    assert (
+        json.loads((here / "run" / "results.json").read_text())["accuracy"]
+        == (first[1]["accuracy"])
+    )
+    assert kept(here, "run") == before
+
+
+def test_two_runs_give_the_same_policy_files_byte_by_byte(here):
+    quick_gap.main([*TINY, "--output", "two"])
+    one, two = (bytes_of(here, output) for output in ("run", "two"))
+    assert one == two and len(one) == 2
+
+
+def test_an_edited_estimator_is_fitted_and_trained_with_again(first, tmp_path):
+    shutil.copytree(first[0] / "run", tmp_path / "run")
     before, policies = kept(tmp_path, "run"), bytes_of(tmp_path, "run")
-    assert run(tmp_path, "run")["accuracy"] == first["accuracy"]
-    assert kept(tmp_path, "run") == before
     (tmp_path / "mine.py").write_text(ESTIMATOR.replace("FACTOR = 1.0", "FACTOR = 0.5"))
     second = run(tmp_path, "run")
     added = {name.split("-")[0] for name in kept(tmp_path, "run").keys() - before.keys()}
     assert added == {"fit", "difference", "measure"}
-    error = [r["accuracy"][0]["visited"]["one_step"]["rate"] for r in (first, second)]
+    error = [r["accuracy"][0]["visited"]["one_step"]["rate"] for r in (first[1], second)]
     assert error[1] > error[0] + 0.2
     after = bytes_of(tmp_path, "run")
     assert after["idealised.safetensors"] == policies["idealised.safetensors"]
     assert after["difference-1.safetensors"] != policies["difference-1.safetensors"]
-
-
-def test_two_runs_give_the_same_policy_files_byte_by_byte(tmp_path):
-    (tmp_path / "mine.py").write_text(ESTIMATOR)
-    for output in ("one", "two"):
-        run(tmp_path, output)
-    one, two = (bytes_of(tmp_path, output) for output in ("one", "two"))
-    assert one == two and len(one) == 2
 
 
 def learn(root, rule):

@@ -11,7 +11,7 @@ import pandas as pd
 from simgap_files import atomic_write_text
 from studies.hidden.dirty.score import finite
 from studies.hidden.report import count, share
-from studies.reporting.markdown import markdown
+from studies.reporting.markdown import frame_markdown
 
 #: Held-out error over the oracle's that is asked for, and room for "never worse than nominal".
 RATIO, SAME = 1.3, 1.02
@@ -169,8 +169,8 @@ def write_dirty(results: Sequence[Mapping[str, Any]], output: Path) -> None:
     atomic_write_text(output / "dirty.csv", frame.to_csv(index=False))
     told = pd.DataFrame(headlines(rows), columns=["what", "wanted", "found"])
     parts = [
-        f"# Dirty world: {len(rows)} sets\n", markdown(told), "\n## Every cell\n",
-        markdown(cells(rows)), "\n## By effect\n", markdown(by_effect(rows)), "\n## Misses\n",
-        "".join(f"- {line}\n" for line in misses(rows)) or "none\n",
+        f"# Dirty world: {len(rows)} sets\n", frame_markdown(told), "\n## Every cell\n",
+        frame_markdown(cells(rows)), "\n## By effect\n", frame_markdown(by_effect(rows)),
+        "\n## Misses\n", "".join(f"- {line}\n" for line in misses(rows)) or "none\n",
     ]  # fmt: skip
     atomic_write_text(output / "dirty.md", "\n".join(parts))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from residual.gap import GapResult, find_gap
+from residual.gap.result import Verdict
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.effects.library import exact_aliases, library
@@ -103,14 +104,7 @@ def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, An
         "sure": sure,
         "kinds": [v.kind for v in result.verdicts],
     }
-    # A parameter of the simulator that is off a little, as all are, is a name for something true.
-    row["truly_off"] = [
-        _label(v)
-        for v in chosen
-        if v.effect in made.truth.off
-        and v.effect != made.label
-        and v.parameters["change"].value * made.truth.off[v.effect] > 0
-    ]
+    row["truly_off"] = [_label(verdict) for verdict in chosen if truly_off(verdict, made)]
     if not made.label:
         return row | {"first": None, "family": None, "among": None, "wrong_sure": list(sure)}
     right = twins | _family(made.label, made.simulator, offered)
@@ -119,15 +113,34 @@ def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, An
     row["first"] = first in twins
     row["family"] = first in right
     row["among"] = bool(among & right)
+    right |= together(made.label, made.simulator, row["named"])
     row["wrong_sure"] = [name for name in sure if name not in right]
     return row
+
+
+def truly_off(verdict: Verdict, made: Dirty) -> bool:
+    """Whether a verdict names a parameter that is off, as all are a little, or its exact twin."""
+    label = _label(verdict)
+    (strength,) = [n.value for n in verdict.parameters.values()][:1]
+    parameters = [name for name in same_as(label, made.simulator) if name in made.truth.off]
+    return label != made.label and any(made.truth.off[name] * strength > 0 for name in parameters)
+
+
+def together(label: str, simulator: HostSimulator, named: Sequence[str]) -> frozenset[str]:
+    """Named effects that, all of them in one exact proportion, make the motion of another."""
+    found: set[str] = set()
+    for alias in exact_aliases(simulator):
+        others = [same_as(name, simulator) for name in alias.effects if name != label]
+        if alias.combination and label in alias.effects and all(o & set(named) for o in others):
+            found.update(*others)
+    return frozenset(found)
 
 
 def same_as(label: str, simulator: HostSimulator) -> frozenset[str]:
     """Labels that mean exactly the same motion, its own included; none for no label."""
     found = {label} if label else set()
     for alias in exact_aliases(simulator):
-        if "combination" not in alias.says and label in alias.effects:
+        if not alias.combination and label in alias.effects:
             found |= set(alias.effects)
     return frozenset(found)
 

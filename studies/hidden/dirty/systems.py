@@ -15,14 +15,25 @@ from sims.simulator import Array, Channel, Parameter
 GRAVITY = 9.81
 
 
+def _angle(name: str) -> tuple[Channel, Channel]:
+    """An angle and its rate."""
+    return (
+        Channel(name, "rad", "position", angle=True),
+        Channel(f"{name} rate", "rad/s", "rate", rate_of=name, scale=3.0),
+    )
+
+
+def _solved(a: Array, b: Array, d: Array, first: Array, second: Array) -> Array:
+    """Accelerations (n, 2) of two coordinates with the mass matrix [[a, b], [b, d]]."""
+    forces = np.stack([d * first - b * second, a * second - b * first], axis=1)
+    return forces / (a * d - b * b)[:, None]
+
+
 class Arm(EquationOfMotion):
     """A link that swings in a vertical plane, driven by a torque; the angle counts from hanging."""
 
     name = "arm"
-    state_channels = (
-        Channel("shoulder", "rad", "position", angle=True),
-        Channel("shoulder rate", "rad/s", "rate", rate_of="shoulder", scale=3.0),
-    )
+    state_channels = _angle("shoulder")
     action_channels = (Channel("torque", "N m", "input", scale=3.0),)
     parameters = {  # noqa: RUF012
         "mass": Parameter(1.0, "kg", "mass at the end of the link", low=0.01),
@@ -41,12 +52,7 @@ class TwoLinkArm(EquationOfMotion):
     """Two links with point masses at their ends in a vertical plane, a torque at each joint."""
 
     name = "two-link arm"
-    state_channels = (
-        Channel("shoulder", "rad", "position", angle=True),
-        Channel("shoulder rate", "rad/s", "rate", rate_of="shoulder", scale=3.0),
-        Channel("elbow", "rad", "position", angle=True),
-        Channel("elbow rate", "rad/s", "rate", rate_of="elbow", scale=3.0),
-    )
+    state_channels = (*_angle("shoulder"), *_angle("elbow"))
     action_channels = (
         Channel("shoulder torque", "N m", "input", scale=5.0),
         Channel("elbow torque", "N m", "input", scale=2.0),
@@ -68,11 +74,7 @@ class TwoLinkArm(EquationOfMotion):
         first = u[:, 0] + force[:, 0] - elbow - hand
         first = first + swing * v[:, 1] * (2 * v[:, 0] + v[:, 1])
         second = u[:, 1] + force[:, 1] - hand - swing * v[:, 0] ** 2
-        a, b, d = both * p.upper_length**2 + far + 2 * bend, far + bend, far
-        determinant = a * d - b * b
-        return np.stack(
-            [(d * first - b * second) / determinant, (a * second - b * first) / determinant], axis=1
-        )
+        return _solved(both * p.upper_length**2 + far + 2 * bend, far + bend, far, first, second)
 
 
 class HangingCart(EquationOfMotion):
@@ -82,8 +84,7 @@ class HangingCart(EquationOfMotion):
     state_channels = (
         Channel("cart", "m", "position", scale=0.5),
         Channel("cart rate", "m/s", "rate", rate_of="cart"),
-        Channel("hinge", "rad", "position", angle=True),
-        Channel("hinge rate", "rad/s", "rate", rate_of="hinge", scale=3.0),
+        *_angle("hinge"),
     )
     action_channels = (Channel("push", "N", "input", scale=4.0),)
     parameters = {  # noqa: RUF012
@@ -100,11 +101,7 @@ class HangingCart(EquationOfMotion):
         on_cart = u[:, 0] + force[:, 0] + swing * v[:, 1] ** 2 * np.sin(q[:, 1])
         on_cart = on_cart - p.stiffness * q[:, 0]
         on_pole = force[:, 1] - GRAVITY * swing * np.sin(q[:, 1])
-        determinant = a * d - b * b
-        return np.stack(
-            [(d * on_cart - b * on_pole) / determinant, (a * on_pole - b * on_cart) / determinant],
-            axis=1,
-        )
+        return _solved(a, b, d, on_cart, on_pole)
 
 
 class Oven(FirstOrderSystem):

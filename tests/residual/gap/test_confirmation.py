@@ -7,7 +7,8 @@ import pytest
 from toy import Toy
 
 from residual.gap.candidates import candidates
-from residual.gap.confirmation import Claim, at_bound, bounded, near, needed, steady, survives
+from residual.gap.confirmation import Claim, near, needed, steady, survives
+from residual.gap.intervals import at_bound, bounded
 from residual.gap.model import Model
 from residual.gap.result import Number
 from residual.gap.samples import Samples

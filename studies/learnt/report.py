@@ -1,0 +1,156 @@
+"""The report over one trial or many, of any system: verdict, pictures, tables."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from studies.learnt.figures import (
+    SECONDS,
+    budgets_figure,
+    curves_figure,
+    episodes_figure,
+    updates_figure,
+)
+from studies.learnt.samples_needed import samples_section
+from studies.learnt.sections import (
+    accuracy_section,
+    headline,
+    policies_once,
+    policies_section,
+    summarise,
+)
+from studies.learnt.tables import apart, tables_of
+from studies.learnt.words import Results, by_name, measures_of, policy_name, record_key
+from studies.reporting import Animation, Code, Figure, Gallery, KeyValues, Report, Section
+from studies.reporting.figures import save_figure
+
+Episodes = Mapping[str, Mapping[str, np.ndarray]]
+
+
+def read_episodes(results: Results, folder: Path) -> dict[str, dict[str, np.ndarray]]:
+    """The episode of every policy that left one in ``folder/rollouts``, by ``record_key``."""
+    found = {}
+    for record in results["policies"]:
+        path = folder / "rollouts" / f"{record_key(record)}.npz"
+        if path.exists():
+            found[record_key(record)] = read_npz(path)
+    return found
+
+
+def write_report(
+    results: Sequence[Results],
+    folder: Path,
+    episodes: Episodes | None = None,
+    films: Mapping[str, Path] | None = None,
+    failures: Mapping[Path, str] | None = None,
+    best: float | None = None,
+    name: str = "report.html",
+) -> str:
+    """Figures as PNG with their numbers as CSV, and one page, into ``folder``.
+
+    Args:
+        results: Of every finished trial, what its ``results.json`` holds.
+        folder: Where to write.
+        episodes: Of a single trial, one of each policy on the true system, by ``record_key``.
+        films: GIF files of some of them.
+        failures: Traceback of every failed trial, by folder.
+        best: The best return that is possible, if it is known.
+        name: Of the page.
+
+    Returns:
+        The table of the policies as text.
+    """
+    about = results[0]["about"]
+    rows, errors = tables_of(results)
+    once = policies_once(rows)
+    measures = list(dict.fromkeys(m for p in results[0]["policies"] for m in measures_of(p)))
+    summary = summarise(once, errors, about, measures)
+    sections: list[Section] = headline(once, errors, about, best)
+    if failures:
+        text = "\n".join(f"{path}\n{failure}" for path, failure in failures.items())
+        told = f"{len(failures)} trials failed and are in no mean"
+        sections.append(Code(text, summary=told, heading="Failed trials"))
+    drawings = []
+    if episodes:
+        titles = _shown(results[0])
+        moving = {title: films[key] for key, title in titles.items() if films and key in films}
+        if moving:
+            pictures = [
+                Animation(path, f"The true system under the policy: {title}.", title)
+                for title, path in moving.items()
+            ]
+            caption = "The first seconds on the **true** system."
+            sections.append(Gallery(pictures, caption, heading="Before and after"))
+        drawn = {title: episodes[key] for key, title in titles.items() if key in episodes}
+        drawings.append((
+            "trajectories", episodes_figure(about, drawn), "Episodes on the true system",
+            "State and action over time for each policy on the true system.",
+            f"The first {SECONDS:g} s on the true system; a line ends where its episode ends.",
+        ))  # fmt: skip
+    learnt = rows[rows["name"] == "difference"]
+    if learnt["samples_per_update"].nunique() > 1:
+        drawings.append((
+            "budgets", budgets_figure(rows, errors, about, best), "Return by sample budget",
+            "Return and accuracy against the number of true samples for each estimator.",
+            "After one update, mean and 95 % interval of the mean over seeds; below, the one-step "
+            "error where the policy goes, as a share of the gap.",
+        ))  # fmt: skip
+    if len(learnt):
+        drawings.append((
+            "updates", updates_figure(once), "Return by update",
+            "Return on the true system after each update, with and without a difference model.",
+            "Mean over seeds and its 95 % interval, in tests on the true system that are not "
+            "counted as samples; dashed, learnt on the true system.",
+        ))  # fmt: skip
+    if len(results) == 1:
+        drawings.append((
+            "curves", curves_figure(results[0]), "Learning curves",
+            "Return while learning against steps.",
+            "Tests in what each policy learns in; the best of them is kept. Cold and warm start "
+            "learn on the true system: their steps are true samples.",
+        ))  # fmt: skip
+    for file, (figure, numbers), heading, alt, caption in drawings:
+        save_figure(figure, folder / "figures" / f"{file}.png", numbers)
+        sections.append(Figure(figure, alt, caption, heading=heading))
+    sections += [
+        policies_section(summary, about, best),
+        *accuracy_section(errors, about),
+        *samples_section(once, apart(results), about),
+        *_provenance(results),
+    ]
+    title = f"{about['name'].replace('_', ' ').capitalize()}: closing the simulation gap"
+    seeds = len(set(rows["seed"]))
+    subtitle = f"{len(results)} trials, {seeds} seeds"
+    if len(results) == 1:
+        own = [results[0].get("label", ""), f"seed {results[0].get('seed', 0)}"]
+        subtitle = ", ".join(filter(None, own))
+    Report(title, subtitle, sections).write(folder / name)
+    return summary.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
+
+
+def _shown(results: Results) -> dict[str, str]:
+    """The policies that pictures show: name of their files, and in words."""
+    last = by_name(results, "difference")[-1:]
+    shown = [
+        *by_name(results, "idealised"), *last, *by_name(results, "corrected"),
+        *by_name(results, "true"),
+    ]  # fmt: skip
+    return {record_key(record): policy_name(record) for record in shown}
+
+
+def _provenance(results: Sequence[Results]) -> list[Section]:
+    """What made the numbers."""
+    sections: list[Section] = []
+    if "versions" in results[0]:
+        sections.append(KeyValues(dict(results[0]["versions"]), heading="Versions"))
+    if len(results) == 1 and "config" in results[0]:
+        settings = io.StringIO()
+        yaml.safe_dump(results[0]["config"], settings, sort_keys=False)
+        summary = "The resolved configuration"
+        sections.append(Code(settings.getvalue(), summary=summary, heading="Configuration"))
+    return sections

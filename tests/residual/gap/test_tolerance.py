@@ -1,0 +1,53 @@
+"""What parameters of the simulator that are a little off can do is no certain effect."""
+
+import numpy as np
+import pytest
+
+from residual.gap import find_gap
+from sims.effects.library import library
+from sims.pendulum_equation import PendulumEquation
+from studies.hidden.data import Truth, make_logs
+
+INERTIA = 1.91e-4
+
+
+def named(inertia, wind, **options):
+    """The first answer for a pendulum with more inertia, in a wind that no library holds."""
+    simulator = PendulumEquation()
+    offered = [e for e in library(simulator) if e.name in ("inertia", "delay", "dead_zone")]
+    logs = make_logs(Truth(inertia=inertia, wind=wind), 11, "strong", "A", 4)
+    found = find_gap(simulator, logs, effects=offered, hold="zero", **options)
+    assert not found.adequate
+    return found.verdicts[0]
+
+
+@pytest.mark.parametrize(("inertia", "wind", "sure"), [(0.025, 2e-4, False), (0.3, 1e-3, True)])
+def test_a_change_within_the_tolerance_of_parameters_is_not_certain(inertia, wind, sure):
+    exact = named(inertia, wind, parameter_tolerance=0.0)
+    allowed = named(inertia, wind)
+    assert exact.effect == allowed.effect == "inertia"
+    assert exact.kind == "confirmed"
+    assert allowed.kind == ("confirmed" if sure else "ambiguous")
+    assert ("calibration" in allowed.doubts) is not sure
+    # 3 % of every parameter, of which the motor alone turns the pendulum by as much.
+    assert allowed.parameters["change"].value == exact.parameters["change"].value
+    wide, narrow = (v.parameters["change"] for v in (allowed, exact))
+    assert wide.low < narrow.low < narrow.high < wide.high
+    assert wide.low <= inertia * INERTIA <= wide.high
+    assert wide.high - wide.low > 0.03 * INERTIA
+
+
+@pytest.mark.parametrize(("inertia", "sure"), [(0.025, False), (0.3, True)])
+def test_where_only_noise_is_left_parameters_may_be_off_too(inertia, sure):
+    simulator = PendulumEquation()
+    offered = [e for e in library(simulator) if e.name in ("inertia", "delay", "dead_zone")]
+    logs = make_logs(Truth(inertia=inertia), 11, "strong", "A", 4)
+    exact, allowed = (
+        find_gap(simulator, logs, effects=offered, hold="zero", parameter_tolerance=tolerance)
+        for tolerance in (0.0, 0.03)
+    )
+    assert exact.adequate
+    assert allowed.adequate
+    assert exact.verdicts[0].kind == "confirmed"
+    assert allowed.verdicts[0].kind == ("confirmed" if sure else "ambiguous")
+    assert np.isclose(exact.verdicts[0].parameters["change"].value, inertia * INERTIA, rtol=0.2)
