@@ -75,7 +75,6 @@ def atomic_write_json(path: str | Path, value: Any) -> None:
     atomic_write_text(path, text + "\n")
 
 
-<<<<<<< HEAD
 def write_sealed(path: str | Path, value: Mapping[str, Any]) -> None:
     """Write an object to ``path`` as JSON with a format version and a checksum of its content."""
     plain = jsonable({**value, "format": FORMAT})
@@ -109,14 +108,6 @@ def _checksum(value: Any) -> str:
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
-def copy_file(source: str | Path, target: str | Path) -> None:
-    """Copy a file, whole or not at all; missing folders are made."""
-    with atomic_path(target) as temporary:
-        shutil.copyfile(source, temporary)
-
-
-=======
->>>>>>> main
 def read_json(path: str | Path) -> Any:
     """What ``atomic_write_json`` wrote.
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from simgap_npz import read_npz
 from studies.learnt.figures import (
     SECONDS,
     budgets_figure,
