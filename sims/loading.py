@@ -19,6 +19,7 @@ from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
 from sims.simulator import Hold, Simulator
+from sims.trust import check_file, trusting
 
 #: In a list of effects: all that the simulator can host.
 LIBRARY = "library"
@@ -27,22 +28,30 @@ LIBRARY = "library"
 MODEL_FILES = {".xml": "sims.mujoco.MujocoSimulator", ".urdf": "sims.mujoco.MujocoSimulator"}
 
 
-def load_simulator(source: str | Path | Mapping[str, Any]) -> Simulator:
+def load_simulator(
+    source: str | Path | Mapping[str, Any], trusted: Sequence[str] = ()
+) -> Simulator:
     """A simulator by its import path, its YAML file, or its ``class_path`` and ``init_args``.
 
     Args:
         source: ``"sims.pendulum.Pendulum"``, a file such as ``"corrected.yaml"``, what such a
             file holds, or a robot's ``.xml`` (MJCF) or ``.urdf``.
+        trusted: Packages whose classes a file may name beside ours: loading runs their code.
 
     Raises:
-        ValueError: There is no such class or file, it is no simulator, or the settings are wrong.
+        ValueError: There is no such class or file, it is no simulator, the settings are wrong, or
+            a file names classes of a package that is not trusted.
     """
-    return _parser().instantiate(_parsed(source)).simulator
+    with trusting(trusted):
+        return _parser().instantiate(_parsed(source)).simulator
 
 
-def simulator_settings(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
+def simulator_settings(
+    source: str | Path | Mapping[str, Any], trusted: Sequence[str] = ()
+) -> dict[str, Any]:
     """``class_path`` and ``init_args`` of what ``load_simulator`` makes, defaults filled in."""
-    text = _parser().dump(_parsed(source), format="yaml", skip_unset=False)
+    with trusting(trusted):
+        text = _parser().dump(_parsed(source), format="yaml", skip_unset=False)
     return yaml.safe_load(text)["simulator"]
 
 
@@ -218,6 +227,8 @@ def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
     value: Any = copy.deepcopy(dict(source)) if isinstance(source, Mapping) else str(source)
     if isinstance(value, str):
         value = model_settings(value) or value
+    if isinstance(value, str) and Path(value).is_file():
+        check_file(value)
     try:
         return _parser().parse_object({"simulator": value})
     except (jsonargparse.ArgumentError, TypeError) as error:

@@ -205,8 +205,8 @@ def hosting(simulator: Simulator) -> HostSimulator:
     Raises:
         ValueError: It hosts none, or is unsound (``sims.contract``).
     """
-    refuse_unsound(simulator)
     if isinstance(simulator, HostSimulator):
+        refuse_unsound(simulator)
         return simulator
     raise ValueError(
         f"{type(simulator).__name__} cannot host effects: derive it from EquationOfMotion or "

@@ -18,7 +18,8 @@ from studies.learning.loop import run_loop
 from studies.learning.settings import instantiate
 from studies.learning.steps import Steps
 from studies.learning.study import Config, Study
-from studies.running.command import class_label, versions
+from studies.running.command import versions
+from studies.running.grids import class_label
 from studies.running.progress import Progress
 
 
