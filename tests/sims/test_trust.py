@@ -47,7 +47,7 @@ FILES = {
     "effect": {
         "class_path": "sims.loading.with_effects",
         "init_args": {"simulator": SOUND, "effects": [
-            {"class_path": "evil_package.Drag", "init_args": {"where": "pivot"}}]},
+            {"class_path": "evil_package.Drag", "init_args": {"joint": "pivot"}}]},
     },
     "effect by name alone": {
         "class_path": "sims.loading.with_effects",
