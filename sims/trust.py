@@ -74,9 +74,15 @@ def foreign(settings: Any) -> str:
     return next((found for part in parts if (found := foreign(part))), "")
 
 
-def named_packages(texts: Collection[str]) -> set[str]:
-    """Packages of the import paths among texts that the user wrote."""
-    return {text.partition(".")[0] for text in texts if _IMPORT.fullmatch(text)}
+def named_packages(settings: Any) -> set[str]:
+    """Packages of the import paths in plain values that the user wrote: those are trusted."""
+    if isinstance(settings, str):
+        return {settings.partition(".")[0]} if _IMPORT.fullmatch(settings) else set()
+    if isinstance(settings, Mapping):
+        settings = list(settings.values())
+    if not isinstance(settings, list | tuple):
+        return set()
+    return set().union(*map(named_packages, settings))
 
 
 def _foreign_text(text: str) -> str:

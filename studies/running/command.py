@@ -87,13 +87,15 @@ class Parser(jsonargparse.ArgumentParser):
             given = simgap_yaml.load(content)
         except yaml.YAMLError:
             given = None  # whoever reads it next says what is wrong
-        for key in ("simulator", "corrected") if isinstance(given, dict) else ():
-            value = given.get(key)
-            if isinstance(value, str):
-                beside = Path(str(path)).parent / value
-                if settings := _settings(beside if path and beside.is_file() else value):
-                    given = {**given, key: settings}
-                    content = yaml.safe_dump(given)
+        # What a config names is the user's own choice, as what stands on the command line is.
+        with trusting(named_packages(given)):
+            for key in ("simulator", "corrected") if isinstance(given, dict) else ():
+                value = given.get(key)
+                if isinstance(value, str):
+                    beside = Path(str(path)).parent / value
+                    if settings := _settings(beside if path and beside.is_file() else value):
+                        given = {**given, key: settings}
+                        content = yaml.safe_dump(given)
         return super().parse_string(content, path, *rest, **options)
 
     def instantiate(self, namespace: Any, *rest: Any, **options: Any) -> Any:
