@@ -9,6 +9,7 @@ import json
 import math
 import os
 import secrets
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -141,10 +142,17 @@ def jsonable(value: Any) -> Any:
     raise TypeError(f"a {type(value).__name__} has no form in JSON: {value!r:.80}")
 
 
-def remove_partial_files(folder: str | Path) -> None:
-    """Delete what a killed writer left in ``folder`` and below; call before work begins."""
+def remove_partial_files(folder: str | Path, older: float = 600.0) -> None:
+    """Delete what a killed writer left in ``folder`` and below; call before work begins.
+
+    Args:
+        folder: Where to look.
+        older: Seconds. What is younger may be the work of another process on the same folder.
+    """
     for leftover in Path(folder).rglob(f"{_PARTIAL}*"):
-        leftover.unlink(missing_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            if time.time() - leftover.stat().st_mtime > older:
+                leftover.unlink()
 
 
 def flush_to_disk(path: str | Path) -> None:

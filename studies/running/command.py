@@ -53,21 +53,16 @@ class Parser(jsonargparse.ArgumentParser):
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, *rest: Any, **options: Any
     ) -> Any:
-        """As usual; a robot's model file may stand where a simulator is expected.
-
-        A file of a simulator may name classes of ours, of packages after ``--trust``, and of those
-        whose classes the user names beside it.
-        """
-        given, trusted = _trusted(list(sys.argv[1:] if args is None else args))
+        """As usual; a robot's model file may stand where a simulator is expected."""
+        given = list(sys.argv[1:] if args is None else args)
         try:
-            with trusting(trusted):
-                for i, text in enumerate(given):
-                    name, equals, value = text.partition("=")
-                    if name in _SIMULATORS and equals:
-                        given[i] = f"{name}={_simulator(value)}"
-                    elif name in _SIMULATORS and i + 1 < len(given):
-                        given[i + 1] = _simulator(given[i + 1])
-                return super().parse_args(given, *rest, **options)
+            for i, text in enumerate(given):
+                name, equals, value = text.partition("=")
+                if name in _SIMULATORS and equals:
+                    given[i] = f"{name}={_simulator(value)}"
+                elif name in _SIMULATORS and i + 1 < len(given):
+                    given[i + 1] = _simulator(given[i + 1])
+            return super().parse_args(given, *rest, **options)
         except UnicodeDecodeError as error:
             self.error(f"a settings file is not UTF-8 text ({error}): save it as UTF-8", error)
         except ValueError as error:
@@ -156,7 +151,8 @@ def guarded(
 
     Bad input and disks that fail end it with one line and exit code 2, Ctrl-C with 130, a fault
     of ours with one line, a file that keeps the traceback, and exit code 1. ``--debug`` or
-    ``SIMGAP_DEBUG=1`` shows tracebacks.
+    ``SIMGAP_DEBUG=1`` shows tracebacks. Files of simulators may name classes of ours, of packages
+    after ``--trust``, and of those whose classes stand beside it on the command line.
 
     Args:
         resumes: Whether the same command continues what was stopped.
@@ -168,7 +164,9 @@ def guarded(
             given = list(sys.argv[1:] if arguments is None else arguments)
             debug = _DEBUG in given or os.environ.get(_DEBUG_VARIABLE, "") not in ("", "0")
             try:
-                main([argument for argument in given if argument != _DEBUG])
+                rest, trusted = _trusted([argument for argument in given if argument != _DEBUG])
+                with trusting(trusted):
+                    main(rest)
             except KeyboardInterrupt:
                 if debug:
                     traceback.print_exc()
