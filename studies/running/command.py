@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import functools
 import json
 import os
 import platform
 import re
+import signal
 import subprocess
 import sys
 import sysconfig
@@ -170,6 +172,8 @@ def guarded(
             except KeyboardInterrupt:
                 if debug:
                     traceback.print_exc()
+                # Whoever presses twice shall not interrupt the end.
+                atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
                 then = "goes on" if resumes else "begins anew"
                 sys.stderr.write(f"\nstopped; the same command {then}\n")
                 raise SystemExit(130) from None
