@@ -22,8 +22,8 @@ _HOMES = {
     ),
     "policy": ("Algorithm", "DDPG", "DDPGConfig", "MlpPolicy", "load_policy"),
     "residual": (
-        "CorrectedSimulator", "DifferenceModel", "DropoutNet", "GaussianProcess", "Linear",
-        "NamedEffects", "accuracy_along", "load", "save",
+        "CorrectedSimulator", "DifferenceModel", "DropoutNet", "Ensemble", "GaussianProcess",
+        "Linear", "NamedEffects", "accuracy_along", "load", "save",
     ),
     "residual.trajectories": ("Trajectory", "Transitions"),
     "residual.logs": ("read_logs",),

@@ -68,6 +68,7 @@ class Rollout:
         rewards: shape (T,).
         states: The environment's ``info["state"]``, shape (T + 1, n_s), or None without it.
         terminated: The episode ended in a terminal state and not by time.
+        measured: The environment's ``info["measured"]``, shape (T + 1, n_s), or None without it.
     """
 
     observations: Array
@@ -75,6 +76,7 @@ class Rollout:
     rewards: Array
     states: Array | None
     terminated: bool
+    measured: Array | None = None
 
     def __repr__(self) -> str:
         end = "terminated" if self.terminated else "cut by time"
@@ -122,13 +124,17 @@ def rollout(
         infos.append(info)
         actions.append(action)
         rewards.append(float(reward))
-    states = [info["state"] for info in infos] if "state" in infos[0] else None
+    states, measured = (
+        np.array([info[key] for info in infos], float) if key in infos[0] else None
+        for key in ("state", "measured")
+    )
     return Rollout(
         np.array(observations, float),
         np.array(actions, float).reshape(len(actions), -1),
         np.array(rewards),
-        None if states is None else np.array(states, float),
+        states,
         bool(terminated),
+        measured,
     )
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from residual.corrected import CorrectedSimulator
     from residual.difference import DifferenceModel
     from residual.dropout_net import DropoutNet
+    from residual.ensemble import Ensemble
     from residual.gaussian_process import GaussianProcess
     from residual.linear import Linear
     from residual.named_effects import NamedEffects
@@ -26,6 +27,7 @@ __all__ = [
     "CorrectedSimulator",
     "DifferenceModel",
     "DropoutNet",
+    "Ensemble",
     "GaussianProcess",
     "Linear",
     "NamedEffects",
@@ -38,6 +40,7 @@ _HOMES = {
     "CorrectedSimulator": "corrected",
     "DifferenceModel": "difference",
     "DropoutNet": "dropout_net",
+    "Ensemble": "ensemble",
     "GaussianProcess": "gaussian_process",
     "Linear": "linear",
     "NamedEffects": "named_effects",

@@ -37,6 +37,8 @@ class NamedEffects(Estimator):
         says_: What was found, in words, and what stays unexplained.
     """
 
+    reads_noise = True
+
     _learned: ClassVar[tuple[str, ...]] = ("covariance_", "residual_")
 
     effects_: tuple[Effect, ...]

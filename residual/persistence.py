@@ -2,21 +2,25 @@
 
 A file is one safetensors file: arrays by name, and one JSON document as metadata that holds the
 format's version, the class (one of a fixed set) and its constructor arguments. Loading reads
-numbers and text; nothing in the file is executed or imported.
+numbers and text; nothing in the file is executed or imported. An estimator of another library,
+or an ensemble, is one array of bytes in that file, which skops reads (``residual.foreign``).
 """
 
 from __future__ import annotations
 
 import dataclasses
 import importlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.utils.validation import check_is_fitted
 
 from residual.difference import DifferenceModel
 from residual.estimator import Estimator
+from residual.foreign import dumped, loaded
 from simgap_arrays import FileError, read_arrays, write_arrays
 from sims.simulator import Channel, Simulator
 
@@ -26,25 +30,30 @@ _CLASSES = {
     "Linear": "residual.linear",
     "NamedEffects": "residual.named_effects",
 }
+#: Where a class's arrays or arguments changed since its first files.
+_FORMATS = {"DropoutNet": 2}
+#: In place of a class: an estimator in skops' format.
+_FOREIGN = "skops"
 # Steps the simulator itself; not imported here, since it brings the whole search for effects.
 _OF_SIMULATOR = "NamedEffects"
 # Far more columns than any system has; a larger number in a file is damage.
 _MOST_COLUMNS = 100_000
 
 
-def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
-    """Write a fitted estimator of ours, or a fitted difference model of one, to a file.
+def save(model: Any, path: str | Path) -> None:
+    """Write a fitted estimator, or a fitted difference model of one, to a file.
 
     The file appears complete or not at all.
 
     Args:
-        model: A ``DropoutNet``, ``GaussianProcess``, ``Linear`` or ``NamedEffects``, or a
-            ``DifferenceModel`` of one. The simulator of ``NamedEffects`` is not written.
+        model: A ``DropoutNet``, ``GaussianProcess``, ``Linear`` or ``NamedEffects``, any other
+            scikit-learn regressor if skops is installed, or a ``DifferenceModel`` of one. The
+            simulator of ``NamedEffects`` is not written.
         path: The file; by convention it ends in ``.safetensors``.
 
     Raises:
-        TypeError: An estimator of another class, or an argument of it that is not a number, a
-            text, None or a sequence of those.
+        TypeError: An argument of ours that is not a number, a text, None or a sequence of those,
+            or an estimator that skops cannot write.
         sklearn.exceptions.NotFittedError: The estimator is not fitted.
     """
     header: dict[str, Any] = {}
@@ -59,13 +68,11 @@ def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
             "scale": model.scale_.tolist(),
         }
     name = type(estimator).__name__
-    if type(estimator).__module__ != _CLASSES.get(name):
-        raise TypeError(
-            f"cannot save a {type(estimator).__module__}.{name}: only {', '.join(_CLASSES)} and "
-            "difference models of those can be saved; any other estimator must be fitted again "
-            "from its data"
-        )
-    header["class"] = name
+    if not is_ours(estimator):
+        check_is_fitted(estimator)
+        write_arrays(path, header | {"class": _FOREIGN}, {_FOREIGN: dumped(estimator)})
+        return
+    header["class"], header["class_format"] = name, _FORMATS.get(name, 1)
     header["params"] = {
         key: _plain(f"{name}.{key}", value)
         for key, value in estimator.get_params(deep=False).items()
@@ -78,7 +85,12 @@ def save(model: DifferenceModel | Estimator, path: str | Path) -> None:
     write_arrays(path, header, estimator.state_arrays())
 
 
-def load(path: str | Path, simulator: Simulator | None = None) -> Any:
+def is_ours(estimator: Any) -> bool:
+    """Whether an estimator is of a class whose files need nothing but numbers and text."""
+    return type(estimator).__module__ == _CLASSES.get(type(estimator).__name__)
+
+
+def load(path: str | Path, simulator: Simulator | None = None, trusted: Sequence[str] = ()) -> Any:
     """Read what ``save`` wrote; no code is run from the file.
 
     Args:
@@ -86,20 +98,23 @@ def load(path: str | Path, simulator: Simulator | None = None) -> Any:
         simulator: For a difference model, the simulator to fit on again and to check against;
             without it the model predicts but cannot be fitted. ``NamedEffects`` need it to
             predict.
+        trusted: For an estimator of another library: import paths of types, beside those that
+            skops knows to be safe and ours, that the file may hold.
 
     Returns:
         The fitted ``DifferenceModel`` or estimator.
 
     Raises:
         FileNotFoundError: There is no such file.
-        ValueError: The file is damaged or not one that ``save`` wrote, or the difference model
-            in it was fitted for another control period or other channels than ``simulator``.
+        ValueError: The file is damaged, holds types that are not trusted, or is not one that
+            ``save`` wrote, or the difference model in it was fitted for another control period or
+            other channels than ``simulator``.
     """
     header, arrays = read_arrays(path)
     try:
         # What divides by zero shows as a prediction that is not finite.
         with np.errstate(all="ignore"):
-            model = _restore(header, arrays, simulator)
+            model = _restore(header, arrays, simulator, trusted)
     except FileError as error:
         raise FileError(f"{path}: {error}") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, RecursionError,
@@ -119,11 +134,21 @@ def load(path: str | Path, simulator: Simulator | None = None) -> Any:
 
 
 def _restore(
-    header: dict[str, Any], arrays: dict[str, NDArray], simulator: Simulator | None
-) -> DifferenceModel | Estimator:
+    header: dict[str, Any],
+    arrays: dict[str, NDArray],
+    simulator: Simulator | None,
+    trusted: Sequence[str],
+) -> Any:
     name = header["class"]
+    if name == _FOREIGN:
+        return _difference(header, loaded(arrays[_FOREIGN], trusted))
     if name not in _CLASSES:
         raise FileError(f"holds a {name!r}; only {', '.join(_CLASSES)} can be loaded")
+    if header.get("class_format", 1) != _FORMATS.get(name, 1):
+        raise FileError(
+            f"holds a {name} of format {header.get('class_format', 1)!r}, this release reads "
+            f"{_FORMATS.get(name, 1)}: fit it again from its data and save it"
+        )
     columns = arrays["n_features_in_"].item()
     if type(columns) is not int or not 1 <= columns <= _MOST_COLUMNS:
         raise ValueError(f"n_features_in_ is {columns}, expected 1 to {_MOST_COLUMNS}")
@@ -143,6 +168,11 @@ def _restore(
         raise ValueError("a prediction is not finite")
     if names is not None:
         estimator.feature_names_in_ = np.array([str(name) for name in names], dtype=object)
+    return _difference(header, estimator)
+
+
+def _difference(header: dict[str, Any], estimator: Any) -> Any:
+    """The difference model that a header describes, or the estimator if it describes none."""
     if "difference" not in header:
         return estimator
     fields = header["difference"]

@@ -66,6 +66,9 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._state: Array = np.zeros(len(simulator.state_channels))
         self._steps = 0
 
+    def __repr__(self) -> str:
+        return f"SimulatorEnv({type(self.task).__name__} on {self.simulator.name})"
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:

@@ -32,6 +32,10 @@ class Finding:
 class Findings(list[Finding]):
     """Findings that print as a table."""
 
+    def __repr__(self) -> str:
+        failed = ", ".join(finding.check for finding in self if not finding.ok)
+        return f"Findings({len(self)} checks, {f'failed: {failed}' if failed else 'all kept'})"
+
     def __str__(self) -> str:
         width = max((len(finding.check) for finding in self), default=0)
         return "\n".join(

@@ -11,6 +11,7 @@ import numpy as np
 
 from sims.contract import refuse_unsound
 from sims.environment import SimulatorEnv
+from sims.measured import MeasuredEnv, Measurement
 from sims.sampled import SampledEnv, StateOf
 from sims.simulator import Array, Channel, Simulator
 from sims.tasks import Task
@@ -84,6 +85,8 @@ class System:
             true system is a simulator.
         published: For tables: what others published, by kind of policy.
         cold_noise_sigma: Exploration noise of policies that are learnt from nothing.
+        measurement: What sensors show of the true system: all that policies, collecting and
+            testing see of it. Rewards, and what is reported, are of the true states.
 
     Raises:
         ValueError: Two parts do not fit together; the message says which.
@@ -103,6 +106,7 @@ class System:
     elsewhere: Callable[[np.random.Generator], tuple[Array, Array]] | None = None
     published: Mapping[str, str] = dataclasses.field(default_factory=dict)
     cold_noise_sigma: float = 0.20
+    measurement: Measurement = dataclasses.field(default_factory=Measurement)
 
     def __post_init__(self) -> None:
         if not isinstance(self.nominal, Simulator):
@@ -139,8 +143,10 @@ class System:
             true = true()
         if isinstance(true, Simulator):
             check_same_channels(self.nominal, true, f"system {self.name}: the true system")
-            return SimulatorEnv(true, self.task)
-        return SampledEnv(true, self.nominal, self.task, self.state_of)
+            env: gymnasium.Env[Any, Any] = SimulatorEnv(true, self.task)
+        else:
+            env = SampledEnv(true, self.nominal, self.task, self.state_of)
+        return MeasuredEnv(env, self.nominal, self.measurement) if self.measurement else env
 
     @property
     def can_learn_on_truth(self) -> bool:
@@ -174,6 +180,12 @@ class System:
                 f"({', '.join(c.name for c in self.nominal.state_channels)}): {error}"
             ) from error
 
+    def code(self) -> list[Any]:
+        """The objects and functions whose code says what the system is."""
+        inside = getattr(self.true, "unwrapped", None)
+        given = [self.true, inside, self.state_of, self.measures, self.elsewhere]
+        return [self.nominal, self.task, *(part for part in given if part is not None)]
+
     def channel_groups(self) -> dict[str, tuple[str, ...]]:
         """State channels by the name under which their errors are averaged."""
         if self.groups is not None:
@@ -206,11 +218,20 @@ def physical(channels: tuple[Channel, ...]) -> tuple[Channel, ...]:
     return tuple(channel for channel in channels if channel.kind != "memory")
 
 
-def check_same_channels(nominal: Simulator, other: Simulator, what: str) -> None:
-    """Raise ``ValueError`` unless both have the same channels, memory apart, and one period."""
+def check_same_channels(
+    nominal: Simulator, other: Simulator, what: str, memory: bool = False
+) -> None:
+    """Raise ``ValueError`` unless both have one period and the same channels.
+
+    Args:
+        nominal, other: The two.
+        what: The other one in words.
+        memory: Whether the hidden memory of effects counts.
+    """
     for kind in ("state_channels", "action_channels"):
         own, others = (
-            [channel.name for channel in physical(getattr(one, kind))] for one in (nominal, other)
+            [c.name for c in getattr(one, kind) if memory or c.kind != "memory"]
+            for one in (nominal, other)
         )
         if own != others:
             raise ValueError(

@@ -38,7 +38,7 @@ from sims.trust import foreign
 from studies.gap.files import CORRECTED, REPORT, write_gap
 from studies.gap.progress import Heartbeat
 from studies.gap.summary import found_in_data, summary
-from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
+from studies.running.command import Parser, check_output, fail, guarded
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,11 +75,7 @@ class GapStudy:
 
 def build_parser() -> Parser:
     """The command line of this study."""
-    parser = Parser(
-        prog="python -m studies.find_gap",
-        description=__doc__,
-        formatter_class=HelpFormatter,
-    )
+    parser = Parser(prog="python -m studies.find_gap", description=__doc__)
     parser.add_argument("--config", action="config", help="YAML file with any of the settings.")
     parser.add_argument(
         "--logs",

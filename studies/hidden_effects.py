@@ -45,7 +45,7 @@ from studies.hidden.report import summary, write_report
 from studies.hidden.rivals import one_step, regression, sparse
 from studies.hidden.scores import replaceable, score, score_names
 from studies.hidden.strengths import draw, truth
-from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
+from studies.running.command import Parser, check_output, fail, guarded
 from studies.running.progress import Progress
 from studies.running.trials import Execution, read_trials, run_trials, trial_folder
 
@@ -54,11 +54,7 @@ RESULTS = Path("results/hidden_effects")
 
 def build_parser() -> Parser:
     """The command line of this study."""
-    parser = Parser(
-        prog="python -m studies.hidden_effects",
-        description=__doc__,
-        formatter_class=HelpFormatter,
-    )
+    parser = Parser(prog="python -m studies.hidden_effects", description=__doc__)
     parser.add_argument("--config", action="config", help="YAML file with any of the settings.")
     parser.add_argument(
         "--output", type=Path | None, default=None, help="Folder; default: results/hidden_effects."

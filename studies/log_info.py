@@ -15,14 +15,12 @@ import numpy as np
 
 from residual.logs.clocks import Signal
 from residual.logs.sources import signals_of
-from studies.running.command import HelpFormatter, Parser, fail, guarded
+from studies.running.command import Parser, fail, guarded
 
 
 def build_parser() -> Parser:
     """The command line."""
-    parser = Parser(
-        prog="python -m studies.log_info", description=__doc__, formatter_class=HelpFormatter
-    )
+    parser = Parser(prog="python -m studies.log_info", description=__doc__)
     parser.add_argument("files", type=str, nargs="+", help="Log files or data set folders.")
     return parser
 

@@ -24,7 +24,7 @@ from jsonargparse.typing import PositiveInt
 
 from sims.pendulum import IDEALISED_MASS, TRUE_MASS
 from studies.hidden.data import Truth, make_logs
-from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
+from studies.running.command import Parser, check_output, fail, guarded
 from studies.running.logs import write_log
 from studies.walks import write_walks
 
@@ -33,9 +33,7 @@ HIDDEN = Truth(mass=TRUE_MASS / IDEALISED_MASS - 1)
 
 def build_parser() -> Parser:
     """The command line."""
-    parser = Parser(
-        prog="python -m studies.make_log", description=__doc__, formatter_class=HelpFormatter
-    )
+    parser = Parser(prog="python -m studies.make_log", description=__doc__)
     parser.add_argument("--output", type=Path, required=True, help="Folder for the CSV files.")
     parser.add_argument(
         "--system", choices=("pendulum", "leo"), default="pendulum", help="What is measured."

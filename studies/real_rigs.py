@@ -23,7 +23,7 @@ from simgap_files import atomic_write_json, atomic_write_text
 from studies.real.judge import Judged, ask
 from studies.real.rigs import RIGS
 from studies.reporting.markdown import frame_markdown
-from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
+from studies.running.command import Parser, check_output, fail, guarded
 
 #: What a corrected simulator's error may be, in errors of the repair by hand, and processor
 #: time in s.
@@ -32,9 +32,7 @@ RATIO, SECONDS = 1.5, 120.0
 
 def build_parser() -> Parser:
     """The command line of this study."""
-    parser = Parser(
-        prog="python -m studies.real_rigs", description=__doc__, formatter_class=HelpFormatter
-    )
+    parser = Parser(prog="python -m studies.real_rigs", description=__doc__)
     parser.add_argument("--data", type=Path, required=True, help="Folder with one folder a rig.")
     parser.add_argument(
         "--rigs", type=str, nargs="+", default=None, help="Only these, by folder; default: all."

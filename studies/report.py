@@ -19,15 +19,13 @@ from jinja2 import UndefinedError
 
 from simgap_files import read_sealed
 from studies.learning import command
-from studies.running.command import HelpFormatter, Parser, fail, guarded
+from studies.running.command import Parser, fail, guarded
 from studies.running.trials import PLAN
 
 
 def build_parser() -> Parser:
     """The command line."""
-    parser = Parser(
-        prog="python -m studies.report", description=__doc__, formatter_class=HelpFormatter
-    )
+    parser = Parser(prog="python -m studies.report", description=__doc__)
     parser.add_argument("folder", type=Path, help="Output folder of a study.")
     return parser
 

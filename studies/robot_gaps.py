@@ -22,14 +22,12 @@ import numpy as np
 from jsonargparse.typing import NonNegativeInt, PositiveFloat, PositiveInt
 
 from studies.robots.cases import Answer, Case, ask, cases
-from studies.running.command import HelpFormatter, Parser, check_output, fail, guarded
+from studies.running.command import Parser, check_output, fail, guarded
 
 
 def build_parser() -> Parser:
     """The command line."""
-    parser = Parser(
-        prog="python -m studies.robot_gaps", description=__doc__, formatter_class=HelpFormatter
-    )
+    parser = Parser(prog="python -m studies.robot_gaps", description=__doc__)
     parser.add_argument("--robot", choices=("cart_pole", "arm2", "arm6", "hopper"), default="arm2")
     parser.add_argument(
         "--kind", type=Literal["none", "single", "pair"], default="single",

@@ -58,7 +58,8 @@ def test_what_a_notebook_shows_is_short():
     shown = [
         pendulum, leo, rows, difference, corrected, agent, agent.policy, run, trajectory, system,
         accuracy, simgap.Algorithm(), simgap.Budget(), simgap.EvaluationProtocol(),
-        simgap.Linear(), simgap.SwingUp(),
+        simgap.Linear(), simgap.SwingUp(), env, simgap.check_simulator(pendulum),
+        pendulum.state_channels[0], simgap.GaussianProcess(), simgap.DropoutNet(),
     ]  # fmt: skip
     for thing in shown:
         text = repr(thing)

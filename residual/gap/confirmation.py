@@ -44,6 +44,7 @@ class Claim:
         bounded: Whether a strength lies at its bound.
         share: Part of the nominal squared error that it takes off, with a 95 % interval.
         calibration: Whether parameters of the simulator, all within their tolerance, do as well.
+        brief: Whether it is a time too short for the log's own clock.
     """
 
     number: int
@@ -58,11 +59,12 @@ class Claim:
     bounded: bool
     share: tuple[float, float, float]
     calibration: bool = False
+    brief: bool = False
 
     @property
     def sure(self) -> bool:
         """Whether nothing speaks against it."""
-        against = (self.bounded, self.calibration, self.rivals, self.alike)
+        against = (self.bounded, self.calibration, self.brief, self.rivals, self.alike)
         return self.needed and self.steady and self.sound and not any(against)
 
 

@@ -19,12 +19,15 @@ TURNING = np.pi / np.sqrt(3)
 PART = 1 / 3
 #: Windows that the records should at least be good for.
 WINDOWS = 8
-#: Least samples of a window.
-SAMPLES = 8
+#: Least samples of a window, and of a forecast of a system that strikes the ground.
+SAMPLES, STRIDE = 8, 10
 
 
 def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> float:
     """A third of the usual period of the motion, or less if the records are short, in s.
+
+    Two thirds of a system that strikes the ground: its forecasts begin where a window of half
+    their length ends, and over shorter ones a small force moves nothing.
 
     The period is that of a sine with the same spread and the same spread of its rate, the middle
     one over channels. At least the records have to hold ``WINDOWS`` windows of ``SAMPLES`` samples.
@@ -33,9 +36,6 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
         simulator: Gives the channels and the control period.
         trajectories: Measured runs.
     """
-    if simulator.has_contacts:
-        # After a few strikes of the ground no forecast of a walk means anything.
-        return 10 * simulator.dt
     total = sum(float(t.times[-1] - t.times[0]) for t in trajectories)
     longest = max(float(t.times[-1] - t.times[0]) for t in trajectories)
     step = float(np.median(np.concatenate([t.durations for t in trajectories])))
@@ -51,9 +51,11 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
         period = _period(trajectories, column, channel.angle)
         if np.isfinite(period):
             periods.append(period)
-    wanted = PART * float(np.median(periods)) if periods else 20 * simulator.dt
+    part = 2 * PART if simulator.has_contacts else PART
+    wanted = part * float(np.median(periods)) if periods else 20 * simulator.dt
     most = (1 - LEAD) * min(total / WINDOWS, longest)
-    return float(max(min(wanted, most), (1 - LEAD) * SAMPLES * step))
+    least = STRIDE if simulator.has_contacts else (1 - LEAD) * SAMPLES
+    return float(max(min(wanted, most), least * step))
 
 
 def _period(trajectories: Sequence[Trajectory], column: int, angle: bool) -> float:

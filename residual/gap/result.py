@@ -15,19 +15,24 @@ Array = NDArray[np.float64]
 Kind = Literal["confirmed", "ambiguous", "minor", "needs_data", "unexplained", "no_gap"]
 #: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
 #: between folds or with the numerics, lies at its bound, parameters within their tolerance do as
-#: well, or an effect of another kind does.
-Doubt = Literal["not_needed", "unsteady", "numerics", "at_bound", "calibration", "rivals"]
+#: well, it is a time shorter than half a sample, or an effect of another kind does as well.
+Doubt = Literal["not_needed", "unsteady", "numerics", "at_bound", "calibration", "clock", "rivals"]
 
 
 @dataclasses.dataclass(frozen=True)
 class Number:
-    """A fitted number with its 95 % interval and unit; at a bound it has none that means much."""
+    """A fitted number with its 95 % interval and unit; at a bound it has none that means much.
+
+    ``if_exact`` is the interval if everything else in the simulator were exactly right; None if
+    the simulator was taken for exact anyway.
+    """
 
     value: float
     low: float
     high: float
     unit: str
     at_bound: bool = False
+    if_exact: tuple[float, float] | None = None
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What parameters of the nominal simulator do to an answer, if they are a little off.
+"""What parameters of the nominal simulator, and the log's clock, do to an answer if they are off.
 
 No parameter is known exactly, so an effect is certain only if it is needed also where every
 parameter may differ by its tolerance, and the interval of a number says how far it may lie off
@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 
 #: How well a parameter is taken to be known, as a share of it.
 KNOWN = 0.03
+#: Part of the time between samples below which a delay or lag is no more certain than the log's
+#: clock: time stamps, and filters in sensors, are as late.
+BRIEF = 0.5
 #: Errors of a forecast count up to so many times the usual one of the nominal simulator.
 BEYOND = 3.0
 #: Parameters that are allowed for, those that matter most.
@@ -52,6 +55,11 @@ def allow_for_parameters(
     if not parameters:
         return list(claims)
     search.add_without_each(key)
+    clock = BRIEF * sample_interval(search)
+    claims = [
+        dataclasses.replace(claim, brief=any(_is_brief(n, clock) for n in claim.numbers.values()))
+        for claim in claims
+    ]
     beside = calibrated(search, key, parameters)
     told = []
     for claim in claims:
@@ -67,6 +75,16 @@ def allow_for_parameters(
         told.append(claim)
     shifts = by_parameters(beside.fit, len(search.tried[key].theta))
     return [widened(search, key, claim, told, shifts) for claim in told]
+
+
+def sample_interval(search: Search) -> float:
+    """Usual time between recorded samples, in s."""
+    recorded = search.fitter.samples.recorded
+    return float(np.median(np.concatenate([run.durations for run in recorded])))
+
+
+def _is_brief(number: Number, clock: float) -> bool:
+    return number.unit == "s" and 0 < abs(number.value) < clock
 
 
 def allowed(search: Search, tolerance: float) -> list[Candidate]:
@@ -171,7 +189,10 @@ def widened(
             least, most = sorted((alone.theta[k], best[k]))
             low, high = min(low, least - reach), max(high, most + reach)
         numbers[knob.field] = dataclasses.replace(
-            number, low=max(float(low), knob.low), high=min(float(high), knob.high)
+            number,
+            low=max(float(low), knob.low),
+            high=min(float(high), knob.high),
+            if_exact=(number.low, number.high),
         )
     return dataclasses.replace(claim, numbers=numbers)
 

@@ -68,6 +68,8 @@ def effect_verdict(
         says.append(f"{sets}, in one exact proportion, would move alike")
     if claim.calibration:
         says.append("parameters that are a few percent off would do as well")
+    if claim.brief:
+        says.append("shorter than half a sample, as late time stamps and filters in sensors are")
     if not claim.needed:
         says.append("forecasts are not clearly worse without it")
     if not claim.steady:
@@ -92,6 +94,7 @@ def doubts(claim: Claim) -> tuple[Doubt, ...]:
         "numerics": not claim.sound,
         "at_bound": claim.bounded,
         "calibration": claim.calibration,
+        "clock": claim.brief,
         "rivals": bool(claim.rivals or claim.alike),
     }
     return tuple(doubt for doubt, there in why.items() if there)

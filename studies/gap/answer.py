@@ -24,6 +24,8 @@ from studies.gap.words import (
 
 #: Share of the gap without a name that is a footnote.
 FOOTNOTE = 0.02
+#: Part of an interval below which one with an exact simulator is worth a line.
+MUCH = 0.7
 #: Rivals that are listed in the first sentence.
 FEW_RIVALS = 2
 
@@ -32,6 +34,7 @@ DOUBTS: dict[Doubt, str] = {
     "unsteady": "its size differs between parts of the data",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
+    "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
     "calibration": "parameters that are a few percent off would do nearly as well",
     "rivals": "an effect of another kind does nearly as well",
 }
@@ -162,6 +165,7 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.kind not in ("confirmed", "ambiguous"):
         return []
     found = [f"without it, {percent(verdict.share.value)} of the gap would be back"]
+    found += [if_exact(number) for number in verdict.parameters.values() if much_surer(number)]
     doubts = [DOUBTS[doubt] for doubt in verdict.doubts if doubt != "rivals"]
     others = rivals(verdict)
     if others:
@@ -177,6 +181,23 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.provisional:
         found.append(provisional(result))
     return found
+
+
+def much_surer(number: Number) -> bool:
+    """Whether a number would be much better known if all else in the simulator were exact."""
+    if number.if_exact is None or number.at_bound:
+        return False
+    low, high = number.if_exact
+    return high - low < MUCH * (number.high - number.low)
+
+
+def if_exact(number: Number) -> str:
+    """How well a number is known if all else in the simulator is exact."""
+    assert number.if_exact is not None
+    low, high = number.if_exact
+    half = 0.5 * (high - low)
+    span = f"{rounded(low, half)} to {rounded(high, half)}{unit_text(number.unit)}"
+    return f"{span} if all else in the simulator is exact".replace("-", "\u2212")
 
 
 def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:

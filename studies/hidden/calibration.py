@@ -32,7 +32,7 @@ from simgap_files import atomic_write_text
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
-from studies.running.command import HelpFormatter, Parser, check_output, guarded
+from studies.running.command import Parser, check_output, guarded
 from studies.running.progress import Progress
 from studies.running.trials import Execution, run_trials, trial_folder
 
@@ -99,11 +99,7 @@ def table(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
 @guarded()
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
-    parser = Parser(
-        prog="python -m studies.hidden.calibration",
-        description=__doc__,
-        formatter_class=HelpFormatter,
-    )
+    parser = Parser(prog="python -m studies.hidden.calibration", description=__doc__)
     parser.add_argument("--sets", type=PositiveInt, default=20, help="Sets for each condition.")
     parser.add_argument("--runs", type=PositiveInt, nargs="+", default=[5, 15], help="Sizes.")
     parser.add_argument("--seed", type=int, default=0, help="Of the first set.")

@@ -15,7 +15,7 @@ import yaml
 
 from simgap_files import atomic_write_text, read_sealed, remove_partial_files, write_sealed
 from studies.learning.settings import ALIASES, build_parser, instantiate, resolve, trial_label
-from studies.learning.study import Config, Study
+from studies.learning.study import Study
 from studies.learning.trial import code_of_trial, run_trial
 from studies.learnt.films import write_films
 from studies.learnt.report import read_episodes, write_report
@@ -23,7 +23,7 @@ from studies.learnt.tables import write_tables
 from studies.running.command import check_output, fail, guarded
 from studies.running.curves import Curves
 from studies.running.grids import expand_grid
-from studies.running.progress import Bars, Progress, Several
+from studies.running.progress import Bars, Several
 from studies.running.trials import Execution, Failures, read_trials, run_trials, trial_folder
 from studies.running.workers import WorkersError
 
@@ -83,7 +83,7 @@ def run_single(
     begin = time.perf_counter()
     remove_partial_files(output)
     curves = [Curves(execution.tensorboard / output.name)] if execution.tensorboard else []
-    results = run_trial(study, settings, output, kept, Several(Bars(), *curves))
+    results = run_trial(study, kept, settings, output, Several(Bars(), *curves))
     results["seconds"] = time.perf_counter() - begin
     atomic_write_text(output / "config.yaml", yaml.safe_dump(settings, sort_keys=False))
     write_films(results, output, study.system_of(instantiate(study, settings)).nominal)
@@ -110,15 +110,12 @@ def run_grid(
     try:
         blocks = [{ALIASES.get(name, name): block[name] for name in block} for block in grid]
         configs = [resolve(study, config) for config in expand_grid(settings, blocks)]
-        made_by = {}
-        for config in configs:
-            folder = trial_folder(output, trial_label(config), config)
-            made_by[folder] = code_of_trial(study, config)
+        trials = {trial_folder(output, trial_label(config), config): config for config in configs}
+        made_by = {folder: code_of_trial(study, config) for folder, config in trials.items()}
     except ValueError as error:
         fail(str(error))
     remove_partial_files(output)
-    trials = {trial_folder(output, trial_label(config), config): config for config in configs}
-    work = functools.partial(grid_trial, study, kept.resolve())
+    work = functools.partial(run_trial, study, kept.resolve())
     try:
         run_trials(study.name, trials, work, execution, made_by)
     except WorkersError as error:
@@ -153,20 +150,13 @@ def rebuild(folder: Path) -> None:
         ValueError: An earlier version wrote it.
     """
     path = folder / "results.json"
-    results = read_sealed(path) if path.exists() else {}
-    if "policies" not in results and not read_trials(folder)[0]:
+    single = read_sealed(path) if path.exists() else {}
+    found = [single] if "policies" in single else read_trials(folder)[0]
+    if not found:
         raise FileNotFoundError(f"{folder}: no trial in it is finished")
-    first = results if "policies" in results else read_trials(folder)[0][0]
-    if "about" not in first:
+    if "about" not in found[0]:
         raise ValueError(f"{folder} is of an earlier version: give its command again")
-    if "policies" in results:
-        report_single(results, folder)
+    if found[0] is single:
+        report_single(single, folder)
     else:
         report_grid(folder)
-
-
-def grid_trial(
-    study: Study, kept: Path, config: Config, folder: Path, progress: Progress
-) -> dict[str, Any]:
-    """``run_trial`` as one of many."""
-    return run_trial(study, config, folder, kept, progress)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from residual.difference import DifferenceModel
-from residual.persistence import load, save
+from residual.persistence import is_ours, load, save
 from residual.trajectories import Transitions
 
 
@@ -40,11 +40,12 @@ class Model:
     key: str = ""
 
     def save(self, folder: Path) -> None:
-        """Write it; an estimator that has no file format but pickle is fitted again by ``load``."""
+        """Write it; another library's estimator is fitted again by ``load``."""
         self.data.save(folder / "transitions.npz")
         (folder / "fit.json").write_text(json.dumps({"fit_seconds": self.fit_seconds}))
-        with contextlib.suppress(TypeError):
-            save(self.difference, folder / "difference.safetensors")
+        if is_ours(self.difference.fitted()):
+            with contextlib.suppress(TypeError):
+                save(self.difference, folder / "difference.safetensors")
 
     @classmethod
     def load(cls, folder: Path, key: str, unfitted: DifferenceModel) -> Model:

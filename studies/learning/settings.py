@@ -10,7 +10,7 @@ from typing import Any
 from jsonargparse.typing import NonNegativeFloat, PositiveInt
 
 from studies.learning.study import Config, Study, Trial
-from studies.running.command import HelpFormatter, Parser
+from studies.running.command import Parser
 from studies.running.workers import Backend
 
 #: Settings under their earlier names.
@@ -19,11 +19,7 @@ ALIASES = {"caution": "uncertainty_penalty"}
 
 def build_parser(study: Study) -> Parser:
     """The command line of a study."""
-    parser = Parser(
-        prog=f"python -m studies.{study.name}",
-        description=study.description,
-        formatter_class=HelpFormatter,
-    )
+    parser = Parser(prog=f"python -m studies.{study.name}", description=study.description)
     parser.add_argument("--config", action="config", help="YAML file with any of the settings.")
     parser.add_argument(
         "--output",

@@ -18,6 +18,7 @@ from policy.selection import Point
 from residual.accuracy import accuracy_along, uniform_rollouts
 from residual.corrected import CorrectedSimulator
 from residual.difference import DifferenceModel
+from residual.measured import fit_measured
 from residual.trajectories import Transitions
 from residual.uncertainty_penalty import PenalisedTask
 from simgap_files import jsonable
@@ -60,6 +61,8 @@ class Steps:
         progress: Told what is going on.
         replay: See ``WarmStart``.
         uncertainty_penalty: See ``residual.uncertainty_penalty``.
+        smoothing: Learn the difference from smoothed paths where states are measured, not from
+            one step to the next.
         described: Settings behind the system that its parts do not tell, plain values.
     """
 
@@ -71,6 +74,7 @@ class Steps:
     progress: Progress
     replay: ReplayRule = "first"
     uncertainty_penalty: float = 0.0
+    smoothing: bool = True
     described: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     def collect(self, policy: Training, samples: int, update: int) -> Samples:
@@ -97,12 +101,19 @@ class Steps:
             title = f"fit {type(self.estimator).__name__} to {len(data)}"
             with self.progress.task(title, 1) as tell:
                 begin = time.perf_counter()
-                unfitted.fit(data)
+                if self.system.measurement and self.smoothing:
+                    sigma = self.system.measurement.sigma(self.system.nominal)
+                    data = fit_measured(unfitted, data, sigma)
+                else:
+                    unfitted.fit(data)
                 seconds = time.perf_counter() - begin
                 tell(1, "")
             return Model(unfitted, data, seconds)
 
-        settings = {"samples": [part.key for part in samples], **self._estimator}
+        settings = {
+            "samples": [part.key for part in samples], "smoothing": self.smoothing,
+            **self._estimator,
+        }  # fmt: skip
         return self._kept(
             "fit",
             settings,
@@ -254,7 +265,7 @@ class Steps:
         system = self.system
         parts = (
             "nominal", "true", "task", "evaluation", "state_of", "measures", "elsewhere",
-            "cold_noise_sigma",
+            "cold_noise_sigma", "measurement",
         )  # fmt: skip
         return {
             "system": {name: settings_of(getattr(system, name)) for name in parts},
@@ -263,17 +274,10 @@ class Steps:
             "seed": self.seed,
         }
 
-    @cached_property
-    def _code(self) -> list[Any]:
-        system = self.system
-        inside = getattr(system.true, "unwrapped", None)
-        given = (system.true, inside, system.state_of, system.measures, system.elsewhere)
-        parts = [Steps, system.nominal, system.task, self.algorithm.kind()]
-        return parts + [part for part in given if part is not None]
-
     def _kept(self, name: str, settings: Any, compute: Any, load: Any, *code: Any) -> Any:
         if self.keeper is None:
             return compute()
         everything = {**self._common, **settings}
-        roots = [*self._code, *code, *sorted(modules_in(everything))]
+        roots = [Steps, self.algorithm.kind(), *self.system.code(), *code]
+        roots += sorted(modules_in(everything))
         return self.keeper.run(name, everything, roots, compute, load)

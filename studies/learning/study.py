@@ -15,8 +15,9 @@ from sklearn.base import BaseEstimator
 from policy.config import DDPGConfig
 from policy.learner import OURS, Algorithm
 from residual import DropoutNet
+from sims.measured import Measurement
 from sims.simulator import Simulator
-from sims.system import System
+from sims.system import System, check_same_channels
 from studies.learning.budget import Budget
 from studies.learning.warm_start import ReplayRule
 
@@ -45,6 +46,10 @@ class Trial:
             such as the corrected.yaml of find_gap.
         corrected: A simulator with what it lacked, such as the corrected.yaml of find_gap: a
             policy is trained on it too, from the idealised one, without a true sample.
+        measure: What sensors show of the true system, to the policy and to the difference model;
+            by default all of the state, without error.
+        smoothing: Learn the difference from smoothed paths where states are measured; false takes
+            one measured state from the next.
     """
 
     estimator: BaseEstimator = dataclasses.field(default_factory=DropoutNet)
@@ -57,6 +62,8 @@ class Trial:
     replay: ReplayRule = "first"
     simulator: Simulator | None = None
     corrected: Simulator | None = None
+    measure: Measurement = dataclasses.field(default_factory=Measurement)
+    smoothing: bool = True
 
     @property
     def algorithm(self) -> Algorithm:
@@ -98,9 +105,17 @@ class Study:
         system = self.system(trial)
         if trial.simulator is not None:
             system = system.with_nominal(trial.simulator)
+        trial.measure.check(system.nominal)
+        if trial.measure.unmeasured and not trial.smoothing:
+            raise ValueError(
+                "smoothing is false, but measure.unmeasured leaves no state to take differences of"
+            )
+        system = dataclasses.replace(system, measurement=trial.measure)
         trial.budget.check(trial.algorithm, trial.replay == "all", trial.corrected is not None)
         if trial.corrected is not None:
-            _check_corrected(system.nominal, trial.corrected)
+            # Delay, lag and play have a memory, which is more state than the nominal one has.
+            named = f"corrected: {trial.corrected.name} (--simulator takes any)"
+            check_same_channels(system.nominal, trial.corrected, named, memory=True)
         memory = [c.name for c in system.nominal.state_channels if c.kind == "memory"]
         if memory and trial.budget.iterations:
             raise ValueError(
@@ -119,21 +134,3 @@ class Study:
         """Plain settings behind the system of a trial."""
         shared = {field.name for field in dataclasses.fields(Trial)} - {"simulator"}
         return {name: config.get(name) for name in self.settings if name not in shared}
-
-
-def _check_corrected(nominal: Simulator, corrected: Simulator) -> None:
-    """Delay, lag and play have a memory, which is more state than the nominal simulator has."""
-    for what in ("state_channels", "action_channels"):
-        own, others = (
-            [channel.name for channel in getattr(one, what)] for one in (nominal, corrected)
-        )
-        if own != others:
-            raise ValueError(
-                f"corrected: {corrected.name} has {what.replace('_', ' ')} {', '.join(others)}, "
-                f"expected {', '.join(own)} as {nominal.name}; --simulator trains on any simulator"
-            )
-    if nominal.dt != corrected.dt:
-        raise ValueError(
-            f"corrected: {corrected.name} has dt {corrected.dt:g} s, expected {nominal.dt:g} s as "
-            f"{nominal.name}; --simulator trains on any simulator"
-        )

@@ -164,12 +164,16 @@ def exploration(system: System, algorithm: Algorithm, seed: int) -> OrnsteinUhle
 
 
 def transitions(system: System, rollouts: list[Rollout]) -> Transitions:
-    """The steps of rollouts, each its own episode."""
-    parts = []
+    """The steps of rollouts, each its own episode: as measured, if the system is measured."""
+    parts, late = [], system.measurement.delay
     for run in rollouts:
         states = visited(system, run)
-        episode = np.zeros(len(run.rewards), dtype=np.int64)
-        parts.append(Transitions(states[:-1], run.actions, states[1:], episode))
+        if run.measured is not None:
+            states = run.measured[late:]
+        actions = run.actions[: len(states) - 1]
+        if len(actions):
+            episode = np.zeros(len(actions), dtype=np.int64)
+            parts.append(Transitions(states[:-1], actions, states[1:], episode))
     return Transitions.join(parts)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import json
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import threadpoolctl
 import torch
 
-from residual.persistence import save
+from residual.persistence import is_ours, save
 from simgap_npz import write_npz
 from studies.learning.fingerprint import code_of
 from studies.learning.kept import OnDisk
@@ -24,15 +25,15 @@ from studies.running.progress import Progress
 
 
 def run_trial(
-    study: Study, config: Config, folder: Path, kept: Path, progress: Progress
+    study: Study, kept: Path, config: Config, folder: Path, progress: Progress
 ) -> dict[str, Any]:
     """One trial of a study.
 
     Args:
         study: Which one.
+        kept: Where finished steps are kept and found again.
         config: The settings of the study's trial as plain values, as the parser dumps them.
         folder: For policies, models and rollouts.
-        kept: Where finished steps are kept and found again.
         progress: Told of every step.
 
     Returns:
@@ -51,6 +52,7 @@ def run_trial(
         progress,
         trial.replay,
         trial.uncertainty_penalty,
+        trial.smoothing,
         study.describe(config),
     )
     learnt = run_loop(steps, trial.budget, trial.corrected)
@@ -58,8 +60,8 @@ def run_trial(
         training.learner.save(folder / "policies" / f"{name}.safetensors")
         write_npz(folder / "rollouts" / f"{name}.npz", training.episode)
     for number, model in enumerate(learnt.models, start=1):
-        # Other libraries' estimators have no file format but pickle.
-        if type(model.estimator).__module__.startswith("residual."):
+        # Another library's estimator needs skops, which may not be there.
+        if is_ours(model.fitted()) or importlib.util.find_spec("skops"):
             save(model, folder / "models" / f"difference-{number}.safetensors")
     return {
         "study": study.name,
@@ -77,10 +79,9 @@ def code_of_trial(study: Study, config: Config) -> str:
     """A hash of the code behind a trial's result: when it changes, the result is not right."""
     trial = instantiate(study, config)
     system = study.system_of(trial)
-    given = [system.true, system.state_of, system.measures, system.elsewhere, trial.corrected]
-    parts = [part for part in given if part is not None]
+    corrected = [] if trial.corrected is None else [trial.corrected]
     code = code_of(
-        run_trial, study.trial, study.system, system.nominal, system.task, trial.estimator,
-        trial.algorithm.kind(), *parts,
+        run_trial, study.trial, study.system, *system.code(), trial.estimator,
+        trial.algorithm.kind(), *corrected,
     )  # fmt: skip
     return hashlib.sha256(json.dumps(code).encode()).hexdigest()

@@ -74,8 +74,8 @@ def write_report(
     sections: list[Section] = headline(once, errors, about, best)
     if failures:
         text = "\n".join(f"{path}\n{failure}" for path, failure in failures.items())
-        told = f"{len(failures)} trials failed and are in no mean"
-        sections.append(Code(text, summary=told, heading="Failed trials"))
+        count = f"{len(failures)} trials failed and are in no mean"
+        sections.append(Code(text, summary=count, heading="Failed trials"))
     drawings = []
     if episodes:
         titles = _shown(results[0])
@@ -105,8 +105,8 @@ def write_report(
         drawings.append((
             "updates", updates_figure(once), "Return by update",
             "Return on the true system after each update, with and without a difference model.",
-            "Mean over seeds and its 95 % interval, in tests on the true system that are not "
-            "counted as samples; dashed, learnt on the true system.",
+            "In tests on the true system that are not counted as samples; of several seeds the "
+            "mean and its 95 % interval; dashed, learnt on the true system.",
         ))  # fmt: skip
     if len(results) == 1:
         drawings.append((
@@ -131,7 +131,9 @@ def write_report(
         own = [results[0].get("label", ""), f"seed {results[0].get('seed', 0)}"]
         subtitle = ", ".join(filter(None, own))
     Report(title, subtitle, sections).write(folder / name)
-    return summary.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
+    # What others published makes lines too long for a terminal.
+    told = summary.drop(columns="published", errors="ignore")
+    return told.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
 
 
 def _shown(results: Results) -> dict[str, str]:

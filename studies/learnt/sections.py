@@ -87,9 +87,10 @@ def model_errors(errors: pd.DataFrame, estimator: str, samples: int, update: int
 
 def policies_section(summary: pd.DataFrame, about: About, best: float | None) -> Table:
     """What ``summarise`` found."""
+    seeds = "mean over seeds with its 95 % interval" if "seeds" in summary else "of one seed"
     starts = f", each the mean of {about['starts']} starts" if about["starts"] > 1 else ""
     known = f" The best return that is possible is {best:.0f}." if best is not None else ""
-    caption = f"Returns: mean over seeds with its 95 % interval{starts}.{known}"
+    caption = f"Returns: {seeds}{starts}.{known}"
     if "above control" in summary:
         caption += (
             " Above control: seed by seed, less what as much training without a difference model "
@@ -200,7 +201,7 @@ def accuracy_section(errors: pd.DataFrame, about: About) -> list[Section]:
             f"{estimator}, update {update}", int(samples),
             "where it goes" if where == "visited" else "anywhere",
             *(_finite(one_step[name]).text(3) for name in groups),
-            *(_finite(_by_group(part, h, about).mean(axis=1)).text(3) for h in horizons),
+            *(_finite(_by_group(part, h, about).mean(axis=1)).text(3) or None for h in horizons),
             float(part["coverage90"].astype(float).mean()),
             float(part["fit_seconds"].median()),
         ])  # fmt: skip
@@ -209,10 +210,10 @@ def accuracy_section(errors: pd.DataFrame, about: About) -> list[Section]:
             ["model", "true samples", "states", *(f"{name}, 1 step" for name in groups),
              *(f"all, {h.replace('s', ' s')}" for h in horizons), "90 % coverage", "fit s"],
             table,
-            "Errors as shares of the gap without the model (1 is as bad as no model), mean over "
-            "seeds with its 95 % interval: along the first seconds of fresh rollouts of the policy "
-            "that was trained on the model, and from states drawn anywhere where the true system "
-            "can be set; coverage of the predicted 90 % interval.",
+            "Errors as shares of the gap without the model (1 is as bad as no model), with several "
+            "seeds their mean and its 95 % interval: along the first seconds of fresh rollouts of "
+            "the policy that was trained on the model, and from states drawn anywhere where the "
+            "true system can be set; coverage of the predicted 90 % interval.",
             heading="Where the difference model is right",
         )
     ]  # fmt: skip

@@ -36,6 +36,8 @@ class Mean:
         return self.value + np.nan_to_num(self.half_width)
 
     def __str__(self) -> str:
+        if self.count == 1:
+            return f"{self.value:.5g}"
         return self._decimals(0 if abs(self.value) >= 100 else 1)
 
     def text(self, digits: int) -> str:

@@ -46,9 +46,10 @@ class Parser(jsonargparse.ArgumentParser):
 
     def __init__(self, *given: Any, **options: Any) -> None:
         says = (
-            f"{_DEBUG}, or {_DEBUG_VARIABLE}=1, shows where errors arise. {_TRUST} PACKAGE: files"
+            f"{_DEBUG}, or {_DEBUG_VARIABLE}=1, shows where errors arise. {_TRUST} PACKAGE: files "
+            "of simulators, such as corrected.yaml, may name classes of that package."
         )
-        says += " of simulators, such as corrected.yaml, may name classes of that package."
+        options.setdefault("formatter_class", HelpFormatter)
         options.setdefault("epilog", says)
         super().__init__(*given, **options)
 

@@ -60,9 +60,13 @@ def class_label(chosen: Mapping[str, Any]) -> str:
     module, _, name = chosen["class_path"].rpartition(".")
     signature = inspect.signature(getattr(importlib.import_module(module), name))
     changed = [
-        f"{key}={value}"
+        f"{key}={class_label(value) if _names_class(value) else value}"
         for key, value in (chosen.get("init_args") or {}).items()
         if key in signature.parameters
         and json.dumps(value) != json.dumps(signature.parameters[key].default, default=str)
     ]
     return f"{name}({', '.join(changed)})" if changed else name
+
+
+def _names_class(value: Any) -> bool:
+    return isinstance(value, Mapping) and "class_path" in value

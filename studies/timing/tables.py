@@ -20,6 +20,7 @@ LEAST_SHARE_OF_PRODUCTS = 0.85
 LEAST_TIMES_GP = 10.0
 MOST_ONE_ROW = 0.2e-3
 LEAST_CONTROL_STEPS = 8000.0
+MOST_ANSWER = {"Pendulum": 60.0, "PendulumEquation": 20.0, "two joints": 180.0}
 
 Record = dict[str, Any]
 
@@ -74,6 +75,7 @@ def tables(data: Mapping[str, Any]) -> str:
         (SCALING.removeprefix("## "), markdown(*fit_scaling.table_rows(found))),
         ("Predicting", _predictions(found)),
         ("Simulators", _simulators(found)),
+        ("find_gap, from logs to verdicts", _answers(found)),
     ]
     return "\n\n".join(f"## {title}\n\n{text}" for title, text in parts if text) + "\n"
 
@@ -124,6 +126,11 @@ def _targets(found: Sequence[Record]) -> str:
         if own := _one(found, "test_prediction_latency", estimator=name, rows=1):
             what = f"{name}: prediction of one row, ms"
             add(what, 1e3 * own["seconds"], ".3f", 1e3 * MOST_ONE_ROW, at_least=False)
+    for system, most in MOST_ANSWER.items():
+        seconds = [r["processor_seconds"] for r in found if r.get("system") == system]
+        if seconds:
+            what = f"find_gap, {system}: slowest answer, processor s"
+            add(what, max(seconds), ".1f", most, at_least=False)
     if own := _one(found, "test_simulator_speed", simulator="Pendulum", rows=1):
         what = "Pendulum: control steps per second, one row"
         add(what, own["control_steps_per_second"], ".0f", LEAST_CONTROL_STEPS)
@@ -216,6 +223,18 @@ def _simulators(found: Sequence[Record]) -> str:
     ]
     head = ["simulator", "rows", "control steps/s", "Gymnasium Pendulum-v1, steps/s", "times"]
     return markdown([*head, "one-step error, rad", "rad/s"], rows)
+
+
+def _answers(found: Sequence[Record]) -> str:
+    asked = [*_of(found, "test_find_gap_time"), *_of(found, "test_find_gap_time_of_an_arm")]
+    rows = [
+        [
+            record["system"], str(record["rows"]), record["hidden"],
+            f"{record['kind']}: {record['named']}", f"{record['processor_seconds']:.1f}",
+        ]
+        for record in asked
+    ]  # fmt: skip
+    return markdown(["simulator", "rows", "hidden", "first verdict", "processor s"], rows)
 
 
 def _of(found: Sequence[Record], test: str) -> list[Record]:

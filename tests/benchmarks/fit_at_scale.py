@@ -29,7 +29,7 @@ NOISE = 0.01
 ESTIMATORS: dict[str, Any] = {
     "Linear": Linear(),
     "GaussianProcess": GaussianProcess(random_state=0),
-    "DropoutNet": DropoutNet(patience=3, random_state=0),
+    "DropoutNet": DropoutNet(random_state=0),
 }
 
 Rows = NDArray[np.float64]

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial-learn.md"
 LESS = [
-    "--budget.idealised_steps", "1300", "--budget.difference_steps", "600",
+    "--budget.idealised_steps", "700", "--budget.difference_steps", "400",
     "--budget.iterations", "1", "--budget.true_samples", "150",
 ]  # fmt: skip
 SMALL_DDPG = ["--ddpg.hidden", "[32, 32]", "--ddpg.warm_up", "300"]

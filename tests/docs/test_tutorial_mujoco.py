@@ -71,7 +71,7 @@ def test_the_policy_holds_the_robot(worked):
 def test_the_loop_runs_on_it(worked):
     folder, _, _ = worked
     _, command = blocks("bash")
-    less = ["--budget.idealised_steps", "1100", "--budget.difference_steps", "400"]
+    less = ["--budget.idealised_steps", "600", "--budget.difference_steps", "300"]
     small = ["--ddpg.hidden", "[32, 32]", "--ddpg.warm_up", "300"]
     run([*command.split()[1:], *less, *small], folder)
     found = json.loads((folder / "learnt" / "results.json").read_text())

@@ -62,7 +62,8 @@ def truth(system, states):
     [
         (Linear(), 1e-4, True),
         (GaussianProcess(random_state=0), 1e-3, True),
-        (DropoutNet(hidden=(60, 60), dropout=0.0, epochs=200, batch_size=32, random_state=0),
+        (DropoutNet(hidden=(60, 60), dropout=0.0, epochs=200, learning_rate=0.01,
+                    random_state=0),
          0.2, True),
         (LinearRegression(), 1e-9, False),
         (RandomForestRegressor(20, random_state=0), 0.3, False),

@@ -25,8 +25,10 @@ CHECKED = [
     Linear(features="quadratic", alpha=1.0),
     GaussianProcess(max_iter=10, random_state=0),
     GaussianProcess(max_iter=10, max_points=30, inducing=20, kernel="matern", random_state=0),
-    DropoutNet(hidden=(32, 32), dropout=0.05, epochs=60, batch_size=32, random_state=0),
-    DropoutNet(hidden=(32,), dropout=0.0, epochs=60, batch_size=32, patience=5, random_state=0),
+    DropoutNet(
+        hidden=(32, 32), dropout=0.05, epochs=60, batch_size=32, learning_rate=0.01, random_state=0
+    ),
+    DropoutNet(hidden=(32,), dropout=0.0, epochs=60, batch_size=32, paper=True, random_state=0),
     ChannelFeatures(),
 ]
 
@@ -41,7 +43,7 @@ def small() -> list:
         Linear(degree=2),
         GaussianProcess(max_iter=20, random_state=0),
         GaussianProcess(max_iter=20, max_points=50, inducing=30, random_state=0),
-        DropoutNet(hidden=(40, 40), epochs=20, batch_size=32, random_state=0),
+        DropoutNet(hidden=(40, 40), epochs=20, batch_size=32, learning_rate=0.01, random_state=0),
     ]
 
 

@@ -93,6 +93,15 @@ def test_a_number_at_its_bound_pretends_no_interval_and_says_why_it_is_not_certa
     assert "one of delay at voltage or actuator lag at voltage: these data cannot tell" in said
 
 
+def test_a_wide_interval_says_how_narrow_it_would_be_for_an_exact_simulator():
+    for own, said in (((0.0349, 0.0351), True), ((0.0341, 0.0359), False)):
+        change = dataclasses.replace(MASS.parameters["change"], if_exact=own)
+        verdict = dataclasses.replace(MASS, parameters={"change": change})
+        lines = notes(verdict, result(verdict))
+        exact = [line for line in lines if "if all else in the simulator is exact" in line]
+        assert exact == (["0.034900 to 0.035100 kg if all else in the simulator is exact"] * said)
+
+
 def test_a_provisional_answer_says_how_much_more_data_would_do():
     said = "; ".join(notes(DELAY, result(DELAY, blocks=5)))
     assert "there are 5 blocks of data to confirm it, 8 would do (some 3 s more)" in said

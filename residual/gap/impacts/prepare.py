@@ -13,7 +13,7 @@ from residual.gap.candidates import Candidate
 from residual.gap.fitting import Fit, Fitter
 from residual.gap.impacts.fitter import LOST, ImpactFitter
 from residual.gap.impacts.noise import quieten, spread, with_noise
-from residual.gap.impacts.windows import lay_out, pieces, scales
+from residual.gap.impacts.windows import lay_out, pieces, scales, steps_for
 from residual.gap.model import Model
 from residual.gap.noise import Noise
 from residual.gap.samples import Samples
@@ -35,7 +35,8 @@ def impact_fitter(
     model, none = Model(simulator), np.zeros(0)
     nodes = paths.measured(model, samples, none)
     rates = np.array([i for i, c in enumerate(simulator.physical_channels) if c.kind == "rate"])
-    grouped = blocks(samples, Windows.cut(pieces(samples)), drive(samples, nodes, rates), NAMED_ON)
+    cut = pieces(samples, steps_for(samples, horizon))
+    grouped = blocks(samples, Windows.cut(cut), drive(samples, nodes, rates), NAMED_ON)
     scale = scales(simulator)
     data = lay_out(simulator, samples, grouped.windows.pieces)
     data, _ = quieten(model, none, data, data.guess, scale, 3)

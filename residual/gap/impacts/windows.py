@@ -15,35 +15,43 @@ from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
-#: Intervals in a window. In longer ones most windows hold an impact on which simulators differ;
-#: shorter ones say little where rates were not measured.
+#: Least intervals in a window: shorter ones say little where rates were not measured.
 STEPS = 5
 
 
-def pieces(samples: Samples, steps: int = STEPS) -> list[tuple[int, int, int]]:
+def steps_for(samples: Samples, horizon: float) -> int:
+    """Intervals in a window: half a horizon, of which forecasts go on from its end.
+
+    In longer ones most windows hold an impact on which simulators differ.
+    """
+    return max(STEPS, round(0.5 * horizon / samples.step))
+
+
+def pieces(samples: Samples, steps: int) -> list[tuple[int, int, int]]:
     """(run, first row, one past last row) of windows that share their end points.
 
     The first sample of a run is left out: what was commanded before it is not known.
+
+    Raises:
+        ValueError: No run is long enough for a window.
     """
-    return [
+    found = [
         (run, a, a + steps + 1)
         for run, (start, stop) in enumerate(samples.runs)
         for a in range(start + 1, stop - steps, steps)
     ]
+    if not found:
+        raise ValueError(
+            f"every run is shorter than {steps + 2} samples, the least for a window of half a "
+            "horizon: log longer runs, or ask for a shorter horizon"
+        )
+    return found
 
 
 def lay_out(
     simulator: HostSimulator, samples: Samples, cut: list[tuple[int, int, int]]
 ) -> WindowData:
-    """Windows with a first guess of start states and noise.
-
-    Raises:
-        ValueError: No run is long enough for a window.
-    """
-    if not cut:
-        raise ValueError(
-            f"every run is shorter than {STEPS + 2} samples, the least for a window: log longer"
-        )
+    """Windows with a first guess of start states and noise."""
     model = Model(simulator)
     windows = Windows.cut(cut)
     nodes = paths.measured(model, samples, np.zeros(0))

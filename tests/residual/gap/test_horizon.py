@@ -59,7 +59,7 @@ def test_a_window_has_samples_enough():
     assert found >= (1 - LEAD) * SAMPLES * 0.4 * (1 - 1e-9)
 
 
-def test_what_strikes_the_ground_is_foretold_over_ten_steps():
+def test_what_strikes_the_ground_is_foretold_over_ten_steps_at_least():
     states = np.zeros((50, 18))
     run = Trajectory("walk", 0.03 * np.arange(50), states, np.zeros((49, 6)))
     assert usual_horizon(Leo(), [run]) == pytest.approx(10 * Leo().dt)

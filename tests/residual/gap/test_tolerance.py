@@ -51,3 +51,15 @@ def test_where_only_noise_is_left_parameters_may_be_off_too(inertia, sure):
     assert exact.verdicts[0].kind == "confirmed"
     assert allowed.verdicts[0].kind == ("confirmed" if sure else "ambiguous")
     assert np.isclose(exact.verdicts[0].parameters["change"].value, inertia * INERTIA, rtol=0.2)
+
+
+@pytest.mark.parametrize(("delay", "sure"), [(0.02, False), (0.04, True)])
+def test_a_delay_of_less_than_half_a_sample_is_not_certain(delay, sure):
+    simulator = PendulumEquation()
+    offered = [e for e in library(simulator) if e.name in ("inertia", "delay", "dead_zone")]
+    logs = make_logs(Truth(delay=delay), 11, "strong", "A", 4)
+    first = find_gap(simulator, logs, effects=offered, hold="zero").verdicts[0]
+    assert first.effect == "delay"
+    assert first.kind == ("confirmed" if sure else "ambiguous")
+    assert ("clock" in first.doubts) is not sure
+    assert np.isclose(first.parameters["time"].value, delay, rtol=0.1)
