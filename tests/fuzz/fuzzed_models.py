@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import copy
 import functools
+import importlib.util
 import tracemalloc
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 from damage import OTHER, REFUSED, SAME, Defect, damaged
+from sklearn.linear_model import Ridge
 
 import residual
 from policy import DDPG, DDPGConfig, MlpPolicy
@@ -32,7 +34,9 @@ LOADERS = {
     "rollout": read_npz,
 }  # fmt: skip
 NPZ = ("transitions", "rollout")
-FILES = ("policy", "agent", "linear", "network", "process", "difference", "effects", *NPZ)
+#: Estimators of other libraries need skops.
+FOREIGN = ("ridge",) if importlib.util.find_spec("skops") else ()
+FILES = ("policy", "agent", "linear", "network", "process", "difference", "effects", *FOREIGN, *NPZ)
 KINDS = (*(f"{kind}, damaged" for kind in FILES), *(f"{kind}, forged" for kind in FILES[:-1]))
 
 
@@ -115,6 +119,8 @@ def whole(what: str, folder: Path) -> Path:
             rows.save(path)
         case "rollout":
             write_npz(path, {"states": X, "actions": y, "rewards": y[:, 0]})
+        case "ridge":
+            residual.save(Ridge().fit(X, y), path)
         case "difference":
             residual.save(DifferenceModel(Linear(), PendulumEquation()).fit(rows), path)
         case "effects":

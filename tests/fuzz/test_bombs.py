@@ -132,3 +132,20 @@ def test_settings_that_unfold_without_end_are_refused(text, tmp_path):
     (tmp_path / "a.yaml").write_text(text)
     with pytest.raises(ValueError, match=r"a\.yaml"):
         load_simulator(tmp_path / "a.yaml")
+
+
+def test_an_estimator_of_another_library_that_would_fill_the_memory(tmp_path):
+    pytest.importorskip("skops")
+    from sklearn.linear_model import Ridge
+
+    from simgap_arrays import FileError, read_arrays, write_arrays
+
+    X = np.random.default_rng(0).normal(size=(20, 2))
+    residual.save(Ridge().fit(X, X), tmp_path / "ridge")
+    header, arrays = read_arrays(tmp_path / "ridge")
+    zipped(tmp_path / "bomb.npz")
+    content = np.frombuffer((tmp_path / "bomb.npz").read_bytes(), np.uint8)
+    (name,) = (name for name, array in arrays.items() if array.dtype == np.uint8 and array.size > 9)
+    write_arrays(tmp_path / "bomb", header, {**arrays, name: content})
+    with pytest.raises(FileError, match=r"bomb.*would unpack to 4\.29 GB"):
+        residual.load(tmp_path / "bomb")
