@@ -39,10 +39,14 @@ class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
     ``for_simulator(simulator)`` that returns an unfitted copy configured for its channels. If
     what it learns is a simulator itself, ``corrected()`` returns that.
 
+    One that is at home with noisy rows that follow each other sets ``reads_noise = True`` and is
+    then fitted to what was measured, not to smoothed paths (``residual.measured``).
+
     A subclass names the attributes it learns in ``_learned`` and implements ``_fit`` and
     ``_predict``.
     """
 
+    reads_noise: ClassVar[bool] = False
     _learned: ClassVar[tuple[str, ...]] = ()
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
