@@ -38,8 +38,8 @@ class Claim:
         alike: Effects of other families that do, with the same motion in these data.
         rivals: Effects of other families that do, with another motion.
         twins: Effects that make the same motion in any data.
-        needed: Whether forecasts are clearly worse without it, and, where chance decides, its share is
-            not below zero by that of the blocks.
+        needed: Whether forecasts are clearly worse without it; where chance decides, also whether
+            its share is above zero in its interval.
         steady: Whether its strength is about the same in every fold.
         sound: Whether it survives other numerics.
         bounded: Whether a strength lies at its bound.
