@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import hashlib
 import json
 import math
 import os
 import secrets
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+FORMAT = 2
 _PARTIAL = ".partial-"
 
 
@@ -73,6 +76,39 @@ def atomic_write_json(path: str | Path, value: Any) -> None:
     atomic_write_text(path, text + "\n")
 
 
+def write_sealed(path: str | Path, value: Mapping[str, Any]) -> None:
+    """Write an object to ``path`` as JSON with a format version and a checksum of its content."""
+    plain = jsonable({**value, "format": FORMAT})
+    atomic_write_json(path, {**plain, "checksum": _checksum(plain)})
+
+
+def read_sealed(path: str | Path) -> dict[str, Any]:
+    """What ``write_sealed`` wrote; a file without version and checksum is of an earlier release.
+
+    Raises:
+        ValueError: It is damaged, or of another release; the message names it.
+    """
+    found = read_json(path)
+    if not isinstance(found, dict):
+        raise ValueError(f"{path} is damaged: expected a JSON object")
+    checksum = found.pop("checksum", None)
+    if found.get("format", FORMAT) != FORMAT:
+        raise ValueError(
+            f"{path} has format version {found['format']!r:.40}, this release reads {FORMAT}: give "
+            "the command that wrote it again"
+        )
+    if checksum is None and "format" in found:
+        raise ValueError(f"{path} is damaged: its checksum is missing")
+    if checksum is not None and checksum != _checksum(found):
+        raise ValueError(f"{path} is damaged: its content does not have its checksum")
+    found.pop("format", None)
+    return found
+
+
+def _checksum(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
+
+
 def read_json(path: str | Path) -> Any:
     """What ``atomic_write_json`` wrote.
 
@@ -106,10 +142,17 @@ def jsonable(value: Any) -> Any:
     raise TypeError(f"a {type(value).__name__} has no form in JSON: {value!r:.80}")
 
 
-def remove_partial_files(folder: str | Path) -> None:
-    """Delete what a killed writer left in ``folder`` and below; call before work begins."""
+def remove_partial_files(folder: str | Path, older: float = 600.0) -> None:
+    """Delete what a killed writer left in ``folder`` and below; call before work begins.
+
+    Args:
+        folder: Where to look.
+        older: Seconds. What is younger may be the work of another process on the same folder.
+    """
     for leftover in Path(folder).rglob(f"{_PARTIAL}*"):
-        leftover.unlink(missing_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            if time.time() - leftover.stat().st_mtime > older:
+                leftover.unlink()
 
 
 def flush_to_disk(path: str | Path) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from residual.difference import DifferenceModel
+from residual.estimator import NotFinite
 from sims.simulator import Array, Simulator
 
 # A difference far outside its data could throw the state anywhere; it is kept within this many
@@ -62,7 +63,17 @@ class CorrectedSimulator(Simulator):
 
     def correct(self, states: Array, actions: Array, next_states: Array) -> Array:
         """What ``step`` makes of next states (n, n_s) that the idealised simulator gave."""
-        return self._bounded(states, next_states + self.difference.predict(states, actions))
+        return self._bounded(states, next_states + self._difference(states, actions))
+
+    def _difference(self, states: Array, actions: Array) -> Array:
+        try:
+            return self.difference.predict(states, actions)
+        except NotFinite:
+            if len(states) == 1:
+                return np.full_like(states, np.nan)
+        # Rows that can be predicted must not suffer from those that cannot.
+        each = [slice(i, i + 1) for i in range(len(states))]
+        return np.concatenate([self._difference(states[i], actions[i]) for i in each])
 
     def _bounded(self, states: Array, next_states: Array) -> Array:
         middle = np.where(self._rates, 0.0, states)

@@ -39,10 +39,14 @@ class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
     ``for_simulator(simulator)`` that returns an unfitted copy configured for its channels. If
     what it learns is a simulator itself, ``corrected()`` returns that.
 
+    One that is at home with noisy rows that follow each other sets ``reads_noise = True`` and is
+    then fitted to what was measured, not to smoothed paths (``residual.measured``).
+
     A subclass names the attributes it learns in ``_learned`` and implements ``_fit`` and
     ``_predict``.
     """
 
+    reads_noise: ClassVar[bool] = False
     _learned: ClassVar[tuple[str, ...]] = ()
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
@@ -53,7 +57,8 @@ class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
             y: targets, shape (n, n_out) or (n,).
 
         Raises:
-            ValueError: The shapes do not fit, or a value is not finite.
+            ValueError: The shapes do not fit, a value is not finite, or values are so large that
+                their spread overflows.
         """
         rows, targets = validate_data(
             self, X, y, dtype=np.float64, multi_output=True, y_numeric=True, ensure_min_samples=2
@@ -61,6 +66,8 @@ class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
         targets = np.asarray(targets, float)
         self.flat_ = targets.ndim == 1
         targets = targets.reshape(len(targets), -1)
+        _check_spread(rows, "X")
+        _check_spread(targets, "y")
         self.target_mean_ = targets.mean(axis=0)
         self.target_scale_ = spread(targets)
         self._fit(rows, (targets - self.target_mean_) / self.target_scale_)
@@ -87,10 +94,15 @@ class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
         Raises:
             sklearn.exceptions.NotFittedError: ``fit`` was not called.
             ValueError: X has another width than in ``fit``, or a value is not finite.
+            NotFinite: X lies so far from the data that the prediction is no number.
         """
         rows = self._rows(X)
-        mean, std = self._predict(rows, return_std)
-        mean = mean * self.target_scale_ + self.target_mean_
+        with np.errstate(over="ignore", invalid="ignore"):
+            mean, std = self._predict(rows, return_std)
+            mean = mean * self.target_scale_ + self.target_mean_
+        # The sum is finite only if all are; looking at each costs more for one row.
+        if not np.isfinite(mean.sum()) and not np.isfinite(mean).all():
+            raise NotFinite(_far(type(self).__name__, rows, mean))
         if self.flat_:
             mean = mean[:, 0]
         if std is None:
@@ -159,6 +171,33 @@ class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
 
 
 _COMMON = ("n_features_in_", "flat_", "target_mean_", "target_scale_")
+
+
+class NotFinite(ValueError):
+    """A prediction that would be no number; it is never returned."""
+
+
+def _far(name: str, rows: Array, mean: Array) -> str:
+    bad = np.flatnonzero(~np.isfinite(mean).all(axis=1))
+    largest = np.abs(rows[bad[0]]).max()
+    return (
+        f"{name} predicts no finite number for {len(bad)} of {len(rows)} rows, the first with "
+        f"inputs up to {largest:.3g}: stay near the data, since networks compute in float32, "
+        "whose range ends at 3e38, and powers of inputs overflow sooner"
+    )
+
+
+def _check_spread(columns: Array, name: str) -> None:
+    """Raise ``ValueError`` if columns cannot be standardised."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        deviation = columns.std(axis=0)
+    bad = np.flatnonzero(~np.isfinite(deviation))
+    if bad.size:
+        column = columns[:, bad[0]]
+        raise ValueError(
+            f"column {bad[0]} of {name} runs from {column.min():.3g} to {column.max():.3g}, whose "
+            "spread overflows: expected values up to about 1e150; look for wild samples, or scale"
+        )
 
 
 def spread(columns: Array) -> Array:

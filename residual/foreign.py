@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Sequence
+from io import BytesIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simgap_arrays import FileError
+from simgap_npz import check_unpacked
 
 #: Ours that an ensemble or a pipeline may hold; each is plain numbers and arrays.
 _OURS = (
@@ -61,6 +64,12 @@ def loaded(data: NDArray[np.uint8], trusted: Sequence[str]) -> Any:
             "holds another library's estimator, which skops reads: pip install 'simgap[skops]'"
         ) from None
     content = np.asarray(data, np.uint8).tobytes()
+    try:
+        with zipfile.ZipFile(BytesIO(content)) as archive:
+            unpacked = sum(entry.file_size for entry in archive.infolist())
+    except zipfile.BadZipFile as error:
+        raise FileError(f"holds an estimator that is damaged ({error})") from None
+    check_unpacked("the estimator", unpacked, len(content))
     unknown = sorted(set(io.get_untrusted_types(data=content)) - {*_OURS, *trusted})
     if unknown:
         raise FileError(

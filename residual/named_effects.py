@@ -37,7 +37,7 @@ class NamedEffects(Estimator):
         says_: What was found, in words, and what stays unexplained.
     """
 
-    reads_noise = True
+    reads_noise: ClassVar[bool] = True
 
     _learned: ClassVar[tuple[str, ...]] = ("covariance_", "residual_")
 

@@ -119,12 +119,16 @@ def load(path: str | Path, simulator: Simulator | None = None, trusted: Sequence
         raise FileError(f"{path}: {error}") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, RecursionError,
             MemoryError) as error:  # fmt: skip
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise FileError(
-            f"{path} is damaged or was not written by residual.save "
-            f"({type(error).__name__}: {error}): save the model again"
+            f"{path} is damaged or was not written by residual.save ({reason:.300}): save the "
+            "model again"
         ) from error
     if simulator is not None and isinstance(model, DifferenceModel):
-        model.check_fits(simulator)
+        try:
+            model.check_fits(simulator)
+        except ValueError as error:
+            raise FileError(f"{path}: {error}") from None
         model.simulator = simulator
     return model
 
@@ -175,8 +179,8 @@ def _difference(header: dict[str, Any], estimator: Any) -> Any:
     model = DifferenceModel.from_state(
         estimator,
         float(fields["dt"]),
-        tuple(Channel(**channel) for channel in fields["state_channels"]),
-        tuple(Channel(**channel) for channel in fields["action_channels"]),
+        tuple(map(_channel, fields["state_channels"])),
+        tuple(map(_channel, fields["action_channels"])),
         np.array(fields["mean"], float),
         np.array(fields["scale"], float),
     )
@@ -184,6 +188,17 @@ def _difference(header: dict[str, Any], estimator: Any) -> Any:
         np.zeros((1, len(model.state_channels))), np.zeros((1, len(model.action_channels)))
     )
     return model
+
+
+def _channel(fields: dict[str, Any]) -> Channel:
+    channel = Channel(**fields)
+    names = (channel.name, channel.unit, channel.kind, channel.rate_of or "")
+    numbers = (channel.scale, channel.low, channel.high)
+    if not all(isinstance(name, str) for name in names) or not all(
+        isinstance(number, int | float) for number in numbers
+    ):
+        raise TypeError(f"{channel!r:.100} is no channel")
+    return channel
 
 
 def _plain(name: str, value: Any) -> Any:

@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from simgap_arrays import FileError
+from simgap_npz import read_npz, write_npz
+
 Array = NDArray[np.float64]
 
 
@@ -50,14 +53,37 @@ class Transitions:
         )
 
     def save(self, path: Path) -> None:
-        """Write all columns to one ``.npz`` file."""
-        np.savez_compressed(path, **dataclasses.asdict(self))
+        """Write all columns to one ``.npz`` file, whole or not at all."""
+        write_npz(path, vars(self))
 
     @classmethod
     def load(cls, path: Path) -> Transitions:
-        """Read what ``save`` wrote; no code is run from the file."""
-        with np.load(path, allow_pickle=False) as data:
-            return cls(**{field.name: data[field.name] for field in dataclasses.fields(cls)})
+        """Read what ``save`` wrote; no code is run from the file.
+
+        Raises:
+            FileNotFoundError: There is no such file.
+            ValueError: It is damaged, holds something else, or values that are not finite.
+        """
+        arrays = read_npz(path)
+        names = [field.name for field in dataclasses.fields(cls)]
+        if set(arrays) != set(names):
+            found = ", ".join(sorted(arrays)) or "none"
+            raise FileError(f"{path} holds arrays {found:.200}, expected {', '.join(names)}")
+        for name, array in arrays.items():
+            kinds, ndim = ("iu", 1) if name == "episodes" else ("fiu", 2)
+            if array.dtype.kind not in kinds or array.ndim != ndim:
+                raise FileError(
+                    f"{path}: {name} holds {array.dtype} of shape {array.shape}, expected "
+                    f"{'integers' if ndim == 1 else 'numbers'} in {ndim} dimensions"
+                )
+            if not np.isfinite(array).all():
+                raise FileError(f"{path}: {name} holds values that are not finite")
+        if len({len(array) for array in arrays.values()}) > 1 or (
+            arrays["states"].shape != arrays["next_states"].shape
+        ):
+            shapes = ", ".join(f"{name} {arrays[name].shape}" for name in names)
+            raise FileError(f"{path}: shapes that do not fit together: {shapes}")
+        return cls(**arrays)
 
 
 @dataclasses.dataclass(frozen=True)

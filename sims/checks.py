@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sims.contract import acceleration_keeps, contract, declared
 from sims.effects.base import Effect
 from sims.effects.library import library, typical
 from sims.equations import EquationOfMotion
@@ -34,34 +35,50 @@ def check_simulator(
         One finding per check. ``print(findings)`` is the report, a table; the simulator keeps
         the contract if ``all(finding.ok for finding in findings)``.
     """
-    declared = Findings(_declared(simulator))
-    if not all(finding.ok for finding in declared):
-        return declared
+    if states is not None and actions is not None:
+        states, actions = simulator.check_rows(states, actions)
     rng = rng or np.random.default_rng(0)
+    return Findings(_until_it_raises(_checks(simulator, states, actions, rng)))
+
+
+def _until_it_raises(checks: Iterator[Finding]) -> Iterator[Finding]:
+    try:
+        yield from checks
+    except Exception as error:
+        says = f"{type(error).__name__}: {error}; expected numbers for every row"
+        yield Finding("raises", False, says)
+
+
+def _checks(
+    simulator: Simulator,
+    states: ArrayLike | None,
+    actions: ArrayLike | None,
+    rng: np.random.Generator,
+) -> Iterator[Finding]:
+    findings = []
+    for finding in declared(simulator):
+        findings.append(finding)
+        yield finding
+    if not all(finding.ok for finding in findings):
+        return
     if states is None or actions is None:
         given = actions if states is None else states
         drawn = draw(simulator, 24 if given is None else len(np.asarray(given)), rng)
         states = drawn[0] if states is None else states
         actions = drawn[1] if actions is None else actions
     states, actions = simulator.check_rows(states, actions)
-    findings = Findings((*declared, *_contract(simulator, states, actions, rng)))
-    if all(finding.ok for finding in findings):
-        findings += _to_the_bounds(simulator, rng)
-        if isinstance(simulator, EquationOfMotion):
-            findings.append(_linear(simulator, states, actions))
-        findings += _parameters(simulator, states, actions)
-        if isinstance(simulator, HostSimulator):
-            findings += _effects(simulator, rng)
-    return findings
-
-
-def _declared(simulator: Simulator) -> Iterator[Finding]:
-    good = bool(np.isfinite(simulator.dt) and simulator.dt > 0)
-    says = f"every {simulator.dt:g} s" if good else f"dt is {simulator.dt!r}, expected seconds > 0"
-    yield Finding("period", good, says)
-    count = len(simulator.state_channels)
-    says = f"{count} of the state" if count else "there is no state channel: declare every column"
-    yield Finding("channels", bool(count), says)
+    for finding in contract(simulator, states, actions, rng):
+        findings.append(finding)
+        yield finding
+    if not all(finding.ok for finding in findings):
+        return
+    yield from _to_the_bounds(simulator, rng)
+    if isinstance(simulator, EquationOfMotion):
+        yield acceleration_keeps(simulator, states, actions)
+        yield _linear(simulator, states, actions)
+    yield from _parameters(simulator, states, actions)
+    if isinstance(simulator, HostSimulator):
+        yield from _effects(simulator, rng)
 
 
 def _to_the_bounds(simulator: Simulator, rng: np.random.Generator) -> Iterator[Finding]:
@@ -98,7 +115,7 @@ def _linear(simulator: EquationOfMotion, states: Array, actions: Array) -> Findi
         force = np.zeros((3, *q.shape))
         force[1:, :, j] = np.array([[1.0], [2.0]]) * simulator.force_scale(joint)
         rest, once, twice = (
-            simulator.acceleration(q.copy(), v.copy(), actions.copy(), each, values)
+            np.asarray(simulator.acceleration(q.copy(), v.copy(), actions.copy(), each, values))
             for each in force
         )
         error = np.abs((twice - rest) - 2 * (once - rest)).max()
@@ -108,113 +125,6 @@ def _linear(simulator: EquationOfMotion, states: Array, actions: Array) -> Findi
             )
             return Finding("linear in forces", False, says)
     return Finding("linear in forces", True, "twice the force, twice the change of acceleration")
-
-
-def _contract(
-    simulator: Simulator, states: Array, actions: Array, rng: np.random.Generator
-) -> Iterator[Finding]:
-    given = states.copy(), actions.copy()
-    following = np.asarray(simulator.step(states, actions))
-    if following.shape != states.shape:
-        says = f"step returned {following.shape} for states of shape {states.shape}"
-        yield Finding("shape", False, says)
-        return
-    yield Finding("shape", True, f"(n, {states.shape[1]}) in and out")
-    kept = np.array_equal(given[0], states) and np.array_equal(given[1], actions)
-    says = "the arguments are left as they were" if kept else "step overwrites its arguments"
-    yield Finding("arguments", kept, says)
-    states, actions = given
-    bad = np.flatnonzero(~np.isfinite(following).all(axis=1))
-    yield Finding(
-        "finite",
-        not bad.size,
-        example("step gives", bad, states, actions, following, following)
-        if bad.size
-        else f"all {len(states)} rows stay finite",
-    )
-
-    def same(check: str, again: Array, good: str, wrong: str) -> Finding:
-        rows = np.flatnonzero((again != following).any(axis=1) & np.isfinite(following).all(axis=1))
-        says = example(wrong, rows, states, actions, following, again) if rows.size else good
-        return Finding(check, not rows.size, says)
-
-    again = simulator.step(states, actions)
-    yield same(
-        "repeatable",
-        again,
-        "the same rows give the same bits",
-        "the same rows stepped twice differ; no random numbers and no memory may be left",
-    )
-    simulator.step(states[::-1] * 0.5, actions[::-1])
-    again = simulator.step(states, actions)
-    yield same(
-        "pure",
-        again,
-        "what was stepped before does not matter",
-        "the result depends on what was stepped before; reset every hidden state in step",
-    )
-    alone = np.concatenate(
-        [simulator.step(states[i : i + 1], actions[i : i + 1]) for i in range(len(states))]
-    )
-    yield same(
-        "batch",
-        alone,
-        "a row alone gives the same bits as in a batch",
-        "a row alone differs from the same row in a batch; use elementwise operations only",
-    )
-    order = rng.permutation(len(states))
-    shuffled = np.empty_like(following)
-    shuffled[order] = simulator.step(states[order], actions[order])
-    yield same(
-        "order",
-        shuffled,
-        "the order of the rows does not matter",
-        "rows in another order differ",
-    )
-    yield from _turns(simulator, states, actions, following)
-    if simulator.action_channels:
-        yield _bounds(simulator, states, actions)
-
-
-def _bounds(simulator: Simulator, states: Array, actions: Array) -> Finding:
-    """Actions beyond their bounds must act like their bounds."""
-    beyond = [
-        channel.high + 1.0 if np.isfinite(channel.high) else column
-        for channel, column in zip(simulator.action_channels, actions[0], strict=True)
-    ]
-    edge = [
-        channel.high if np.isfinite(channel.high) else column
-        for channel, column in zip(simulator.action_channels, actions[0], strict=True)
-    ]
-    clipped = np.array_equal(
-        simulator.step(states[:1], [beyond]), simulator.step(states[:1], [edge])
-    )
-    says = (
-        "actions are clipped to their bounds"
-        if clipped
-        else (f"the action {beyond} does not act like its bound {edge}; use check_rows in step")
-    )
-    return Finding("bounds", clipped, says)
-
-
-def _turns(
-    simulator: Simulator, states: Array, actions: Array, following: Array
-) -> Iterator[Finding]:
-    """An angle must not be wrapped: a start one turn further ends one turn further."""
-    for column, channel in enumerate(simulator.state_channels):
-        if not channel.angle:
-            continue
-        moved = states.copy()
-        moved[:, column] += 4 * np.pi
-        further = simulator.step(moved, actions)[:, column] - following[:, column]
-        # Other forces than those of whole turns may move it a little differently.
-        ok = bool(np.all(np.abs(further - 4 * np.pi) < np.pi))
-        says = (
-            "is not wrapped"
-            if ok
-            else "two turns further on, the next angle is not two turns further on; do not wrap it"
-        )
-        yield Finding(f"angle {channel.name}", ok, says)
 
 
 def _parameters(simulator: Simulator, states: Array, actions: Array) -> Iterator[Finding]:

@@ -13,11 +13,13 @@ from typing import Any
 import jsonargparse
 import yaml
 
+import simgap_yaml
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
 from sims.simulator import Hold, Simulator
+from sims.trust import check_file, trusting
 
 #: In a list of effects: all that the simulator can host.
 LIBRARY = "library"
@@ -26,22 +28,30 @@ LIBRARY = "library"
 MODEL_FILES = {".xml": "sims.mujoco.MujocoSimulator", ".urdf": "sims.mujoco.MujocoSimulator"}
 
 
-def load_simulator(source: str | Path | Mapping[str, Any]) -> Simulator:
+def load_simulator(
+    source: str | Path | Mapping[str, Any], trusted: Sequence[str] = ()
+) -> Simulator:
     """A simulator by its import path, its YAML file, or its ``class_path`` and ``init_args``.
 
     Args:
         source: ``"sims.pendulum.Pendulum"``, a file such as ``"corrected.yaml"``, what such a
             file holds, or a robot's ``.xml`` (MJCF) or ``.urdf``.
+        trusted: Packages whose classes a file may name beside ours: loading runs their code.
 
     Raises:
-        ValueError: There is no such class or file, it is no simulator, or the settings are wrong.
+        ValueError: There is no such class or file, it is no simulator, the settings are wrong, or
+            a file names classes of a package that is not trusted.
     """
-    return _parser().instantiate(_parsed(source)).simulator
+    with trusting(trusted):
+        return _parser().instantiate(_parsed(source)).simulator
 
 
-def simulator_settings(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
+def simulator_settings(
+    source: str | Path | Mapping[str, Any], trusted: Sequence[str] = ()
+) -> dict[str, Any]:
     """``class_path`` and ``init_args`` of what ``load_simulator`` makes, defaults filled in."""
-    text = _parser().dump(_parsed(source), format="yaml", skip_unset=False)
+    with trusting(trusted):
+        text = _parser().dump(_parsed(source), format="yaml", skip_unset=False)
     return yaml.safe_load(text)["simulator"]
 
 
@@ -217,6 +227,8 @@ def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
     value: Any = copy.deepcopy(dict(source)) if isinstance(source, Mapping) else str(source)
     if isinstance(value, str):
         value = model_settings(value) or value
+    if isinstance(value, str) and Path(value).is_file():
+        check_file(value)
     try:
         return _parser().parse_object({"simulator": value})
     except (jsonargparse.ArgumentError, TypeError) as error:
@@ -230,7 +242,10 @@ def _not_found(source: str | Mapping[str, Any]) -> str:
     if isinstance(source, str) and Path(source).suffix in (".yaml", ".yml"):
         if not Path(source).is_file():
             return "there is no such file"
-        settings = yaml.safe_load(Path(source).read_text(encoding="utf-8"))
+        try:
+            settings = simgap_yaml.load(Path(source).read_text(encoding="utf-8"))
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            return f"it is no YAML: {_one_line(error)}"
     for path in _class_paths(settings):
         module = path.partition(".")[0]
         if module and importlib.util.find_spec(module) is None:

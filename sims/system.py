@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from sims.contract import refuse_unsound
 from sims.environment import SimulatorEnv
 from sims.measured import MeasuredEnv, Measurement
 from sims.sampled import SampledEnv, StateOf
@@ -165,8 +166,10 @@ class System:
         """Begin an episode on the simulator and on the true system, and reward one step.
 
         Raises:
-            ValueError: The task, the simulator and the true system do not fit together.
+            ValueError: The task, the simulator and the true system do not fit together, or the
+                simulator is unsound (``sims.contract``).
         """
+        refuse_unsound(self.nominal)
         try:
             for env in (self.environment(self.nominal), self.true_environment()):
                 env.reset(seed=0)

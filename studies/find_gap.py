@@ -29,10 +29,12 @@ from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 from residual.gap import GapResult, find_gap
 from residual.logs import LogData, LogFormat, read_logs
 from residual.step_check import advice
+from sims.contract import refuse_unsound
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Hold, Simulator
+from sims.trust import foreign
 from studies.gap.files import CORRECTED, REPORT, write_gap
 from studies.gap.progress import Heartbeat
 from studies.gap.summary import found_in_data, summary
@@ -198,9 +200,10 @@ def hosting(simulator: Simulator) -> HostSimulator:
     """The simulator, if effects can be added to it.
 
     Raises:
-        ValueError: It hosts none.
+        ValueError: It hosts none, or is unsound (``sims.contract``).
     """
     if isinstance(simulator, HostSimulator):
+        refuse_unsound(simulator)
         return simulator
     raise ValueError(
         f"{type(simulator).__name__} cannot host effects: derive it from EquationOfMotion or "
@@ -245,6 +248,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         fail(str(error))
     print(f"\n{summary(result, settings['tolerance'])}\n\nreport:              {output / REPORT}")
     print(f"corrected simulator: {output / CORRECTED}")
+    if strange := foreign(settings["simulator"]):
+        print(f"  names a class of yours: load it with --trust {strange.partition('.')[0]}")
     for name in result.corrected.own_files():
         print(f"corrected model:     {output / name}")
     for line in result.corrected.not_in_own_files():

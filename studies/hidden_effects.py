@@ -32,7 +32,7 @@ import threadpoolctl
 from jsonargparse.typing import PositiveInt
 
 from residual.gap import find_gap
-from simgap_files import atomic_write_json, read_json
+from simgap_files import read_sealed, write_sealed
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
@@ -120,7 +120,7 @@ def rebuild(folder: Path) -> None:
         folder: Where the sets are: ``sets`` in the output folder.
     """
     results, _ = read_trials(folder)
-    _report(results, folder.parent, read_json(folder.parent / "settings.json"))
+    _report(results, folder.parent, read_sealed(folder.parent / "settings.json"))
 
 
 def _report(
@@ -155,7 +155,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         fail("nothing to run: expected blocks or dirty, as in studies/configs/hidden_effects/")
     folders = {trial_folder(output / "sets", _title(c), c): c for c in cells}
     settings = json.loads(parser.dump(given, format="json"))
-    atomic_write_json(output / "settings.json", settings)
+    write_sealed(output / "settings.json", settings)
     results, failures = run_trials("hidden_effects", folders, run_set, Execution(jobs=given.jobs))
     if results:
         _report(results, output, settings)

@@ -17,7 +17,7 @@ from typing import Any
 
 from jinja2 import UndefinedError
 
-from simgap_files import read_json
+from simgap_files import read_sealed
 from studies.learning import command
 from studies.running.command import Parser, fail, guarded
 from studies.running.trials import PLAN
@@ -45,7 +45,7 @@ def study_of(folder: Path) -> str:
         raise FileNotFoundError(
             f"{folder}: expected the output folder of a study, with {PLAN} or results.json in it"
         )
-    found: Any = read_json(path)
+    found: Any = read_sealed(path)
     if isinstance(found, dict) and isinstance(found.get("trials"), list):
         found = (found["trials"] or [None])[0]
     if not isinstance(found, dict):

@@ -21,6 +21,7 @@ from residual.gap.result import GapResult
 from residual.gap.tolerance import KNOWN
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
+from sims.contract import refuse_unsound
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
@@ -77,9 +78,10 @@ def find_gap(
 
     Raises:
         ValueError: There are no trajectories, nothing was measured, samples are too rare, the
-            simulator returns values that are not finite, or a position of a system that strikes
-            the ground was not measured.
+            simulator is unsound (``sims.contract``) or returns values that are not finite, or a
+            position of a system that strikes the ground was not measured.
     """
+    refuse_unsound(simulator)
     clock = Clock()
     tell = progress or (lambda _: None)
     until = time.process_time() + 60 * minutes * SEARCHING

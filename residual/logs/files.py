@@ -13,6 +13,7 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from residual.logs.table import LogError, Table, shortened
+from simgap_npz import check_unpacked, read_npz
 
 TEXT, PARQUET, NPZ = (".csv", ".txt", ".tsv", ".dat", ".log"), (".parquet", ".pq"), (".npz",)
 
@@ -174,23 +175,36 @@ def _read_arrays(path: Path, data: bytes, suffix: str) -> Table:
 
 
 def _parquet(data: bytes) -> list[tuple[str | int, NDArray[Any]]]:
-    table = pyarrow.parquet.ParquetFile(io.BytesIO(data)).read()
+    opened = pyarrow.parquet.ParquetFile(io.BytesIO(data), page_checksum_verification=True)
+    check_parquet(opened, len(data))
+    table = opened.read()
     return [
         (name, column.to_numpy())
         for name, column in zip(table.column_names, table.columns, strict=True)
     ]
 
 
+def check_parquet(file: pyarrow.parquet.ParquetFile, size: int) -> None:
+    """Refuse a Parquet file of ``size`` bytes that would unpack to far more.
+
+    Raises:
+        ValueError: It would.
+    """
+    about = file.metadata
+    parts = [about.row_group(k) for k in range(about.num_row_groups)]
+    rows = max(about.num_rows, sum(part.num_rows for part in parts))
+    unpacked = sum(part.total_byte_size for part in parts)
+    check_unpacked("the file", max(unpacked, 8 * rows * about.num_columns), size)
+
+
 def _npz(data: bytes) -> list[tuple[str | int, NDArray[Any]]]:
     """Arrays of shape (n,) as columns; those of shape (n, k) as ``name.0``, ``name.1``, ..."""
     arrays: list[tuple[str | int, NDArray[Any]]] = []
-    with np.load(io.BytesIO(data), allow_pickle=False) as file:
-        for name in file.files:
-            array = file[name]
-            if array.ndim == 1:
-                arrays.append((name, array))
-            elif array.ndim == 2:
-                arrays += [(f"{name}.{k}", array[:, k]) for k in range(array.shape[1])]
+    for name, array in read_npz("the file", data).items():
+        if array.ndim == 1:
+            arrays.append((name, array))
+        elif array.ndim == 2:
+            arrays += [(f"{name}.{k}", array[:, k]) for k in range(array.shape[1])]
     return arrays
 
 

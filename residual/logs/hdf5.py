@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.logs.table import LogError, Table, shortened
+from simgap_arrays import FileError
+from simgap_npz import check_unpacked
 
 EPISODE = "episode"
 
@@ -42,6 +44,11 @@ def read_hdf5(path: Path) -> Table:
             return
         if item.dtype.kind not in "biuf":
             return
+        if item.is_virtual or item.external:
+            raise LogError(f"{name} lies in another file; write its numbers into this one", path)
+        check_unpacked(
+            f"dataset {name}", item.size * item.dtype.itemsize, item.id.get_storage_size()
+        )
         found = _NUMBERED.match(name)
         if found is None:
             single[name.replace("/", ".")] = item[()]
@@ -52,7 +59,12 @@ def read_hdf5(path: Path) -> Table:
     try:
         with h5py.File(path, "r") as file:
             file.visititems(visit)
-    except OSError as error:
+    except LogError:
+        raise
+    except FileError as error:
+        raise LogError(str(error), path) from None
+    # Broken bytes make the library raise nearly anything.
+    except Exception as error:
         raise LogError(f"cannot be read as HDF5 ({shortened(str(error))})", path) from None
     if not episodes:
         return _joined(path, [single], None)

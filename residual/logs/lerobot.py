@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet
 
+from residual.logs.files import check_parquet
 from residual.logs.table import LogError, Table, shortened
 
 INFO = Path("meta", "info.json")
@@ -40,7 +41,9 @@ def read_lerobot(path: Path) -> Table:
     parts: list[dict[str, Any]] = []
     for file in files:
         try:
-            table = pyarrow.parquet.read_table(file)
+            opened = pyarrow.parquet.ParquetFile(file, page_checksum_verification=True)
+            check_parquet(opened, file.stat().st_size)
+            table = opened.read()
         except Exception as error:  # broken bytes raise nearly anything
             raise LogError(f"cannot be read as Parquet ({shortened(str(error))})", file) from error
         columns: dict[str, Any] = {}

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from residual.logs.clocks import Signal
 from residual.logs.table import LogError, shortened
+from simgap_npz import check_unpacked
 
 #: Decoders by the encoding of a channel's messages, and the package of each.
 DECODERS = {
@@ -74,8 +75,10 @@ def _messages(path: Path) -> Iterator[tuple[str, int, Any]]:
         reader = importlib.import_module("mcap.reader")
     except ImportError:
         raise LogError("MCAP needs the package mcap: pip install 'simgap[logs]'", path) from None
+    size = path.stat().st_size
+    _check_chunks(path, size)
     with path.open("rb") as stream:
-        opened = reader.make_reader(stream)
+        opened = reader.SeekingReader(stream, validate_crcs=True, record_size_limit=size)
         summary = opened.get_summary()
         channels = summary.channels.values() if summary else ()
         decoders = {}
@@ -92,6 +95,30 @@ def _messages(path: Path) -> Iterator[tuple[str, int, Any]]:
                     continue
                 content = decode(message.data)
             yield channel.topic, message.log_time, content
+
+
+def _check_chunks(path: Path, size: int) -> None:
+    """Refuse chunks that would unpack to far more than lies on disk."""
+    records = importlib.import_module("mcap.records")
+    reader = importlib.import_module("mcap.stream_reader")
+    unpacked = 0
+    with path.open("rb") as stream:
+        found = reader.StreamReader(stream, emit_chunks=True, record_size_limit=size)
+        for record in found.records:
+            if isinstance(record, records.Chunk):
+                unpacked += max(record.uncompressed_size, _declared(record))
+                check_unpacked("the file", unpacked, size)
+
+
+def _declared(chunk: Any) -> int:
+    """Bytes that a compressed frame says it holds; zero if it does not say."""
+    if chunk.compression == "zstd":
+        zstd = importlib.import_module("zstandard")
+        size = int(zstd.get_frame_parameters(chunk.data).content_size)
+        return 0 if size == zstd.CONTENTSIZE_UNKNOWN else size
+    if chunk.compression == "lz4":
+        return int(importlib.import_module("lz4.frame").get_frame_info(chunk.data)["content_size"])
+    return 0
 
 
 def _decoder(encoding: str, path: Path) -> Any:

@@ -15,7 +15,7 @@ import yaml
 
 from residual.gap import GapResult
 from residual.logs import Finding
-from simgap_files import atomic_write_json, atomic_write_text
+from simgap_files import atomic_write_text, write_sealed
 from sims.loading import corrected_settings
 from studies.gap.answer import lead
 from studies.gap.report import write_report
@@ -56,7 +56,7 @@ def write_gap(
         for name, content in result.corrected.own_files().items():
             (stage / name).write_bytes(content)
         write_report(result, record, stage)
-        atomic_write_json(stage / JSON, record)
+        write_sealed(stage / JSON, record)
     return Path(folder)
 
 

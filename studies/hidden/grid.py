@@ -22,6 +22,7 @@ OUTSIDE: Mapping[str, Mapping[str, float]] = {
     "resonance": {"resonance": 2e-3},
     "wind": {"wind": 2e-3},
 }
+MOST_REPEATS = 10_000
 METHODS = ("find_gap", "one_step", "pysindy")
 
 
@@ -52,6 +53,9 @@ class Block:
     repeats: PositiveInt = 1
     sets: PositiveInt | None = None
 
+    def __post_init__(self) -> None:
+        _check_block(self, "hidden", "size", "excitation", "noise", "runs")
+
 
 @dataclasses.dataclass(frozen=True)
 class DirtyBlock:
@@ -76,6 +80,9 @@ class DirtyBlock:
     size: list[float] = dataclasses.field(default_factory=lambda: [3.0, 6.0])
     layout: list[Layout] = dataclasses.field(default_factory=lambda: ["ramp", "single", "many"])
     repeats: PositiveInt = 1
+
+    def __post_init__(self) -> None:
+        _check_block(self, "systems", "size", "layout")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,6 +138,17 @@ def trials_of(study: HiddenStudy) -> list[dict[str, Any]]:
     found += [cell for block in study.dirty for cell in _dirty_cells(block)]
     mixed = [found[i] for i in rng.permutation(len(found))]
     return [{**cell, "seed": 100_000 * study.seed + number} for number, cell in enumerate(mixed)]
+
+
+def _check_block(block: Block | DirtyBlock, *lists: str) -> None:
+    """Refuse lists without entries, and more sets than anybody could wait for."""
+    for name in lists:
+        if not getattr(block, name):
+            raise ValueError(f"block {block.name!r}: {name} is empty, expected a list of values")
+    if not isinstance(block.repeats, int) or block.repeats > MOST_REPEATS:
+        raise ValueError(
+            f"block {block.name!r}: repeats is {block.repeats}, expected 1 to {MOST_REPEATS}"
+        )
 
 
 def _dirty_cells(block: DirtyBlock) -> list[dict[str, Any]]:

@@ -38,8 +38,9 @@ class Budget:
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             least = 2 if field.name == "true_samples" else 0
-            if (value := getattr(self, field.name)) < least:
-                raise ValueError(f"{field.name} is {value}, expected at least {least}")
+            value = getattr(self, field.name)
+            if not isinstance(value, int) or value < least:
+                raise ValueError(f"{field.name} is {value}, expected a number of at least {least}")
 
     def check(self, algorithm: Algorithm, replay_is_filled: bool, corrected: bool = False) -> None:
         """Raise ``ValueError`` if a training would end before anything is learnt in it.

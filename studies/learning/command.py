@@ -13,15 +13,16 @@ from typing import Any
 
 import yaml
 
-from simgap_files import atomic_write_json, atomic_write_text, read_json, remove_partial_files
+from simgap_files import atomic_write_text, read_sealed, remove_partial_files, write_sealed
 from studies.learning.settings import ALIASES, build_parser, instantiate, resolve, trial_label
 from studies.learning.study import Study
 from studies.learning.trial import code_of_trial, run_trial
 from studies.learnt.films import write_films
 from studies.learnt.report import read_episodes, write_report
 from studies.learnt.tables import write_tables
-from studies.running.command import check_output, expand_grid, fail, guarded
+from studies.running.command import check_output, fail, guarded
 from studies.running.curves import Curves
+from studies.running.grids import expand_grid
 from studies.running.progress import Bars, Several
 from studies.running.trials import Execution, Failures, read_trials, run_trials, trial_folder
 from studies.running.workers import WorkersError
@@ -86,7 +87,7 @@ def run_single(
     results["seconds"] = time.perf_counter() - begin
     atomic_write_text(output / "config.yaml", yaml.safe_dump(settings, sort_keys=False))
     write_films(results, output, study.system_of(instantiate(study, settings)).nominal)
-    atomic_write_json(output / "results.json", results)
+    write_sealed(output / "results.json", results)
     report_single(results, output)
 
 
@@ -121,7 +122,7 @@ def run_grid(
         fail(str(error))
     # For later reports, which load nothing that a file names.
     if best := study.system(instantiate(study, configs[0])).best:
-        atomic_write_json(output / BEST, {"return": best()})
+        write_sealed(output / BEST, {"return": best()})
     failures = report_grid(output)
     if failures:
         raise SystemExit(1)
@@ -131,7 +132,7 @@ def report_grid(folder: Path) -> Failures:
     """Tables and report of a grid from the trials in its folder; returns the failed ones."""
     results, failures = read_trials(folder)
     if results:
-        best = read_json(folder / BEST)["return"] if (folder / BEST).exists() else None
+        best = read_sealed(folder / BEST)["return"] if (folder / BEST).exists() else None
         write_tables(results, folder)
         table = write_report(results, folder, failures=failures, best=best)
         print(f"\n{table}\n\nreport: {folder / 'report.html'}")
@@ -149,7 +150,7 @@ def rebuild(folder: Path) -> None:
         ValueError: An earlier version wrote it.
     """
     path = folder / "results.json"
-    single = read_json(path) if path.exists() else {}
+    single = read_sealed(path) if path.exists() else {}
     found = [single] if "policies" in single else read_trials(folder)[0]
     if not found:
         raise FileNotFoundError(f"{folder}: no trial in it is finished")

@@ -23,7 +23,16 @@ from typing import Any
 import numpy as np
 from sklearn.base import BaseEstimator
 
-_OURS = ("sims", "policy", "residual", "studies", "simgap", "simgap_arrays", "simgap_files")
+_OURS = (
+    "sims",
+    "policy",
+    "residual",
+    "studies",
+    "simgap",
+    "simgap_arrays",
+    "simgap_files",
+    "simgap_npz",
+)
 _LIBRARIES = tuple(
     str(Path(folder).resolve())
     for folder in {sysconfig.get_path(kind) for kind in ("stdlib", "purelib", "platlib")}

@@ -17,6 +17,7 @@ from policy.learner import Algorithm, Learner
 from policy.noise import OrnsteinUhlenbeck
 from policy.selection import Point, learn_and_select
 from residual.trajectories import Transitions
+from simgap_npz import read_npz, write_npz
 from sims.simulator import Array
 from sims.system import System
 from studies.learning.streams import stream
@@ -67,10 +68,9 @@ class Training:
         points = [dataclasses.asdict(point) for point in self.curve]
         (folder / CURVE).write_text(json.dumps(points))
         (folder / SUMMARY).write_text(json.dumps(self.summary))
-        arrays: dict[str, Any] = self.episode
-        np.savez_compressed(folder / EPISODE, **arrays)
+        write_npz(folder / EPISODE, self.episode)
         if self.simulated:
-            np.savez(folder / SIMULATED, **vars(self.simulated))
+            write_npz(folder / SIMULATED, vars(self.simulated), compress=False)
 
     @classmethod
     def load(cls, folder: Path, key: str, algorithm: Algorithm, env: gymnasium.Env) -> Training:
@@ -80,8 +80,8 @@ class Training:
             algorithm.load(folder / AGENT, env),
             tuple(Point(**point) for point in json.loads((folder / CURVE).read_text())),
             json.loads((folder / SUMMARY).read_text()),
-            _arrays(folder / EPISODE),
-            Simulated(**_arrays(simulated)) if simulated.exists() else None,
+            read_npz(folder / EPISODE),
+            Simulated(**read_npz(simulated)) if simulated.exists() else None,
             key,
         )
 
@@ -186,8 +186,3 @@ def visited(system: System, run: Rollout) -> Array:
     if run.states is None:
         raise ValueError("the environment does not report info['state'], the system's state")
     return run.states[:, : len(system.nominal.state_channels)]
-
-
-def _arrays(path: Path) -> dict[str, np.ndarray]:
-    with np.load(path, allow_pickle=False) as data:
-        return dict(data)

@@ -8,19 +8,19 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import threadpoolctl
 import torch
 
 from residual.persistence import is_ours, save
-from simgap_files import atomic_path
+from simgap_npz import write_npz
 from studies.learning.fingerprint import code_of
 from studies.learning.kept import OnDisk
 from studies.learning.loop import run_loop
 from studies.learning.settings import instantiate
 from studies.learning.steps import Steps
 from studies.learning.study import Config, Study
-from studies.running.command import class_label, versions
+from studies.running.command import versions
+from studies.running.grids import class_label
 from studies.running.progress import Progress
 
 
@@ -58,9 +58,7 @@ def run_trial(
     learnt = run_loop(steps, trial.budget, trial.corrected)
     for name, training in learnt.trainings.items():
         training.learner.save(folder / "policies" / f"{name}.safetensors")
-        with atomic_path(folder / "rollouts" / f"{name}.npz") as path:
-            arrays: dict[str, Any] = training.episode
-            np.savez_compressed(path, **arrays)
+        write_npz(folder / "rollouts" / f"{name}.npz", training.episode)
     for number, model in enumerate(learnt.models, start=1):
         # Another library's estimator needs skops, which may not be there.
         if is_ours(model.fitted()) or importlib.util.find_spec("skops"):

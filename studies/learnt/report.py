@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from simgap_npz import read_npz
 from studies.learnt.figures import (
     SECONDS,
     budgets_figure,
@@ -38,8 +39,7 @@ def read_episodes(results: Results, folder: Path) -> dict[str, dict[str, np.ndar
     for record in results["policies"]:
         path = folder / "rollouts" / f"{record_key(record)}.npz"
         if path.exists():
-            with np.load(path, allow_pickle=False) as data:
-                found[record_key(record)] = dict(data)
+            found[record_key(record)] = read_npz(path)
     return found
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from simgap_files import atomic_path, atomic_write_json, atomic_write_text
+from simgap_files import atomic_path, atomic_write_text, write_sealed
 from studies.learnt.words import measures_of
 
 # Policies of trials that differ in these only are the same, or stand in rows of their own.
@@ -42,7 +42,7 @@ def write_tables(
         atomic_write_text(folder / f"{name}.csv", table.to_csv(index=False))
         with atomic_path(folder / f"{name}.parquet") as path:
             table.to_parquet(path, index=False)
-    atomic_write_json(folder / "results.json", {"trials": list(results)})
+    write_sealed(folder / "results.json", {"trials": list(results)})
     return rows, errors
 
 

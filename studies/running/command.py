@@ -1,18 +1,18 @@
-"""What every study's command line shares: typed settings, grids of trials, one way to end."""
+"""What every study's command line shares: typed settings, one way to end."""
 
 from __future__ import annotations
 
-import copy
+import atexit
+import contextlib
 import functools
-import importlib
-import inspect
-import itertools
 import json
 import os
 import platform
 import re
+import signal
 import subprocess
 import sys
+import sysconfig
 import tempfile
 import traceback
 from argparse import RawDescriptionHelpFormatter
@@ -24,11 +24,16 @@ from typing import Any, NoReturn
 import jsonargparse
 import yaml
 
+import simgap_yaml
 from sims.loading import model_settings
+from sims.trust import check_file, named_packages, trusting
 
-_DEBUG, _DEBUG_VARIABLE = "--debug", "SIMGAP_DEBUG"
+_DEBUG, _DEBUG_VARIABLE, _TRUST = "--debug", "SIMGAP_DEBUG", "--trust"
+_SIMULATORS = ("--simulator", "--corrected")
 # What a check of a disk writes before the work: less would fit on a disk that is full.
 _PROBE = bytes(2**16)
+_HOME = Path(__file__).parents[2]
+_LIBRARIES = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "purelib", "platlib")]
 _PACKAGES = ("torch", "scikit-learn", "gpytorch", "pymunk", "numpy", "scipy", "gymnasium")
 
 
@@ -40,8 +45,12 @@ class Parser(jsonargparse.ArgumentParser):
     """An argument parser whose errors are one line on stderr, with exit code 2."""
 
     def __init__(self, *given: Any, **options: Any) -> None:
+        says = (
+            f"{_DEBUG}, or {_DEBUG_VARIABLE}=1, shows where errors arise. {_TRUST} PACKAGE: files "
+            "of simulators, such as corrected.yaml, may name classes of that package."
+        )
         options.setdefault("formatter_class", HelpFormatter)
-        options.setdefault("epilog", f"{_DEBUG}, or {_DEBUG_VARIABLE}=1, shows where errors arise.")
+        options.setdefault("epilog", says)
         super().__init__(*given, **options)
 
     def parse_args(  # type: ignore[override]
@@ -49,33 +58,51 @@ class Parser(jsonargparse.ArgumentParser):
     ) -> Any:
         """As usual; a robot's model file may stand where a simulator is expected."""
         given = list(sys.argv[1:] if args is None else args)
-        for i, text in enumerate(given):
-            name, equals, value = text.partition("=")
-            if name == "--simulator" and equals:
-                given[i] = f"--simulator={_simulator(value)}"
-            elif name == "--simulator" and i + 1 < len(given):
-                given[i + 1] = _simulator(given[i + 1])
-        return super().parse_args(given, *rest, **options)
+        try:
+            for i, text in enumerate(given):
+                name, equals, value = text.partition("=")
+                if name in _SIMULATORS and equals:
+                    given[i] = f"{name}={_simulator(value)}"
+                elif name in _SIMULATORS and i + 1 < len(given):
+                    given[i + 1] = _simulator(given[i + 1])
+            return super().parse_args(given, *rest, **options)
+        except UnicodeDecodeError as error:
+            self.error(f"a settings file is not UTF-8 text ({error}): save it as UTF-8", error)
+        except ValueError as error:
+            self.error(str(error), error)
 
     def parse_object(self, cfg_obj: Any, *rest: Any, **options: Any) -> Any:
         """As usual; a robot's model file may stand where a simulator is expected."""
-        value = cfg_obj.get("simulator") if isinstance(cfg_obj, Mapping) else None
-        if isinstance(value, str) and (settings := model_settings(value)):
-            cfg_obj = {**cfg_obj, "simulator": settings}
+        for key in ("simulator", "corrected"):
+            value = cfg_obj.get(key) if isinstance(cfg_obj, Mapping) else None
+            if isinstance(value, str):
+                cfg_obj = {**cfg_obj, key: _settings(value) or value}
         return super().parse_object(cfg_obj, *rest, **options)
 
     def parse_string(self, content: str, path: Any = "", *rest: Any, **options: Any) -> Any:
         """As usual; a robot's model file, also one beside the config, may be the simulator."""
         try:
-            given = yaml.safe_load(content)
+            given = simgap_yaml.load(content)
         except yaml.YAMLError:
             given = None  # whoever reads it next says what is wrong
-        value = given.get("simulator") if isinstance(given, dict) else None
-        if isinstance(value, str):
-            beside = Path(str(path)).parent / value
-            if settings := model_settings(beside if path and beside.is_file() else value):
-                content = yaml.safe_dump({**given, "simulator": settings})
+        # What a config names is the user's own choice, as what stands on the command line is.
+        with trusting(named_packages(given)):
+            for key in ("simulator", "corrected") if isinstance(given, dict) else ():
+                value = given.get(key)
+                if isinstance(value, str):
+                    beside = Path(str(path)).parent / value
+                    if settings := _settings(beside if path and beside.is_file() else value):
+                        given = {**given, key: settings}
+                        content = yaml.safe_dump(given)
         return super().parse_string(content, path, *rest, **options)
+
+    def instantiate(self, namespace: Any, *rest: Any, **options: Any) -> Any:
+        """As usual; whatever a class of the user's does not like of its settings is one line."""
+        try:
+            return super().instantiate(namespace, *rest, **options)
+        except Exception as error:
+            said = str(error) if isinstance(error, ValueError) else _typed(error)
+            self.error(f"the settings do not make what they name: {said}", error)
 
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
         """Say what is wrong and how to learn more, in one line."""
@@ -85,8 +112,33 @@ class Parser(jsonargparse.ArgumentParser):
 
 
 def _simulator(value: str) -> str:
-    settings = model_settings(value)
+    settings = _settings(value)
     return json.dumps(settings) if settings else value
+
+
+def _settings(source: str | Path) -> dict[str, Any] | None:
+    """What a robot's model file means; None for all else, a file of settings after a look at it."""
+    if settings := model_settings(source):
+        return settings
+    with contextlib.suppress(OSError):  # a name too long is no file
+        if Path(source).is_file():
+            check_file(source)
+    return None
+
+
+def _trusted(arguments: list[str]) -> tuple[list[str], set[str]]:
+    """The arguments without ``--trust``, and the packages that the user trusts by naming them."""
+    given: list[str] = []
+    trusted: set[str] = set()
+    waiting = iter(arguments)
+    for text in waiting:
+        name, equals, value = text.partition("=")
+        if name == _TRUST:
+            trusted.update((value if equals else next(waiting, "")).split(","))
+        else:
+            given.append(text)
+    values = [text.partition("=")[2] if text.startswith("--") else text for text in given]
+    return given, trusted - {""} | named_packages(values)
 
 
 def fail(message: str) -> NoReturn:
@@ -102,7 +154,8 @@ def guarded(
 
     Bad input and disks that fail end it with one line and exit code 2, Ctrl-C with 130, a fault
     of ours with one line, a file that keeps the traceback, and exit code 1. ``--debug`` or
-    ``SIMGAP_DEBUG=1`` shows tracebacks.
+    ``SIMGAP_DEBUG=1`` shows tracebacks. Files of simulators may name classes of ours, of packages
+    after ``--trust``, and of those whose classes stand beside it on the command line.
 
     Args:
         resumes: Whether the same command continues what was stopped.
@@ -114,10 +167,14 @@ def guarded(
             given = list(sys.argv[1:] if arguments is None else arguments)
             debug = _DEBUG in given or os.environ.get(_DEBUG_VARIABLE, "") not in ("", "0")
             try:
-                main([argument for argument in given if argument != _DEBUG])
+                rest, trusted = _trusted([argument for argument in given if argument != _DEBUG])
+                with trusting(trusted):
+                    main(rest)
             except KeyboardInterrupt:
                 if debug:
                     traceback.print_exc()
+                # Whoever presses twice shall not interrupt the end.
+                atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
                 then = "goes on" if resumes else "begins anew"
                 sys.stderr.write(f"\nstopped; the same command {then}\n")
                 raise SystemExit(130) from None
@@ -132,6 +189,8 @@ def guarded(
             except Exception as error:
                 if debug:
                     traceback.print_exc()
+                if place := users_code(error):
+                    fail(f"{place} raised {_typed(error)} (mend it, or see {_DEBUG})")
                 sys.stderr.write(_internal(error))
                 raise SystemExit(1) from error
 
@@ -140,9 +199,29 @@ def guarded(
     return decorate
 
 
+def users_code(error: BaseException) -> str:
+    """File, line and function of the user's that an error comes from; empty if it is ours.
+
+    Libraries in between, which only pass on what they were given, do not count.
+    """
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        path = Path(frame.filename)
+        if not path.is_file() or any(path.is_relative_to(place) for place in _LIBRARIES):
+            continue
+        ours = path.parent == _HOME or (path.is_relative_to(_HOME) and (
+            path.relative_to(_HOME).parts[0] in ("sims", "policy", "residual", "studies")
+        ))  # fmt: skip
+        return "" if ours else f"{path}, line {frame.lineno}, in {frame.name}"
+    return ""
+
+
+def _typed(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"
+
+
 def _internal(error: Exception) -> str:
     """Keep the traceback of a fault in a file, and say where."""
-    told = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+    told = " ".join(_typed(error).split())[:200]
     text = traceback.format_exc()
     try:
         handle, path = tempfile.mkstemp(prefix="simgap-error-", suffix=".txt")
@@ -171,67 +250,6 @@ def check_output(output: str | Path) -> None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         fail(f"--output {folder} cannot be written: {reason}")
-
-
-def expand_grid(
-    config: Mapping[str, Any], grid: Sequence[Mapping[str, Sequence[Any]]]
-) -> list[dict[str, Any]]:
-    """The configurations of a grid: the product within each block, one block after another.
-
-    Args:
-        config: Settings that all trials share, nested as in the YAML file.
-        grid: Blocks; each maps a setting (dots reach into groups) to the values it takes.
-
-    Returns:
-        One configuration per trial; duplicates are kept once.
-
-    Raises:
-        ValueError: A setting does not exist or a value is not a list; the message names it.
-    """
-    trials: list[dict[str, Any]] = []
-    for number, block in enumerate(grid, start=1):
-        for key, values in block.items():
-            if not isinstance(values, list):
-                raise ValueError(
-                    f"grid block {number}: {key!r} needs a list of values, got {values!r}"
-                )
-        for values in itertools.product(*block.values()):
-            trial = copy.deepcopy(dict(config))
-            for key, value in zip(block, values, strict=True):
-                _assign(trial, key, value, number)
-            if trial not in trials:
-                trials.append(trial)
-    return trials
-
-
-def _assign(config: dict[str, Any], key: str, value: Any, block: int) -> None:
-    *groups, last = key.split(".")
-    for group in groups:
-        config = config.get(group, {})
-    if not isinstance(config, dict) or last not in config:
-        raise ValueError(f"grid block {block}: there is no setting {key!r}; see --help")
-    config[last] = copy.deepcopy(value)
-
-
-def class_label(chosen: Mapping[str, Any]) -> str:
-    """A class and those of its settings that are not the default, such as ``Linear(alpha=1)``.
-
-    Args:
-        chosen: ``class_path`` and ``init_args``, as in a config file.
-    """
-    module, _, name = chosen["class_path"].rpartition(".")
-    signature = inspect.signature(getattr(importlib.import_module(module), name))
-    changed = [
-        f"{key}={class_label(value) if _names_class(value) else value}"
-        for key, value in (chosen.get("init_args") or {}).items()
-        if key in signature.parameters
-        and json.dumps(value) != json.dumps(signature.parameters[key].default, default=str)
-    ]
-    return f"{name}({', '.join(changed)})" if changed else name
-
-
-def _names_class(value: Any) -> bool:
-    return isinstance(value, Mapping) and "class_path" in value
 
 
 def versions() -> dict[str, str]:

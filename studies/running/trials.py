@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from simgap_files import atomic_write_json, atomic_write_text, jsonable, read_json
+from simgap_files import atomic_write_text, read_sealed, write_sealed
 from studies.running.curves import Curves
 from studies.running.progress import Progress, Several
 from studies.running.watching import STATUS, StatusFile, TrialsView
@@ -93,7 +93,7 @@ def run_trials(
     attempt = functools.partial(attempt_trial, work, execution.tensorboard)
     with workers(execution.backend, execution.jobs, execution.scheduler) as run:
         plan = {"study": study, "trials": {path.name: config for path, config in trials.items()}}
-        atomic_write_json(root / PLAN, plan)
+        write_sealed(root / PLAN, plan)
         for folder in waiting:
             for left in (STATUS, "error.txt"):
                 (folder / left).unlink(missing_ok=True)
@@ -122,9 +122,9 @@ def read_trials(root: Path) -> tuple[list[dict[str, Any]], Failures]:
         FileNotFoundError: Neither file is there.
     """
     if not (root / PLAN).exists():
-        return read_json(root / "results.json")["trials"], {}
-    folders = [root / name for name in read_json(root / PLAN)["trials"]]
-    results = [_unsealed(folder) for folder in folders if _finished(folder)]
+        return read_sealed(root / RESULTS)["trials"], {}
+    folders = [root / name for name in read_sealed(root / PLAN)["trials"]]
+    results = [read_sealed(folder / RESULTS) for folder in folders if _finished(folder)]
     failures = {
         folder: f"{folder / RESULTS} is damaged: give the command of the study again\n"
         for folder in folders
@@ -150,7 +150,7 @@ def attempt_trial(work: Work, tensorboard: Path | None, config: Config, folder: 
     curves = [Curves(tensorboard / folder.name)] if tensorboard else []
     try:
         results = work(config, folder, Several(status, *curves))
-        _seal(folder, results)
+        write_sealed(folder / RESULTS, results)
     except (Exception, SystemExit):  # SystemExit would take a cluster's worker with it
         atomic_write_text(folder / "error.txt", failure := traceback.format_exc())
         return failure
@@ -173,34 +173,10 @@ def spread_seeds(trials: Mapping[Path, Config]) -> dict[Path, Config]:
     return {folder: trials[folder] for folder in sorted(trials, key=turns.__getitem__)}
 
 
-def _seal(folder: Path, results: Mapping[str, Any]) -> None:
-    """Write the results of a trial with their checksum."""
-    plain = jsonable(results)
-    atomic_write_json(folder / RESULTS, {**plain, "checksum": _checksum(plain)})
-
-
-def _checksum(results: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(results, sort_keys=True).encode()).hexdigest()
-
-
-def _unsealed(folder: Path) -> dict[str, Any]:
-    """The results of a trial.
-
-    Raises:
-        ValueError: They are not as they were written.
-    """
-    results = read_json(folder / RESULTS)
-    # Before version 0.2 there was none.
-    checksum = results.pop("checksum", None)
-    if checksum is not None and checksum != _checksum(results):
-        raise ValueError(f"{folder / RESULTS} is damaged")
-    return results
-
-
 def _finished(folder: Path, code: str | None = None) -> bool:
     """Whether results are there, whole and, if a hash is given, of this code."""
     try:
-        made_by = _unsealed(folder).get("made_by")
+        made_by = read_sealed(folder / RESULTS).get("made_by")
     except (OSError, ValueError, TypeError, AttributeError):
         return False
     return not code or made_by == code

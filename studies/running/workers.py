@@ -122,7 +122,8 @@ def _dask(scheduler: str) -> Iterator[Run]:
         raise WorkersError("Dask is not installed: pip install 'simgap[dask]'") from None
     try:
         client = distributed.Client(scheduler, timeout=CONNECT_SECONDS)
-    except (OSError, ValueError) as problem:
+    # A TLS scheduler without a certificate of one's own is a TypeError.
+    except (OSError, ValueError, TypeError) as problem:
         raise WorkersError(f"no Dask scheduler at {scheduler}: {problem}") from None
 
     def run(attempt: Attempt, trials: Mapping[Path, Config]) -> Iterator[Ended]:

@@ -15,7 +15,7 @@ from sklearn.exceptions import NotFittedError
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from residual.dropout_net import DropoutNet
-from residual.estimator import ChannelFeatures
+from residual.estimator import ChannelFeatures, NotFinite
 from residual.gaussian_process import GaussianProcess
 from residual.linear import Linear
 
@@ -179,3 +179,23 @@ def test_importing_linear_loads_neither_torch_nor_gpytorch():
     code = "import sys, residual.linear; print('torch' in sys.modules, 'gpytorch' in sys.modules)"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.split() == ["False", "False"]
+
+
+HUGE = np.tile([-1e308, 1e308], 10)
+
+
+@pytest.mark.parametrize("make", [Linear, lambda: GaussianProcess(max_iter=2)])
+def test_values_whose_spread_overflows_are_refused(make):
+    X = np.random.default_rng(0).normal(size=(20, 2))
+    with pytest.raises(ValueError, match=r"column 0 of y runs from .* overflows"):
+        make().fit(X, HUGE)
+    with pytest.raises(ValueError, match=r"column 1 of X runs from .* overflows"):
+        make().fit(np.column_stack([X[:, 0], HUGE]), X)
+
+
+def test_no_prediction_is_ever_nan():
+    X = np.random.default_rng(0).normal(size=(20, 2))
+    model = Linear("quadratic").fit(X, X[:, 0])
+    with pytest.raises(NotFinite, match=r"no finite number for 1 of 2 rows.*1e\+200"):
+        model.predict([[0.0, 0.0], [1e200, -1e200]])
+    assert np.isfinite(model.predict([[1e3, -1e3]])).all()

@@ -15,7 +15,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studies.running.command import check_output, expand_grid, fail, guarded
+from studies.running import command
+from studies.running.command import check_output, fail, guarded
+from studies.running.grids import expand_grid
 
 BASE = {"seed": 0, "budget": {"true_samples": 3750, "iterations": 2}, "estimator": {}}
 
@@ -58,12 +60,12 @@ def ended(capsys, fault, arguments=(), **options):
     """Exit code and what was said of a command that raises."""
 
     @guarded(**options)
-    def command(given):
+    def faulty(given):
         assert "--debug" not in given
         raise fault
 
     with pytest.raises(SystemExit) as stopped:
-        command([*arguments])
+        faulty([*arguments])
     return stopped.value.code, capsys.readouterr().err
 
 
@@ -75,10 +77,17 @@ def test_a_stopped_command_says_how_to_go_on(capsys):
 
 def test_an_internal_fault_is_one_line_and_a_file(capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(command, "users_code", lambda error: "")
     code, said = ended(capsys, RuntimeError("deliberate"))
     (kept,) = tmp_path.iterdir()
     assert code == 1 and said.count("\n") == 1 and "deliberate" in said and str(kept) in said
     assert "Traceback" in kept.read_text() and "RuntimeError: deliberate" in kept.read_text()
+
+
+def test_a_fault_of_the_users_code_is_one_line_that_says_where(capsys):
+    code, said = ended(capsys, ZeroDivisionError("deliberate"))
+    assert code == 2 and said.count("\n") == 1
+    assert f"{__file__}, line" in said and "ZeroDivisionError: deliberate" in said
 
 
 @pytest.mark.parametrize("how", ["option", "variable"])

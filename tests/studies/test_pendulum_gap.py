@@ -49,7 +49,9 @@ def results(folder):
 
     def timeless(value):
         if isinstance(value, dict):
-            return {k: timeless(v) for k, v in value.items() if "seconds" not in k}
+            return {
+                k: timeless(v) for k, v in value.items() if "seconds" not in k and k != "checksum"
+            }
         return [timeless(item) for item in value] if isinstance(value, list) else value
 
     found = timeless(json.loads((folder / "results.json").read_text()))
