@@ -38,7 +38,8 @@ class Claim:
         alike: Effects of other families that do, with the same motion in these data.
         rivals: Effects of other families that do, with another motion.
         twins: Effects that make the same motion in any data.
-        needed: Whether forecasts are clearly worse without it.
+        needed: Whether forecasts are clearly worse without it; where chance decides, also whether
+            its share is above zero in its interval.
         steady: Whether its strength is about the same in every fold.
         sound: Whether it survives other numerics.
         bounded: Whether a strength lies at its bound.
@@ -93,6 +94,7 @@ def claims(
         form, alike, rivals = near(search, key, number, adequate)
         twins = tuple(name for name in groups.get(label, ()) if name != label)
         strengths = [j for j in own if fit.model.knobs[j].strength] or own
+        taken = share(search, key, number)
         found.append(
             Claim(
                 number,
@@ -101,11 +103,11 @@ def claims(
                 tuple(name for name in alike if name not in twins),
                 tuple(name for name in rivals if name not in twins),
                 twins,
-                needed(search, key, number, adequate),
+                needed(search, key, number, adequate) and not (adequate and taken[1] < 0),
                 all(steady(search, key, j) for j in strengths),
                 all(survives(fit.theta[j], half[j], [n[j] for n in numerics]) for j in strengths),
                 any(at_bound(fit, j) for j in strengths),
-                share(search, key, number),
+                taken,
             )
         )
     return sorted(found, key=lambda claim: -claim.share[0])
