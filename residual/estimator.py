@@ -60,9 +60,12 @@ class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
             ValueError: The shapes do not fit, a value is not finite, or values are so large that
                 their spread overflows.
         """
-        rows, targets = validate_data(
-            self, X, y, dtype=np.float64, multi_output=True, y_numeric=True, ensure_min_samples=2
-        )
+        # scikit-learn sums the values up, which overflows before their spread is looked at.
+        with np.errstate(over="ignore", invalid="ignore"):
+            rows, targets = validate_data(
+                self, X, y, dtype=np.float64, multi_output=True, y_numeric=True,
+                ensure_min_samples=2,
+            )  # fmt: skip
         targets = np.asarray(targets, float)
         self.flat_ = targets.ndim == 1
         targets = targets.reshape(len(targets), -1)
