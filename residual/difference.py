@@ -13,7 +13,8 @@ from sklearn.exceptions import NotFittedError
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.utils import get_tags
 
-from residual.estimator import Array, ChannelFeatures, spread
+from residual.estimator import Array, spread
+from residual.features import ChannelFeatures
 from residual.trajectories import Transitions
 from sims.simulator import Channel, Simulator, as_rows, state_difference
 

@@ -17,7 +17,7 @@ from simgap_npz import check_unpacked
 _OURS = (
     "residual.dropout_net.DropoutNet",
     "residual.ensemble.Ensemble",
-    "residual.estimator.ChannelFeatures",
+    "residual.features.ChannelFeatures",
     "residual.gaussian_process.GaussianProcess",
     "residual.linear.Linear",
 )

@@ -10,7 +10,8 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.estimator import Array, ChannelFeatures, Estimator, angles_and_scales, spread
+from residual.estimator import Array, Estimator, spread
+from residual.features import ChannelFeatures, angles_and_scales
 from sims.simulator import Simulator
 
 _KINDS = ("raw", "quadratic", "trigonometric")

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.estimator import ChannelFeatures
+from residual.features import ChannelFeatures
 from sims.pendulum import Pendulum
 from sims.simulator import state_difference
 

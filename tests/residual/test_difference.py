@@ -16,7 +16,7 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from residual.difference import DifferenceModel
 from residual.dropout_net import DropoutNet
-from residual.estimator import ChannelFeatures
+from residual.features import ChannelFeatures
 from residual.gaussian_process import GaussianProcess
 from residual.linear import Linear
 from residual.trajectories import Transitions

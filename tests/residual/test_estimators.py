@@ -15,7 +15,8 @@ from sklearn.exceptions import NotFittedError
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from residual.dropout_net import DropoutNet
-from residual.estimator import ChannelFeatures, NotFinite
+from residual.estimator import NotFinite
+from residual.features import ChannelFeatures
 from residual.gaussian_process import GaussianProcess
 from residual.linear import Linear
 
