@@ -14,8 +14,16 @@ MOST_FAMILIES = 3
 
 
 def nameable(search: Search, claim: Claim, blocks: int) -> bool:
-    """Whether an effect has few enough rivals, and data enough, to be named at all."""
-    return len(families(search, claim)) <= MOST_FAMILIES and blocks >= TOO_FEW
+    """Whether an effect has few enough rivals, a size, and data enough, to be named at all."""
+    few = len(families(search, claim)) <= MOST_FAMILIES
+    return few and blocks >= TOO_FEW and not may_vanish(search, claim)
+
+
+def may_vanish(search: Search, claim: Claim) -> bool:
+    """Whether none of an effect's strengths is known to be other than zero."""
+    strengths = [knob.field for knob in search.candidates[claim.number].knobs if knob.strength]
+    numbers = [claim.numbers[field] for field in strengths if field in claim.numbers]
+    return bool(numbers) and all(n.low <= 0 <= n.high and not n.at_bound for n in numbers)
 
 
 def families(search: Search, claim: Claim) -> set[str]:

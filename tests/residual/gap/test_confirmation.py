@@ -119,6 +119,13 @@ def test_few_blocks_confirm_families_for_the_time_being_and_fewer_than_four_noth
     assert not nameable(toy, claim(1), 3)
 
 
+@pytest.mark.parametrize(("low", "named"), [(0.001, True), (-0.001, False)])
+def test_what_may_have_no_size_has_no_name(low, named):
+    toy = Toy({(0,): 0.3})
+    small = claim(numbers={"change": Number(0.01, low, 0.02, "kg")})
+    assert nameable(toy, small, 20) is named
+
+
 def test_what_could_be_too_many_others_has_no_name():
     toy = Toy({(0,): 0.3})
     some = ("constant_load@pivot", "viscous_friction@pivot", "coulomb_friction@pivot")

@@ -65,7 +65,12 @@ class Toy:
             for key, error in errors.items()
         }
         self.unfit, self.refused = set(), {}
-        self.candidates = [SimpleNamespace(effect=e, label=str(e)) for e in EFFECTS]
+        self.candidates = [
+            SimpleNamespace(
+                effect=e, label=str(e), knobs=(SimpleNamespace(field="change", strength=True),)
+            )
+            for e in EFFECTS
+        ]
         self.simulator = PendulumEquation()
         windows = Windows.cut([(0, 4 * i, 4 * i + 4) for i in range(blocks)])
         self.fitter = SimpleNamespace(
