@@ -68,6 +68,8 @@ def grow(search: Search, key: Key) -> list[Key]:
             fresh, theta = search.merged(key, [(number, gain.values[0])])
             if number in key or gain.value <= 0 or not search.fits_in(fresh):
                 continue
+            if fresh not in found and search.spelt_out(number, [i for k in found for i in k]):
+                continue
             if fresh not in found:
                 search.add({fresh: theta})
                 if fresh in search.tried and search.sound(fresh):

@@ -13,6 +13,7 @@ from residual.gap.samples import Samples
 from sims.effects.base import Effect, Quantity
 from sims.effects.joint import JointEffect
 from sims.effects.library import typical
+from sims.effects.sensor import SensorEffect
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -96,10 +97,13 @@ def candidates(
     """
     measured = {simulator.state_channels[i].name for i in samples.measured}
     inputs = [channel.name for channel in simulator.action_channels]
+    columns = {channel.name: c for c, channel in enumerate(simulator.physical_channels)}
     found = []
     for effect in effects:
-        if effect.enters == "sensor" and effect.where not in measured:
-            continue
+        if isinstance(effect, SensorEffect):
+            if effect.where not in measured:
+                continue
+            effect = effect.suited_to(*_range(samples, columns[effect.where]))
         if _follows_unseen(effect, simulator, measured):
             continue
         known = _within_reach(effect, effect.quantities(simulator), simulator, samples)
@@ -129,13 +133,21 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     return bool(np.ptp(there.force(places, np.zeros(4))) > 0)
 
 
+def _range(samples: Samples, column: int) -> tuple[float, float]:
+    """Least and greatest measured value of a channel."""
+    seen = samples.seen[:, column]
+    return float(np.nanmin(seen)), float(np.nanmax(seen))
+
+
 def _within_reach(
     effect: Effect, known: dict[str, Quantity], simulator: HostSimulator, samples: Samples
 ) -> dict[str, Quantity]:
     """Sizes of a joint's effect for the positions that were measured.
 
     An angle that counts turns goes far beyond its channel's scale, where a cubic spring of usual
-    size would be a wall, and trial steps of that size would tell nothing.
+    size would be a wall, and trial steps of that size would tell nothing. A place, such as where a
+    spring rests, is looked for near the channel's zero and no farther beyond what was measured
+    than that is wide: a spring that rests farther away is a constant load with another name.
     """
     joint = next((j for j in simulator.joints if j.name == effect.where), None)
     if effect.enters != "joint" or joint is None:
@@ -144,13 +156,21 @@ def _within_reach(
     column = names.index(joint.position)
     if column not in samples.measured:
         return known
-    farthest = float(np.nanmax(np.abs(samples.seen[:, column])))
-    reach = max(1.0, farthest / simulator.physical_channels[column].scale)
+    low, high = _range(samples, column)
+    scale = simulator.physical_channels[column].scale
+    reach = max(1.0, max(abs(low), abs(high)) / scale)
+    beyond = max(high - low, scale)
     found = {}
     for field in dataclasses.fields(effect):
         quantity = known.get(field.name)
         if quantity is None:
             continue
+        if quantity.role == "shape" and field.metadata["dimension"] == {"position": 1}:
+            quantity = dataclasses.replace(
+                quantity,
+                low=max(quantity.low, min(low, 0.0) - beyond),
+                high=min(quantity.high, max(high, 0.0) + beyond),
+            )
         power = field.metadata["dimension"].get("position", 0)
         factor = reach**power if power < 0 else 1.0
         starts = tuple(factor * start for start in quantity.starts)
@@ -178,8 +198,10 @@ def _candidate(effect: Effect, known: dict[str, Quantity], reach: float) -> Cand
     quantities = list(free.values())
     starts = [quantities[i].starts or (quantities[i].scale,) for i in shapes]
     if not strengths and reach > 0:
-        # The level of a saturation is searched where the recorded input reaches.
+        # The level of a saturation is searched where the recorded input reaches; beyond, it does
+        # nothing, and no slope leads back.
         starts = [tuple(s / quantities[i].scale * reach for s in starts[0]) for i in shapes]
+        knobs = tuple(dataclasses.replace(knob, high=min(knob.high, reach)) for knob in knobs)
     trials = []
     for shape in itertools.product(*starts):
         sizes = [list(quantities[i].starts) or [0.1 * quantities[i].scale] for i in strengths] or [

@@ -15,7 +15,7 @@ from residual.gap.fitting import Fit, Fitter, Left
 from residual.gap.forecasts import noise_floor
 from residual.gap.noise import Noise
 from residual.gap.search import Effort, Key, Proposals, Search
-from residual.gap.significance import significant
+from residual.gap.significance import score, significant
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -120,7 +120,9 @@ def settle(search: Search, floor: Noise) -> Explanation:
 
     choice = choose(search, enough)
     for _ in range(EXCHANGES):
-        quiet = [k for k in {(), choice.key, search.best()} if _quiet(search, k, floor)]
+        likeliest = min(search.usable(), key=lambda k: score(search, k))
+        best = {(), choice.key, search.best(), likeliest}
+        quiet = [k for k in best if _quiet(search, k, floor)]
         if quiet:
             needed = fitter.needed(search.signatures(()), search.tried[()])
             key = significant(search, needed)

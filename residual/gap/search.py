@@ -35,6 +35,9 @@ SAME_MOTION = 0.995
 #: Part of the best gain by the linear screen below which no rival is worth a fit.
 HOPELESS = 0.5
 
+#: Spellings of one effect, as cogging has one for every order, that are tried for one place.
+SPELLINGS = 2
+
 
 @dataclasses.dataclass(frozen=True)
 class Effort:
@@ -233,11 +236,18 @@ class Search:
                 number = around.variants[gain.variants[0]].candidate
                 near = len(taken) < most or (family and self.family(number) == family)
                 hopeless = gain.value < HOPELESS * ranked[0].value
+                if number not in taken and self.spelt_out(number, taken):
+                    continue
                 if number in key or number in taken or hopeless or not near:
                     continue
                 taken.append(number)
                 fresh, theta = self.merged(rest, [(number, gain.values[0])])
                 self.add({fresh: theta})
+
+    def spelt_out(self, number: int, taken: Sequence[int]) -> bool:
+        """Whether enough spellings of a candidate's effect are taken, so that others get a turn."""
+        label = self.candidates[number].label
+        return sum(self.candidates[other].label == label for other in set(taken)) >= SPELLINGS
 
     def contains(self, one: int, other: int) -> bool:
         """Whether an effect is a special case of another at the same place."""

@@ -36,7 +36,7 @@ class DryFriction(JointEffect):
 class CoulombFriction(DryFriction):
     """Friction of constant size ``level`` against the motion."""
 
-    level: Value = number(low=0.0, force=1, share=0.1)
+    level: Value = number(low=0.0, force=1, share=0.1, starts=(0.01, 0.3))
 
     name: ClassVar[str] = "coulomb_friction"
     sentence: ClassVar[str] = "Dry friction of constant size that always opposes the motion."

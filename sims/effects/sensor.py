@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
@@ -39,6 +39,10 @@ class SensorEffect(Effect):
     @abc.abstractmethod
     def undo(self, x: Value) -> Value:
         """What is true where the sensor reads ``x``: the inverse of ``read``."""
+
+    def suited_to(self, low: float, high: float) -> Self:
+        """The effect as it is looked for in readings between two values."""
+        return self
 
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of the channel."""
@@ -76,9 +80,10 @@ class SensorOffset(SensorEffect):
 
 @dataclasses.dataclass(frozen=True)
 class SensorScale(SensorEffect):
-    """The sensor reads ``1 + scale`` times what is there; an angle is not wrapped."""
+    """The sensor reads ``zero + (1 + scale) (x - zero)``; an angle is not wrapped."""
 
     scale: Value = number(share=0.1, low=-0.99, channel=0)
+    zero: Value = number(role="fixed", channel=1)
 
     name: ClassVar[str] = "sensor_scale"
     sentence: ClassVar[str] = "The sensor's scale is wrong: it reads a fixed share too much."
@@ -87,11 +92,21 @@ class SensorScale(SensorEffect):
 
     def read(self, x: Value) -> Value:
         """Reading."""
-        return (1.0 + self.scale) * x
+        return x + self.scale * (x - self.zero)
 
     def undo(self, x: Value) -> Value:
         """Truth."""
-        return x / (1.0 + self.scale)
+        return self.zero + (x - self.zero) / (1.0 + self.scale)
+
+    def suited_to(self, low: float, high: float) -> Self:
+        """The same about the middle of readings that are far from zero.
+
+        Between 290 and 310 K a scale about 0 K is next to nothing but an offset.
+        """
+        reach = high - low
+        if low - reach <= 0.0 <= high + reach:
+            return self
+        return self.with_values(zero=float(0.5 * (low + high)))
 
 
 def through_sensors(simulator: HostSimulator, states: Array, forward: bool) -> Array:
