@@ -23,6 +23,9 @@ CLEARLY = 1.5
 STEADY = 0.5
 #: Standard errors by which forecasts must be worse without the effect.
 WORSE = 2.0
+#: Part of the time between samples below which a delay or lag is no more certain than the log's
+#: clock: time stamps, and filters in sensors, are as late.
+BRIEF = 0.5
 #: Blocks below which forms within a family are not told apart, and below which nothing is sure.
 FEW, TOO_FEW = 8, 4
 
@@ -108,6 +111,7 @@ def claims(
                 all(survives(fit.theta[j], half[j], [n[j] for n in numerics]) for j in strengths),
                 any(at_bound(fit, j) for j in strengths),
                 taken,
+                brief=brief(search, number, fit.theta[own]),
             )
         )
     return sorted(found, key=lambda claim: -claim.share[0])
@@ -204,6 +208,19 @@ def steady(search: Search, key: Key, j: int) -> bool:
 def survives(value: float, half: float, others: Sequence[float]) -> bool:
     """Whether a number keeps its sign and about its size under other numerics."""
     return all(abs(other - value) <= max(STEADY * abs(value), half) for other in others)
+
+
+def brief(search: Search, number: int, values: Array) -> bool:
+    """Whether an effect of the actuator is a time too short for the log's own clock."""
+    candidate = search.candidates[number]
+    if candidate.effect.enters != "actuator":
+        return False
+    runs = search.fitter.samples.recorded
+    clock = BRIEF * float(np.median(np.concatenate([run.durations for run in runs])))
+    return any(
+        knob.unit == "s" and 0 < abs(value) < clock
+        for knob, value in zip(candidate.knobs, values, strict=True)
+    )
 
 
 def share(search: Search, key: Key, number: int) -> tuple[float, float, float]:

@@ -1,8 +1,7 @@
-"""What parameters of the nominal simulator, and the log's clock, do to an answer if they are off.
+"""What parameters of the nominal simulator do to an answer if they are off.
 
-No parameter is known exactly, so an effect is certain only if it is needed also where every
-parameter may differ by its tolerance, and the interval of a number says how far it may lie off
-because they do.
+No parameter is known exactly, so an effect is certain only if it is needed, and beats its rivals,
+also where every parameter may differ by its tolerance.
 """
 
 from __future__ import annotations
@@ -13,16 +12,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.bounded import bounded_step
 from residual.gap.candidates import Candidate, candidates
 from residual.gap.confirmation import CLEARLY, Claim, tie, where_it_matters
 from residual.gap.fitting import Fit
-from residual.gap.intervals import deviations
 from residual.gap.model import Model
-from residual.gap.result import Number
 from residual.gap.search import Key, Search
 from residual.gap.significance import size
 from residual.gap.validation import validate
+from residual.gap.widening import widened
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
 
@@ -30,11 +27,8 @@ Array = NDArray[np.float64]
 
 #: How well a parameter is taken to be known, as a share of it.
 KNOWN = 0.03
-#: Part of the time between samples below which a delay or lag is no more certain than the log's
-#: clock: time stamps, and filters in sensors, are as late.
-BRIEF = 0.5
-#: Errors of a forecast count up to so many times the usual one of the nominal simulator.
-BEYOND = 3.0
+#: Rivals that are given another chance, parameters free.
+RIVALS = 4
 #: Parameters that are allowed for, those that matter most.
 MOST = 12
 
@@ -45,7 +39,7 @@ def allow_for_parameters(
     """The claims with parameters allowed for.
 
     Args:
-        search: With the chosen set.
+        search: With the chosen set, and its members exchanged for rivals.
         key: The chosen set.
         claims: Of its members.
         adequate: Whether only noise is left, so that chance decides.
@@ -55,36 +49,71 @@ def allow_for_parameters(
     if not parameters:
         return list(claims)
     search.add_without_each(key)
-    clock = BRIEF * sample_interval(search)
-    claims = [
-        dataclasses.replace(claim, brief=any(_is_brief(n, clock) for n in claim.numbers.values()))
-        for claim in claims
-    ]
     beside = calibrated(search, key, parameters)
+
+    def as_good(claim: Claim, other: Key) -> bool:
+        """Whether another set does as well as the chosen one, parameters free beside both."""
+        its = calibrated(search, other, parameters)
+        if adequate:
+            more = search.numbers(key) - search.numbers(other)
+            price = np.log(size(search)) * more + tie(search)
+            return bool(its.fit.merit <= beside.fit.merit + price)
+        group = where_it_matters(search, key, claim.number)
+        return bool(its.errors[group] <= CLEARLY * beside.errors[group])
+
     told = []
     for claim in claims:
         if claim.sure:
-            without = calibrated(search, tuple(i for i in key if i != claim.number), parameters)
-            if adequate:
-                price = np.log(size(search)) * len(claim.numbers) + tie(search)
-                enough = without.fit.merit <= beside.fit.merit + price
-            else:
-                group = where_it_matters(search, key, claim.number)
-                enough = without.errors[group] <= CLEARLY * beside.errors[group]
-            claim = dataclasses.replace(claim, calibration=bool(enough))
+            without = tuple(i for i in key if i != claim.number)
+            claim = dataclasses.replace(claim, calibration=as_good(claim, without))
+        if claim.sure:
+            rivals = [
+                search.candidates[other].label
+                for other, rival in excluded_rivals(search, key, claim)
+                if as_good(claim, rival)
+            ]
+            claim = dataclasses.replace(claim, rivals=tuple(dict.fromkeys(rivals)))
         told.append(claim)
-    shifts = by_parameters(beside.fit, len(search.tried[key].theta))
-    return [widened(search, key, claim, told, shifts) for claim in told]
+    return [
+        dataclasses.replace(claim, calibration=True) if within(search, claim, tolerance) else claim
+        for claim in widened(search, key, told, beside.fit)
+    ]
 
 
-def sample_interval(search: Search) -> float:
-    """Usual time between recorded samples, in s."""
-    recorded = search.fitter.samples.recorded
-    return float(np.median(np.concatenate([run.durations for run in recorded])))
+def within(search: Search, claim: Claim, tolerance: float) -> bool:
+    """Whether a claim is of a parameter, and by what may be no more than its tolerance."""
+    effect = search.candidates[claim.number].effect
+    if not isinstance(effect, ParameterChange):
+        return False
+    size = tolerance * float(np.max(np.abs(search.simulator.parameters[effect.parameter].value)))
+    (change,) = claim.numbers.values()
+    return change.low < size and change.high > -size
 
 
-def _is_brief(number: Number, clock: float) -> bool:
-    return number.unit == "s" and 0 < abs(number.value) < clock
+def excluded_rivals(search: Search, key: Key, claim: Claim) -> list[tuple[int, Key]]:
+    """Effects of other families that were found worse in place of a claimed one, best first.
+
+    Returns:
+        At most ``RIVALS`` of those that take a part of the error off: candidate and its set.
+    """
+    rest = set(key) - {claim.number}
+    group = where_it_matters(search, key, claim.number)
+    family = search.family(claim.number)
+    found = []
+    for rival in search.usable():
+        fresh = set(rival) - rest
+        if len(rival) != len(key) or not rest < set(rival) or fresh == {claim.number}:
+            continue
+        (other,) = fresh
+        same = family and search.family(other) == family
+        if same or search.contains(other, claim.number) or search.candidates[other].label in (
+            *claim.twins, *claim.form,
+        ):  # fmt: skip
+            continue
+        error = search.currency.by_group(search.validated[rival].squares)[group]
+        found.append((float(error), other, rival))
+    without = search.currency.by_group(search.validated[tuple(sorted(rest))].squares)[group]
+    return [(other, rival) for error, other, rival in sorted(found)[:RIVALS] if error < without]
 
 
 def allowed(search: Search, tolerance: float) -> list[Candidate]:
@@ -133,87 +162,3 @@ def calibrated(search: Search, key: Key, parameters: Sequence[Candidate]) -> Cal
     fit = search.fitter.fit(Model(search.simulator, [*chosen, *free]), start, search.tried[key])
     squares = validate(search.fitter, fit).squares
     return Calibrated(fit, search.currency.by_group(squares))
-
-
-def by_parameters(fit: Fit, count: int) -> Array:
-    """How far the first numbers of a fit lie off if its last ones do by their tolerance, (count,).
-
-    Errors of the parameters are taken to be independent.
-    """
-    rows = np.sqrt(fit.weights)[:, None, None] * fit.by_knob
-    own, others = rows[..., :count], rows[..., count:]
-    scale = np.sqrt(np.maximum((own**2).sum(axis=(0, 1)), 1e-300))
-    own = own / scale
-    matrix = np.einsum("wri,wrj->ij", own, own)
-    right = np.einsum("wri,wrj->ij", own, others)
-    most = np.array([knob.high for knob in fit.model.knobs[count:]])
-    shifts = np.linalg.pinv(matrix, rcond=1e-12) @ right * most / scale[:, None]
-    return np.sqrt((shifts**2).sum(axis=1))
-
-
-def widened(
-    search: Search, key: Key, claim: Claim, claims: Sequence[Claim], shifts: Array
-) -> Claim:
-    """A claim with intervals that hold with and without its companions that are not certain.
-
-    They hold, too, for the numbers that forecast best. Of a model that is right, those are the
-    numbers of the fit; of one that leaves a remainder, each weighs that in its own way.
-
-    Args:
-        search: With the chosen set.
-        key: The chosen set.
-        claim: One of its members.
-        claims: All of them.
-        shifts: By which each number of the set may lie off as parameters do, (p,).
-    """
-    sure = {other.number for other in claims if other.sure}
-    smaller, theta = search.merged(
-        key, (), drop=tuple(i for i in key if i not in sure | {claim.number})
-    )
-    search.add({smaller: theta})
-    fit, alone = search.tried[key], search.tried[smaller]
-    best = best_forecasts(search, smaller)
-    own = np.flatnonzero(fit.model.owner == key.index(claim.number))
-    there = np.flatnonzero(alone.model.owner == smaller.index(claim.number))
-    half = 1.96 * deviations(alone, search.fitter.blocks)
-    usable = search.sound(smaller)
-    numbers: dict[str, Number] = {}
-    for j, k in zip(own, there, strict=True):
-        knob = fit.model.knobs[j]
-        number = claim.numbers[knob.field]
-        # In quadrature: errors of the data have nothing to do with those of the parameters.
-        low = number.value - np.hypot(number.value - number.low, shifts[j])
-        high = number.value + np.hypot(number.high - number.value, shifts[j])
-        if usable:
-            reach = float(np.hypot(half[k], shifts[j]))
-            least, most = sorted((alone.theta[k], best[k]))
-            low, high = min(low, least - reach), max(high, most + reach)
-        numbers[knob.field] = dataclasses.replace(
-            number,
-            low=max(float(low), knob.low),
-            high=min(float(high), knob.high),
-            if_exact=(number.low, number.high),
-        )
-    return dataclasses.replace(claim, numbers=numbers)
-
-
-def best_forecasts(search: Search, key: Key) -> Array:
-    """Numbers with which a set's forecasts are best in least squares, (p,), a step from its fit."""
-    fitter, fit = search.fitter, search.tried[key]
-    samples, windows = fitter.samples, fitter.blocks.windows
-    seen = samples.seen[windows.index][..., samples.measured]
-    usual = np.sqrt(np.nanmean(search.validated[()].foretold.squares, axis=0))
-    everywhere = np.zeros(len(windows), np.int64)
-
-    def errors(theta: Array) -> Array:
-        shown = fitter.foretell(fit.model, theta[None], everywhere, fit).shown
-        wrong = np.where(windows.inside[..., None], (seen - shown) / usual, 0.0)
-        return np.nan_to_num(np.clip(wrong, -BEYOND, BEYOND)).ravel()
-
-    theta, step = fit.theta, np.maximum(0.02 * np.abs(fit.theta), 0.1 * fit.model.step)
-    step = np.where(theta + step > fit.model.high, -step, step)
-    here = errors(theta)
-    slopes = [(errors(theta + np.eye(len(theta))[j] * h) - here) / h for j, h in enumerate(step)]
-    slope = np.stack(slopes, axis=1)
-    low, high = fit.model.low - theta, fit.model.high - theta
-    return theta + bounded_step(slope.T @ slope, -slope.T @ here, low, high)

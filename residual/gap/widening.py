@@ -1,0 +1,114 @@
+"""Intervals of an answer's numbers, with all that they rest on allowed to be off."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.bounded import bounded_step
+from residual.gap.confirmation import Claim
+from residual.gap.fitting import Fit
+from residual.gap.intervals import deviations
+from residual.gap.result import Number
+from residual.gap.search import Key, Search
+
+Array = NDArray[np.float64]
+
+#: Errors of a forecast count up to so many times the usual one of the nominal simulator.
+BEYOND = 3.0
+
+
+def widened(search: Search, key: Key, claims: Sequence[Claim], beside: Fit) -> list[Claim]:
+    """The claims with intervals that hold with and without companions that are not certain.
+
+    They hold, too, for the numbers that forecast best. Of a model that is right, those are the
+    numbers of the fit; of one that leaves a remainder, each weighs that in its own way.
+
+    Args:
+        search: With the chosen set.
+        key: The chosen set.
+        claims: Of its members.
+        beside: The set fitted with all parameters free within their tolerance.
+    """
+    sure = {claim.number for claim in claims if claim.sure}
+    shifts = by_parameters(beside, len(search.tried[key].theta))
+    forecast_best = functools.cache(lambda smaller: best_forecasts(search, smaller))
+    told = []
+    for claim in claims:
+        smaller, theta = search.merged(
+            key, (), drop=tuple(i for i in key if i not in sure | {claim.number})
+        )
+        search.add({smaller: theta})
+        best = forecast_best(smaller) if search.sound(smaller) else None
+        told.append(_widened(search, key, claim, shifts, smaller, best))
+    return told
+
+
+def _widened(
+    search: Search, key: Key, claim: Claim, shifts: Array, smaller: Key, best: Array | None
+) -> Claim:
+    """One claim, see ``widened``; ``best`` are the numbers of the smaller set, if it is sound."""
+    fit, alone = search.tried[key], search.tried[smaller]
+    own = np.flatnonzero(fit.model.owner == key.index(claim.number))
+    there = np.flatnonzero(alone.model.owner == smaller.index(claim.number))
+    half = 1.96 * deviations(alone, search.fitter.blocks)
+    numbers: dict[str, Number] = {}
+    for j, k in zip(own, there, strict=True):
+        knob = fit.model.knobs[j]
+        number = claim.numbers[knob.field]
+        # In quadrature: errors of the data have nothing to do with those of the parameters.
+        low = number.value - np.hypot(number.value - number.low, shifts[j])
+        high = number.value + np.hypot(number.high - number.value, shifts[j])
+        if best is not None:
+            reach = float(np.hypot(half[k], shifts[j]))
+            least, most = sorted((alone.theta[k], best[k]))
+            low, high = min(low, least - reach), max(high, most + reach)
+        numbers[knob.field] = dataclasses.replace(
+            number,
+            low=max(float(low), knob.low),
+            high=min(float(high), knob.high),
+            if_exact=(number.low, number.high),
+        )
+    return dataclasses.replace(claim, numbers=numbers)
+
+
+def by_parameters(fit: Fit, count: int) -> Array:
+    """How far the first numbers of a fit lie off if its last ones do by their tolerance, (count,).
+
+    Errors of the parameters are taken to be independent.
+    """
+    rows = np.sqrt(fit.weights)[:, None, None] * fit.by_knob
+    own, others = rows[..., :count], rows[..., count:]
+    scale = np.sqrt(np.maximum((own**2).sum(axis=(0, 1)), 1e-300))
+    own = own / scale
+    matrix = np.einsum("wri,wrj->ij", own, own)
+    right = np.einsum("wri,wrj->ij", own, others)
+    most = np.array([max(knob.high, -knob.low) for knob in fit.model.knobs[count:]])
+    shifts = np.linalg.pinv(matrix, rcond=1e-12) @ right * most / scale[:, None]
+    return np.sqrt((shifts**2).sum(axis=1))
+
+
+def best_forecasts(search: Search, key: Key) -> Array:
+    """Numbers with which a set's forecasts are best in least squares, (p,), a step from its fit."""
+    fitter, fit = search.fitter, search.tried[key]
+    samples, windows = fitter.samples, fitter.blocks.windows
+    seen = samples.seen[windows.index][..., samples.measured]
+    usual = np.sqrt(np.nanmean(search.validated[()].foretold.squares, axis=0))
+    everywhere = np.zeros(len(windows), np.int64)
+
+    def errors(theta: Array) -> Array:
+        shown = fitter.foretell(fit.model, theta[None], everywhere, fit).shown
+        wrong = np.where(windows.inside[..., None], (seen - shown) / usual, 0.0)
+        return np.nan_to_num(np.clip(wrong, -BEYOND, BEYOND)).ravel()
+
+    theta, step = fit.theta, np.maximum(0.02 * np.abs(fit.theta), 0.1 * fit.model.step)
+    step = np.where(theta + step > fit.model.high, -step, step)
+    here = errors(theta)
+    slopes = [(errors(theta + np.eye(len(theta))[j] * h) - here) / h for j, h in enumerate(step)]
+    slope = np.stack(slopes, axis=1)
+    low, high = fit.model.low - theta, fit.model.high - theta
+    return theta + bounded_step(slope.T @ slope, -slope.T @ here, low, high)
