@@ -95,7 +95,8 @@ def score(
         outside: Whether something that no library holds was hidden too.
     """
     named = [v.effect for v in result.verdicts if v.effect]
-    sure = [v.effect for v in result.verdicts if v.effect and v.kind == "confirmed"]
+    confirmed = [v for v in result.verdicts if v.effect and v.kind == "confirmed"]
+    sure = [v.effect for v in confirmed]
     said = {name.split("@")[0] for v in result.verdicts if v.effect for name in v.alternatives}
     kinds = [v.kind for v in result.verdicts]
     doubts = {
@@ -106,7 +107,13 @@ def score(
     }
     hidden = [*strengths, *(["outside"] if outside else [])]
     row = score_names(named, hidden)
-    row["false_sure"] = score_names(sure, hidden)["false"]
+    # Where the form is said to be undecided, the family is what is confirmed.
+    meant = set().union(*(alike(name) for name in hidden))
+    families = [{v.effect, *(label.split("@")[0] for label in v.form)} for v in confirmed]
+    row["false_sure"] = sum(not family & meant for family in families)
+    first = next((v for v in result.verdicts if v.effect), None)
+    if first and first.kind == "confirmed" and hidden:
+        row["first_alike"] = bool(row["first_alike"] or families[0] & meant)
     row["in_set"] = (
         all(alike(name) & (set(named) | said) for name in strengths) if strengths else None
     )
