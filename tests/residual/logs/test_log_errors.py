@@ -1,0 +1,152 @@
+"""Measured logs: what is broken gets one line that tells the fix."""
+
+import numpy as np
+import pyarrow
+import pyarrow.parquet
+import pytest
+from swings import ACTIONS, STATES, error, read, swing, write
+
+from residual.logs import Column, LogError, read_logs
+
+
+def test_no_file_and_no_table(tmp_path):
+    with pytest.raises(LogError, match="no log files"):
+        read_logs([], STATES, ACTIONS)
+    assert "there is no such file" in error(tmp_path / "none.csv")
+    assert "this is not a file" in error(tmp_path)
+    (tmp_path / "log.xlsx").write_text("x")
+    assert "unknown kind of file '.xlsx', expected one of .csv" in error(tmp_path / "log.xlsx")
+    for name in ("empty.csv", "empty.parquet", "empty.npz"):
+        (tmp_path / name).write_bytes(b"")
+        assert "the file is empty" in error(tmp_path / name)
+    (tmp_path / "blank.csv").write_text("\n \n# only a comment\n")
+    assert "no row holds data" in error(tmp_path / "blank.csv")
+    for name in ("bad.parquet", "bad.npz"):
+        (tmp_path / name).write_bytes(b"PK or PAR1, but not really")
+        assert "cannot be read as" in error(tmp_path / name)
+
+
+def test_header_missing_or_alone(csv):
+    message = error(csv(lambda lines: ["", *lines[1:]]))
+    assert "row 2: holds only numbers" in message and "set header: false" in message
+    assert "only the header is there" in error(csv(lambda lines: lines[:1]))
+
+
+def test_text_in_a_number_is_found_in_its_row(csv):
+    def change(lines):
+        lines[41] = "oops".join(lines[41].rsplit("-1.0", 1))
+        return ["# comment", "", *lines[:1], "", *lines[1:]]
+
+    path = csv(change, voltage=-np.arange(200) % 2 * 1.0 - 1)
+    row = 1 + path.read_text().splitlines().index(
+        next(line for line in path.read_text().splitlines() if "oops" in line)
+    )
+    message = error(path)
+    assert message.startswith(f"{path}, row {row}, column 'voltage': found 'oops', expected a num")
+
+
+def test_decimal_comma_is_recognised(csv):
+    path = csv(lambda lines: [line.replace(",", ";").replace(".", ",") for line in lines])
+    assert "set decimal: ','" in error(path)
+
+
+@pytest.mark.parametrize("word", ["inf", "-Infinity", "1e999"])
+def test_infinite_value(csv, word):
+    def change(lines):
+        return [*lines[:8], f"0.35,{word},0,1", *lines[9:]]
+
+    assert "row 9, column 'angle': found an infinite value" in error(csv(change))
+
+
+def test_column_without_any_value(tmp_path):
+    path = write(tmp_path / "log.npz", swing() | {"rate": np.full(200, np.nan)})
+    assert "column 'rate': no value at all for 'rate'" in error(path)
+
+
+def test_time_going_backwards(csv):
+    message = error(csv(lambda lines: [*lines[:20], lines[5], *lines[20:]]))
+    assert "row 21, column 'time': time goes backwards, from 0.9 s to 0.2 s" in message
+
+
+def test_trajectory_of_two_rows(csv):
+    message = error(csv(lambda lines: lines[:3]))
+    assert "row 2: a trajectory of 2 samples ('log.csv'), expected at least 5" in message
+
+
+def test_missing_columns_are_named_with_what_is_there(csv):
+    path = csv(lambda lines: ["t,theta,rate,volts", *lines[1:]])
+    message = error(path)
+    assert "no column for action 'voltage', the file has 't', 'theta', 'rate', 'volts'" in message
+    message = error(path, actions={"voltage": "volt"}, time="t")
+    assert "no column 'volt', the file has" in message and "did you mean 'volts'?" in message
+    path = csv(lambda lines: ["time,x,y,voltage", *lines[1:]])
+    assert "no column is named like a state of the simulator ('angle', 'rate')" in error(path)
+
+
+def test_layout_that_fits_no_file(csv):
+    path = csv()
+    message = error(path, states={"angel": "angle"})
+    assert "the simulator has no state channel 'angel'" in message
+    assert "did you mean 'angle'?" in message
+    assert "unknown unit 'degr': did you mean 'deg'?" in error(
+        path, states={"angle": Column("angle", "degr")}
+    )
+    assert "column 'angle': unit 'deg/s' is converted to rad/s, but rad is needed" in error(
+        path, states={"angle": Column("angle", "deg/s")}
+    )
+    assert "give time, states and actions by position" in error(path, header=False)
+    assert "only an action can have a constant value" in error(
+        path, states={"angle": Column(value=1.0)}
+    )
+    assert "delimiter 'ab' is not usable" in error(path, delimiter="ab")
+    assert "expected '.' or ','" in error(path, decimal="x")
+
+
+def test_uneven_rows(csv):
+    message = error(csv(lambda lines: [*lines[:8], "0.35,1", *lines[9:]]))
+    assert "row 9: 2 fields, expected 4 as in row 1" in message
+    message = error(csv(lambda lines: [*lines[:8], lines[8] + ",7", *lines[9:]]))
+    assert "row 9: 5 fields, expected 4" in message
+    message = error(csv(lambda lines: [*lines[:8], '"' + lines[8], *lines[9:]]))
+    assert "row 9: cannot be split into fields" in message
+
+
+def test_undecodable_and_binary_text(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"time,angle\n0,1\n0.1,\xb0\n")
+    assert "row 3: byte 0xb0 is not UTF-8 text; save the file as UTF-8" in error(path)
+    path.write_bytes(b"time,angle\n0,\x00\n")
+    assert "row 2: holds zero bytes" in error(path)
+
+
+def test_names_that_occur_twice(csv):
+    path = csv(lambda lines: ["time,angle,angle,voltage", *lines[1:]])
+    assert "column 'angle': 2 columns have this name" in error(path)
+    path = csv(lambda lines: [f"{lines[0]},x,x", *(f"{line},0,0" for line in lines[1:])])
+    assert len(read(path).trajectories) == 1
+    table = pyarrow.Table.from_arrays([pyarrow.array([1.0, 2.0])] * 2, names=["time", "time"])
+    pyarrow.parquet.write_table(table, path.with_suffix(".parquet"))
+    settings = {"states": {"angle": "time"}, "actions": {"voltage": Column(value=0.0)}}
+    assert "2 columns have this name" in error(path.with_suffix(".parquet"), **settings)
+
+
+def test_arrays_of_different_length(tmp_path):
+    path = write(tmp_path / "log.npz", swing() | {"angle": np.zeros(150)})
+    assert "columns of different length (time: 200, angle: 150" in error(path)
+
+
+def test_pickled_arrays_are_not_loaded(tmp_path):
+    path = write(tmp_path / "log.npz", swing() | {"angle": np.array([print] * 200, object)})
+    assert "cannot be read as NPZ" in error(path)
+
+
+def test_constant_action(csv, tmp_path):
+    path = csv(voltage=np.zeros(200))
+    message = error(path)
+    assert "column 'voltage': the action 'voltage' is 0 V in all 199 samples" in message
+    assert "allow_constant_action: true" in message
+    assert len(read(path, allow_constant_action=True).trajectories) == 1
+    # One free decay among runs with input is no reason to stop.
+    other = write(tmp_path / "other.csv", swing())
+    assert len(read_logs([path, other], STATES, ACTIONS).trajectories) == 2
+    assert len(read(path, channels=(STATES, ())).trajectories) == 1

@@ -1,0 +1,93 @@
+"""Measured logs: what can be mended is mended, and it is said."""
+
+import numpy as np
+import pytest
+from swings import kinds, read, swing, write
+
+
+def test_gaps_cut_a_trajectory(tmp_path):
+    columns = swing()
+    keep = np.ones(200, bool)
+    keep[50:70] = keep[100] = False
+    data = read(write(tmp_path / "log.csv", {k: v[keep] for k, v in columns.items()}))
+    assert [run.name for run in data.trajectories] == ["log.csv part 1", "log.csv part 2"]
+    assert [len(run.times) for run in data.trajectories] == [50, 129]
+    (gap,) = [finding for finding in data.findings if finding.kind == "gap"]
+    assert gap.numbers["longest_s"] == pytest.approx(21 * 0.05)
+    assert "first after row 51" in gap.says
+    (sampling,) = [finding for finding in data.findings if finding.kind == "sampling"]
+    assert sampling.numbers["late"] == 1
+
+
+def test_repeated_times_are_dropped(csv):
+    data = read(csv(lambda lines: [*lines[:10], lines[9], lines[9], *lines[10:]]))
+    assert len(data.trajectories[0].times) == 200
+    (finding,) = [finding for finding in data.findings if finding.kind == "repeated"]
+    assert finding.says == ("2 samples repeat the time before them (first in row 11); dropped.")
+
+
+def test_jitter_is_kept_and_reported(tmp_path):
+    rng = np.random.default_rng(0)
+    t = np.cumsum(rng.uniform(0.03, 0.07, 200))
+    columns = swing() | {"time": t, "angle": np.sin(t), "rate": np.cos(t)}
+    data = read(write(tmp_path / "log.csv", columns))
+    np.testing.assert_array_equal(data.trajectories[0].times, t)
+    assert "nine in ten lie between 0.03" in data.findings[-1].says
+
+
+@pytest.mark.parametrize("word", ["", "nan", "NaN", "null", "N/A"])
+def test_missing_values_stay_missing(csv, word):
+    def change(lines):
+        lines[5] = f"0.2,{word},{lines[5].split(',')[2]},1"
+        lines[1] = f"0.0,{word},{word},1"
+        return lines
+
+    data = read(csv(change))
+    (run,) = data.trajectories
+    assert len(run.times) == 199
+    assert np.isnan(run.states).sum() == 1 and np.isnan(run.states[3, 0])
+    assert "angle is missing in 1 of 199 samples, the first in row 6." in [
+        finding.says for finding in data.findings
+    ]
+
+
+def test_unwrapping_looks_past_missing_values(tmp_path):
+    turns = 4.0 * swing()["time"]
+    wrapped = (turns + np.pi) % (2 * np.pi) - np.pi
+    wrapped[20:23] = np.nan
+    path = write(tmp_path / "log.npz", swing() | {"angle": wrapped, "rate": 0 * turns + 4})
+    angle = read(path).trajectories[0].states[:, 0]
+    known = np.isfinite(angle)
+    np.testing.assert_allclose(angle[known], turns[known], atol=1e-9)
+
+
+def test_sample_without_action_ends_a_piece(tmp_path):
+    columns = swing()
+    columns["voltage"][[50, 199]] = np.nan
+    data = read(write(tmp_path / "log.npz", columns))
+    assert [len(run.times) for run in data.trajectories] == [51, 149]
+    assert all(np.isfinite(run.actions).all() for run in data.trajectories)
+    assert "no_action" in kinds(data)
+
+
+def test_samples_without_time_are_dropped(tmp_path):
+    columns = swing()
+    columns["time"][7] = np.nan
+    data = read(write(tmp_path / "log.npz", columns))
+    assert len(data.trajectories[0].times) == 199
+    assert "untimed" in kinds(data)
+
+
+def test_last_row_cut_off_is_left_out(csv):
+    data = read(csv(lambda lines: [*lines[:-1], lines[-1][:8]]))
+    assert len(data.trajectories[0].times) == 199
+    assert kinds(data)[0] == "cut_off"
+
+
+def test_short_pieces_are_left_out(tmp_path):
+    columns = swing()
+    columns["time"] = columns["time"] + np.where(np.arange(200) >= 197, 5.0, 0.0)
+    data = read(write(tmp_path / "log.csv", columns))
+    assert [len(run.times) for run in data.trajectories] == [197]
+    (finding,) = [finding for finding in data.findings if finding.kind == "left_out"]
+    assert finding.numbers["samples"] == 3
