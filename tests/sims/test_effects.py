@@ -1,13 +1,13 @@
-"""Every effect on both hosts: against written-out equations, at zero strength, by row."""
+"""None"""
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
+from hosts import HOSTS, host, rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pendulum_reference import INERTIA, LENGTH, G, K, R, dry_step, play_step, smooth_step
+from pendulum_reference import INERTIA, LENGTH, K, R, dry_step, play_step, smooth_step
 
 from sims.effects import (
     ActuatorBias,
@@ -21,8 +21,6 @@ from sims.effects import (
     DeadZone,
     Delay,
     DirectionalFriction,
-    DryFriction,
-    JointEffect,
     LinearSpring,
     ParameterChange,
     QuadraticDrag,
@@ -31,22 +29,10 @@ from sims.effects import (
     SensorScale,
     StribeckFriction,
     ViscousFriction,
-    exact_aliases,
     library,
-    number,
     typical,
 )
 from sims.pendulum import Pendulum
-from sims.pendulum_equation import PendulumEquation
-
-HOSTS = {"pymunk": Pendulum(), "equation": PendulumEquation()}
-host = pytest.mark.parametrize("host", HOSTS)
-
-
-def rows(n, seed=0):
-    rng = np.random.default_rng(seed)
-    states = np.c_[rng.uniform(-np.pi, np.pi, n), rng.uniform(-12, 12, n)]
-    return states, rng.uniform(-3, 3, (n, 1))
 
 
 def changed(name, change):
@@ -274,228 +260,3 @@ def test_rows_with_everything_at_once_are_pure(host, table):
     for i in range(len(states)):
         alone = simulator.step(states[i : i + 1], actions[i : i + 1])
         assert np.array_equal(alone[0], together[i])
-
-
-@host
-@pytest.mark.parametrize(
-    "friction", [CoulombFriction("pivot", 4e-3), StribeckFriction("pivot", 1e-3, 4e-3, 0.5)]
-)
-def test_what_friction_holds_does_not_creep(host, friction):
-    simulator = HOSTS[host].with_effects([friction])
-    # 0.1 rad off hanging: gravity pulls with 2.3e-3 N m, less than the friction holds.
-    start = np.array([np.pi - 0.1, 0.0])
-    path = simulator.rollout(start, np.zeros((200, 1)))
-    assert np.array_equal(path, np.tile(start, (201, 1)))
-    # A voltage that pulls harder than friction and gravity together moves it.
-    assert simulator.rollout(start, np.full((2, 1), 3.0))[-1, 1] != 0
-
-
-@host
-def test_friction_that_differs_by_direction_holds_one_way_and_slips_the_other(host):
-    # 0.1 rad off hanging, gravity pulls back with 2.3e-3 N m.
-    start = np.array([[np.pi - 0.1, 0.0], [np.pi + 0.1, 0.0]])
-    for levels, held in (((3e-3, 1e-3), 0), ((1e-3, 3e-3), 1), ((3e-3, 3e-3), 2)):
-        simulator = HOSTS[host].with_effects([DirectionalFriction("pivot", *levels)])
-        stays = (simulator.step(start, np.zeros((2, 1))) == start).all(axis=1)
-        assert np.array_equal(stays, {0: [True, False], 1: [False, True], 2: [True, True]}[held])
-
-
-@host
-def test_a_swing_with_dry_friction_comes_to_rest_in_finite_time(host):
-    simulator = HOSTS[host].with_effects([CoulombFriction("pivot", 2e-3)])
-    path = simulator.rollout([np.pi - 1.5, 0.0], np.zeros((60, 1)))
-    assert path[-1, 1] == 0.0 and path[-1, 0] == path[-2, 0]
-    assert abs(0.055 * G * LENGTH * math.sin(path[-1, 0])) <= 2e-3
-
-
-def test_dissipation_takes_energy():
-    states, _ = rows(20, seed=5)
-    actions = np.zeros((20, 1))
-
-    def energy(states):
-        potential = 0.055 * G * LENGTH * np.cos(states[:, 0])
-        return 0.5 * INERTIA * states[:, 1] ** 2 + potential
-
-    nominal = energy(HOSTS["equation"].step(states, actions))
-    for effect in (
-        ViscousFriction("pivot", 1e-4),
-        QuadraticDrag("pivot", 1e-5),
-        CoulombFriction("pivot", 1e-4),
-        StribeckFriction("pivot", 1e-4, 2e-4, 0.5),
-    ):
-        simulator = HOSTS["equation"].with_effects([effect])
-        assert (energy(simulator.step(states, actions)) < nominal + 1e-9).all()
-
-
-def test_units_and_scales_come_from_the_host():
-    units = {
-        str(effect): {name: q.unit for name, q in effect.quantities(Pendulum()).items()}
-        for effect in library(Pendulum())
-    }
-    assert units["viscous_friction@pivot"]["coefficient"] == "N m s/rad"
-    assert units["quadratic_drag@pivot"]["coefficient"] == "N m s^2/rad^2"
-    assert units["cubic_spring@pivot"]["stiffness"] == "N m/rad^3"
-    assert units["stribeck_friction@pivot"]["speed"] == "rad/s"
-    assert units["backlash@pivot"]["width"] == "rad"
-    assert units["dead_zone@voltage"]["width"] == "V"
-    assert units["delay@voltage"]["time"] == "s"
-    assert units["sensor_scale@angle"]["scale"] == "1"
-    assert units["mass"]["change"] == "kg"
-
-
-def test_library_names_every_effect_and_bounds_what_dissipates():
-    effects = library(Pendulum())
-    assert {effect.name for effect in effects} >= {
-        *("viscous_friction", "coulomb_friction", "stribeck_friction", "quadratic_drag"),
-        *("linear_spring", "cubic_spring", "constant_load", "cogging", "mass", "inertia"),
-        *("length", "actuator_gain", "actuator_bias", "dead_zone", "saturation", "delay"),
-        *("actuator_lag", "backlash", "sensor_offset", "sensor_scale"),
-    }
-    for effect in effects:
-        assert effect.absent and effect.sentence and effect.needs
-        for quantity in effect.quantities(Pendulum()).values():
-            assert quantity.scale > 0 and quantity.low < quantity.high
-    low = {
-        effect.name: effect.quantities(Pendulum())[effect.strengths()[0]].low for effect in effects
-    }
-    for name in ("viscous_friction", "coulomb_friction", "linear_spring", "delay", "backlash"):
-        assert low[name] == 0
-
-
-@pytest.mark.parametrize("host", HOSTS)
-def test_exact_aliases(host):
-    found = {frozenset(alias.effects) for alias in exact_aliases(HOSTS[host])}
-    assert frozenset({"constant_load@pivot", "actuator_bias@voltage"}) in found
-    assert frozenset({"mass", "length", "gravity"}) in found
-    assert (
-        frozenset({"viscous_friction@pivot", "actuator_gain@voltage", "torque_constant"}) in found
-    )
-    four = {"viscous_friction@pivot", "actuator_gain@voltage", "mass", "inertia"}
-    assert frozenset(four) in found
-    following = exact_aliases(PendulumEquation(inertia_follows_mass=True))
-    twins = [set(alias.effects) for alias in following if "the same motion" in alias.says]
-    assert twins and not any("mass" in names for names in twins)
-
-
-@pytest.mark.parametrize(
-    ("effect", "message"),
-    [
-        (ViscousFriction("knee", 1.0), "joint 'knee'.*pivot"),
-        (Delay("torque", 1.0), "actuator 'torque'.*voltage"),
-        (SensorOffset("speed", 1.0), "channel 'speed'.*angle, rate"),
-        (ParameterChange("weight", 1.0), "parameter 'weight'.*mass"),
-    ],
-)
-def test_a_wrong_place_lists_the_right_ones(effect, message):
-    with pytest.raises(ValueError, match=message):
-        Pendulum().with_effects([effect])
-
-
-def test_values_for_different_numbers_of_rows_are_refused():
-    with pytest.raises(ValueError, match="rows"):
-        _ = StribeckFriction("pivot", np.ones(3), np.ones(4)).rows
-
-
-@dataclasses.dataclass(frozen=True)
-class FanTorque(JointEffect):
-    level: float = number(force=1, rate=-3, low=0.0)
-    name = "fan_torque"
-    sentence = "A torque that grows with the cube of speed."
-    needs = "fast motion"
-
-    def force(self, q, v):
-        return -self.level * v * v * v
-
-
-@host
-def test_an_effect_of_the_users_own_is_hosted(host):
-    effect = FanTorque("pivot", 2e-6)
-    assert effect.quantities(HOSTS[host])["level"].unit == "N m s^3/rad^3"
-    states, actions = rows(10)
-    found = HOSTS[host].with_effects([effect]).step(states, actions)
-    truth = [
-        smooth_step(s, u, lambda q, w: -2e-6 * w**3)
-        for s, u in zip(states, actions[:, 0], strict=True)
-    ]
-    assert found == pytest.approx(np.array(truth), abs=2e-5)
-
-
-def test_every_effect_says_which_family_it_belongs_to():
-    pendulum = Pendulum()
-    families = {str(effect): effect.family_in(pendulum) for effect in library(pendulum)}
-    assert {name for name, family in families.items() if family == "dissipation"} == {
-        "viscous_friction@pivot",
-        "coulomb_friction@pivot",
-        "stribeck_friction@pivot",
-        "directional_friction@pivot",
-        "quadratic_drag@pivot",
-        "damping",
-    }
-    assert families["mass"] == families["actuator_gain@voltage"] == ""
-    dry = {effect.name for effect in library(pendulum) if effect.subfamily == "dry friction"}
-    assert dry == {"coulomb_friction", "stribeck_friction", "directional_friction"}
-    (general,) = [e for e in library(pendulum) if e.name == "directional_friction"]
-    states, actions = rows(6)
-    for name in general.special_cases:
-        (special,) = [typical(e, pendulum) for e in library(pendulum) if e.name == name]
-        equal = general.with_values(forward=special.level, backward=special.level)
-        one, other = (pendulum.with_effects([e]).step(states, actions) for e in (special, equal))
-        assert np.array_equal(one, other)
-    before_the_sensor = {e.name for e in library(pendulum) if e.upstream_of_sensor}
-    assert before_the_sensor == {"dead_zone", "saturation", "actuator_lag"}
-
-
-def test_a_spring_may_rest_anywhere_and_is_absent_without_stiffness():
-    for kind in (LinearSpring, CubicSpring):
-        rest = kind("pivot").quantities(Pendulum())["rest"]
-        assert rest.role == "shape" and rest.starts == (-0.5, 0.0, 0.5)
-        assert kind("pivot", 0.0, 0.4).absent
-        assert not np.any(kind("pivot", np.zeros(3), np.ones(3)).present())
-        assert next(e for e in library(Pendulum()) if isinstance(e, kind)) == kind("pivot")
-
-
-@dataclasses.dataclass(frozen=True)
-class Seal(DryFriction):
-    level: float = number(force=1, low=0.0)
-    name = "seal"
-    sentence = "Dry friction of the user's own."
-    needs = "reversals of the motion"
-
-    def limit(self, v):
-        return self.level + 0.0 * v
-
-
-@dataclasses.dataclass(frozen=True)
-class Magnet(JointEffect):
-    level: float = number(force=1)
-    name = "magnet"
-    sentence = "A torque of the user's own that depends on the angle alone."
-    needs = "whole turns"
-    follows_rate = False
-
-    def force(self, q, v):
-        return self.level * np.sin(3 * q)
-
-
-@host
-def test_effects_of_the_users_own_move_like_those_of_the_library(host):
-    states, actions = rows(12)
-    states[::3, 1] = 0.0
-    levels = np.where(np.arange(12) % 2, 2e-3, 0.0)
-    for own, known in (
-        (Seal("pivot", levels), CoulombFriction("pivot", levels)),
-        (Magnet("pivot", levels), Cogging("pivot", levels, 0.0, 3.0)),
-    ):
-        found, wanted = (HOSTS[host].with_effects([e]).step(states, actions) for e in (own, known))
-        assert found == pytest.approx(wanted, abs=1e-12)
-        assert np.array_equal(found[::2], HOSTS[host].step(states, actions)[::2])
-
-
-@host
-def test_what_goes_wrong_in_an_effect_of_the_users_own_is_raised(host):
-    class Broken(Magnet):
-        def force(self, q, v):
-            raise KeyError("level of the magnet")
-
-    with pytest.raises(KeyError, match="level of the magnet"):
-        HOSTS[host].with_effects([Broken("pivot", 1e-3)]).step(*rows(2))

@@ -1,0 +1,123 @@
+"""The library of effects: units, places, families, exact aliases."""
+
+import numpy as np
+import pytest
+from hosts import HOSTS, rows
+
+from sims.effects import (
+    CubicSpring,
+    Delay,
+    LinearSpring,
+    ParameterChange,
+    SensorOffset,
+    StribeckFriction,
+    ViscousFriction,
+    exact_aliases,
+    library,
+    typical,
+)
+from sims.pendulum import Pendulum
+from sims.pendulum_equation import PendulumEquation
+
+
+def test_units_and_scales_come_from_the_host():
+    units = {
+        str(effect): {name: q.unit for name, q in effect.quantities(Pendulum()).items()}
+        for effect in library(Pendulum())
+    }
+    assert units["viscous_friction@pivot"]["coefficient"] == "N m s/rad"
+    assert units["quadratic_drag@pivot"]["coefficient"] == "N m s^2/rad^2"
+    assert units["cubic_spring@pivot"]["stiffness"] == "N m/rad^3"
+    assert units["stribeck_friction@pivot"]["speed"] == "rad/s"
+    assert units["backlash@pivot"]["width"] == "rad"
+    assert units["dead_zone@voltage"]["width"] == "V"
+    assert units["delay@voltage"]["time"] == "s"
+    assert units["sensor_scale@angle"]["scale"] == "1"
+    assert units["mass"]["change"] == "kg"
+
+
+def test_library_names_every_effect_and_bounds_what_dissipates():
+    effects = library(Pendulum())
+    assert {effect.name for effect in effects} >= {
+        *("viscous_friction", "coulomb_friction", "stribeck_friction", "quadratic_drag"),
+        *("linear_spring", "cubic_spring", "constant_load", "cogging", "mass", "inertia"),
+        *("length", "actuator_gain", "actuator_bias", "dead_zone", "saturation", "delay"),
+        *("actuator_lag", "backlash", "sensor_offset", "sensor_scale"),
+    }
+    for effect in effects:
+        assert effect.absent and effect.sentence and effect.needs
+        for quantity in effect.quantities(Pendulum()).values():
+            assert quantity.scale > 0 and quantity.low < quantity.high
+    low = {
+        effect.name: effect.quantities(Pendulum())[effect.strengths()[0]].low for effect in effects
+    }
+    for name in ("viscous_friction", "coulomb_friction", "linear_spring", "delay", "backlash"):
+        assert low[name] == 0
+
+
+@pytest.mark.parametrize("host", HOSTS)
+def test_exact_aliases(host):
+    found = {frozenset(alias.effects) for alias in exact_aliases(HOSTS[host])}
+    assert frozenset({"constant_load@pivot", "actuator_bias@voltage"}) in found
+    assert frozenset({"mass", "length", "gravity"}) in found
+    assert (
+        frozenset({"viscous_friction@pivot", "actuator_gain@voltage", "torque_constant"}) in found
+    )
+    four = {"viscous_friction@pivot", "actuator_gain@voltage", "mass", "inertia"}
+    assert frozenset(four) in found
+    following = exact_aliases(PendulumEquation(inertia_follows_mass=True))
+    twins = [set(alias.effects) for alias in following if "the same motion" in alias.says]
+    assert twins and not any("mass" in names for names in twins)
+
+
+@pytest.mark.parametrize(
+    ("effect", "message"),
+    [
+        (ViscousFriction("knee", 1.0), "joint 'knee'.*pivot"),
+        (Delay("torque", 1.0), "actuator 'torque'.*voltage"),
+        (SensorOffset("speed", 1.0), "channel 'speed'.*angle, rate"),
+        (ParameterChange("weight", 1.0), "parameter 'weight'.*mass"),
+    ],
+)
+def test_a_wrong_place_lists_the_right_ones(effect, message):
+    with pytest.raises(ValueError, match=message):
+        Pendulum().with_effects([effect])
+
+
+def test_values_for_different_numbers_of_rows_are_refused():
+    with pytest.raises(ValueError, match="rows"):
+        _ = StribeckFriction("pivot", np.ones(3), np.ones(4)).rows
+
+
+def test_every_effect_says_which_family_it_belongs_to():
+    pendulum = Pendulum()
+    families = {str(effect): effect.family_in(pendulum) for effect in library(pendulum)}
+    assert {name for name, family in families.items() if family == "dissipation"} == {
+        "viscous_friction@pivot",
+        "coulomb_friction@pivot",
+        "stribeck_friction@pivot",
+        "directional_friction@pivot",
+        "quadratic_drag@pivot",
+        "damping",
+    }
+    assert families["mass"] == families["actuator_gain@voltage"] == ""
+    dry = {effect.name for effect in library(pendulum) if effect.subfamily == "dry friction"}
+    assert dry == {"coulomb_friction", "stribeck_friction", "directional_friction"}
+    (general,) = [e for e in library(pendulum) if e.name == "directional_friction"]
+    states, actions = rows(6)
+    for name in general.special_cases:
+        (special,) = [typical(e, pendulum) for e in library(pendulum) if e.name == name]
+        equal = general.with_values(forward=special.level, backward=special.level)
+        one, other = (pendulum.with_effects([e]).step(states, actions) for e in (special, equal))
+        assert np.array_equal(one, other)
+    before_the_sensor = {e.name for e in library(pendulum) if e.upstream_of_sensor}
+    assert before_the_sensor == {"dead_zone", "saturation", "actuator_lag"}
+
+
+def test_a_spring_may_rest_anywhere_and_is_absent_without_stiffness():
+    for kind in (LinearSpring, CubicSpring):
+        rest = kind("pivot").quantities(Pendulum())["rest"]
+        assert rest.role == "shape" and rest.starts == (-0.5, 0.0, 0.5)
+        assert kind("pivot", 0.0, 0.4).absent
+        assert not np.any(kind("pivot", np.zeros(3), np.ones(3)).present())
+        assert next(e for e in library(Pendulum()) if isinstance(e, kind)) == kind("pivot")
