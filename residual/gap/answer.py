@@ -26,6 +26,7 @@ from residual.gap.verdicts import (
     nameable,
     no_gap_verdict,
     remainder_verdict,
+    tolerance_verdicts,
 )
 from residual.trajectories import Trajectory
 
@@ -57,8 +58,8 @@ def matters(found: Explanation, tolerance: float | None) -> bool:
     if tolerance is None:
         return True
     search = found.search
-    floor = noise_floor(search.fitter, search.tried[()], found.floor.sigma)
-    squares = search.validated[()].squares
+    floor = noise_floor(search.fitter, search.nominal, found.floor.sigma)
+    squares = search.before.squares
     main = main_channel(search.simulator, search.fitter.samples.measured, squares, floor)
     return bool(np.sqrt(np.nanmean(squares[:, main])) > tolerance)
 
@@ -100,6 +101,14 @@ def confirm(
         search.add_exchanged(key, 3)
 
 
+def nameless(answer: Answer) -> bool:
+    """Whether there is a gap above the noise and nothing of it can be named."""
+    left = answer.found.search.fitter.left(
+        answer.found.search.tried[answer.key], answer.found.floor
+    )
+    return not answer.key and not left.adequate and left.ratio > FOOTNOTE
+
+
 def summed_up(answer: Answer) -> Gap:
     """The table of errors."""
     found, search = answer.found, answer.found.search
@@ -115,9 +124,8 @@ def judged_apart(answer: Answer, prepared: Prepared, runs: Sequence[Trajectory],
     other = prepare(search.simulator, runs, prepared.horizon).fitter
     other = other.weighed_like(search.fitter)
     fits = []
-    for key in ((), answer.key):
-        model = Model(search.model(key).bind(search.tried[key].theta))
-        fits.append(other.fit(model, np.zeros(0)))
+    for fit in (search.nominal, search.tried[answer.key]):
+        fits.append(other.fit(Model(fit.model.bind(fit.theta)), np.zeros(0)))
     floor = noise_floor(other, fits[1], answer.found.floor.sigma)
     return held_out(table, other, fits[0], fits[1], floor)
 
@@ -135,14 +143,14 @@ def told(
     blind: tuple[Blind, ...] = ()
     if found.adequate:
         blind = hidden(search.signatures(key), search.candidates, key, found.needed)
-    where = fitter.where(search.tried[()], found.floor)
+    where = fitter.where(search.nominal, found.floor)
     return GapResult(
         verdicts=tuple(verdicts(answer, table, sets, tolerance, blind)),
         gap=table,
         held_out=apart,
         where=where,
         evidence=evidence(answer),
-        rollouts=rollouts(search, search.validated[()], search.validated[key]),
+        rollouts=rollouts(search, search.before, search.validated[key]),
         effects=tuple(corrected.effects[len(simulator.effects) :]),
         corrected=corrected,
         channels=tuple((channel.name, channel.unit) for channel in measured),
@@ -168,6 +176,8 @@ def verdicts(
     made: list[Verdict] = []
     for claim, label in zip(answer.claims, labels, strict=True):
         made.append(effect_verdict(search, claim, blocks, *dependent(label, labels, sets)))
+    if answer.key:
+        made += tolerance_verdicts(search, answer.key)
     left = search.fitter.left(search.tried[answer.key], found.floor)
     if tolerance is not None and table.before.value <= tolerance:
         made.insert(

@@ -77,6 +77,7 @@ def explain(
     effort: Effort,
     tell: Callable[[str], None],
     until: float,
+    beside: Sequence[Candidate] = (),
 ) -> Explanation:
     """Search, weigh the channels by what is left, search again, until nothing changes.
 
@@ -89,13 +90,14 @@ def explain(
         effort: How hard to search.
         tell: Progress.
         until: When to stop searching, on the clock of ``time.process_time``.
+        beside: Free beside every set, see ``Search``.
     """
     seeds: Proposals = {}
     key: Key = ()
     for _ in range(ROUNDS):
-        search = Search(simulator, pool, fitter, effort, tell, until)
+        search = Search(simulator, pool, fitter, effort, tell, until, beside)
         if len(search.currency.groups) > 1 and not simulator.has_contacts:
-            alone = noise_floor(fitter, search.tried[()], floor.sigma)
+            alone = noise_floor(fitter, search.nominal, floor.sigma)
             search.currency = search.currency.only_where_wrong(alone)
         run(search, seeds)
         key = choose(search).key
@@ -104,7 +106,7 @@ def explain(
         if search.late or ((ratio > 1 / WORTH).all() and (ratio < WORTH).all()):
             break
         best = sorted(search.usable(), key=search.error)[:SEEDS]
-        seeds = {k: search.tried[k].theta for k in {*best, key} if k}
+        seeds = {k: search.own(k) for k in {*best, key} if k}
         fitter = fresh
     return settle(search, floor)
 
@@ -112,7 +114,7 @@ def explain(
 def settle(search: Search, floor: Noise) -> Explanation:
     """The final choice, after everything chosen has met its rivals."""
     fitter = search.fitter
-    nominal_left = fitter.left(search.tried[()], floor)
+    nominal_left = fitter.left(search.nominal, floor)
     needed = np.inf
 
     def enough(key: Key) -> bool:

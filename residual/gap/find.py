@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.aliases import aliases
-from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
-from residual.gap.candidates import candidates
+from residual.gap.answer import confirm, judged_apart, matters, nameless, summed_up, told
+from residual.gap.candidates import Candidate, candidates
 from residual.gap.data import examine
 from residual.gap.explain import Explanation, explain
 from residual.gap.horizon import usual_horizon
 from residual.gap.numerics import fits_better, forecast_error, held_as, held_otherwise, how_held
 from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import GapResult
-from residual.gap.tolerance import KNOWN
+from residual.gap.tolerance import KNOWN, allowed
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
 from sims.contract import refuse_unsound
@@ -98,16 +98,21 @@ def find_gap(
     # Of effects that make the same motion the first stands for all.
     kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
 
-    def explained(simulator: HostSimulator) -> tuple[Prepared, Explanation]:
+    def explained(
+        simulator: HostSimulator, beside: Sequence[Candidate] = ()
+    ) -> tuple[Prepared, Explanation]:
         ready = prepare(simulator, runs, horizon)
+        free = {candidate.label for candidate in beside}
         pool = ready.pool(candidates(simulator, kept, ready.fitter.samples))
+        pool = [candidate for candidate in pool if candidate.label not in free]
         tell(
             f"{len(ready.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s, "
             f"{len(pool)} candidate effects"
         )
         return ready, explain(
-            simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, tell, until
-        )
+            simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, tell, until,
+            beside,
+        )  # fmt: skip
 
     with workers(n_jobs):
         simulator = held_as(simulator, hold)
@@ -127,7 +132,16 @@ def find_gap(
                 )
         clock.lap("search")
         tell("confirming")
-        answer = confirm(found, groups, matters(found, tolerance), parameter_tolerance)
+        asked = matters(found, tolerance)
+        answer = confirm(found, groups, asked, parameter_tolerance)
+        if asked and nameless(answer) and parameter_tolerance:
+            # Parameters that are a little off may hide what is missing.
+            beside = allowed(found.search, parameter_tolerance)
+            if beside:
+                tell("nothing can be named: once more with parameters free within their tolerance")
+                prepared, found = explained(found.search.simulator, beside)
+                second = confirm(found, groups, asked, parameter_tolerance)
+                answer = second if second.key else answer
         clock.lap("confirm")
         table = summed_up(answer)
         apart = None

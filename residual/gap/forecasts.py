@@ -60,7 +60,7 @@ def gap(
         ratios: Residual over noise in windows, before and after.
     """
     samples, simulator = search.fitter.samples, search.simulator
-    before, after = search.validated[()], search.validated[key]
+    before, after = search.before, search.validated[key]
     by_channel = {}
     for i, c in enumerate(samples.measured):
         channel = simulator.physical_channels[c]
@@ -70,6 +70,9 @@ def gap(
     main = main_channel(simulator, samples.measured, before.squares, floor)
     name = simulator.physical_channels[samples.measured[main]].name
     steps = [Step("", by_channel[name].before)]
+    if search.beside:
+        squares = search.validated[()].squares[:, main]
+        steps.append(Step("parameters within their tolerance", span(squares)))
     for count in range(1, len(order) + 1):
         part = tuple(sorted(order[:count]))
         if part not in search.validated:

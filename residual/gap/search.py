@@ -64,6 +64,9 @@ class Search:
     """Rival sets of effects fitted to the windows of one fitter.
 
     Attributes:
+        beside: Candidates that are free beside every set, the empty one included, and that no set
+            is charged for: parameters within their tolerance.
+        nominal: The simulator as it was given; ``before``: its forecasts.
         tried: Every fitted set: sorted candidate numbers -> fit.
         unfit: Sets that did not converge.
         refused: Sets that cannot be right whatever they take off, and why.
@@ -79,23 +82,33 @@ class Search:
         effort: Effort | None = None,
         tell: Callable[[str], None] = lambda _: None,
         until: float = np.inf,
+        beside: Sequence[Candidate] = (),
     ) -> None:
         self.simulator, self.candidates, self.fitter = simulator, list(candidates), fitter
         self.effort, self.tell, self.until = effort or Effort(), tell, until
-        self.tried: dict[Key, Fit] = {(): fitter.fit(Model(simulator), np.zeros(0))}
+        self.beside = tuple(beside)
+        self.nominal = fitter.fit(Model(simulator), np.zeros(0))
+        self.before = validate(fitter, self.nominal)
+        free = sum(len(candidate.knobs) for candidate in beside)
+        base = fitter.fit(self.model(()), np.zeros(free), self.nominal) if free else self.nominal
+        self.tried: dict[Key, Fit] = {(): base}
         self.unfit: set[Key] = set()
         self.refused: dict[Key, str] = {}
         self._signatures: dict[Key, Signatures] = {}
         channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
-        nominal = validate(fitter, self.tried[()])
-        self.validated: dict[Key, Validated] = {(): nominal}
-        self.currency = Currency(nominal.squares, groups(channels))
+        found = validate(fitter, base) if free else self.before
+        self.validated: dict[Key, Validated] = {(): found}
+        self.currency = Currency(self.before.squares, groups(channels))
 
     # -- what is known of a set -----------------------------------------------------------
 
     def model(self, key: Key) -> Model:
         """The simulator with some candidates."""
-        return Model(self.simulator, [self.candidates[i] for i in key])
+        return Model(self.simulator, [*(self.candidates[i] for i in key), *self.beside])
+
+    def own(self, key: Key) -> Array:
+        """Fitted numbers of a set, without those that are free beside every one."""
+        return self.tried[key].theta[: self.numbers(key)]
 
     def labels(self, key: Key) -> tuple[str, ...]:
         """Names and places of a set."""
@@ -176,9 +189,15 @@ class Search:
         return fresh
 
     def fit(self, key: Key, theta: Array) -> None:
-        """Fit a set from start values, and from its nested sets if it ends worse than one."""
+        """Fit a set from start values, and from its nested sets if it ends worse than one.
+
+        Args:
+            key: The set.
+            theta: Start values of its own numbers.
+        """
         nested = [k for k in self.tried if len(k) < len(key) and set(k) < set(key)]
         near = min(nested, key=lambda k: self.tried[k].merit, default=())
+        theta = np.append(theta, self.tried[near].theta[self.numbers(near) :])
         found = self.fitter.fit(self.model(key), theta, self.tried[near])
         if nested:
             floor = self.tried[near].merit

@@ -134,7 +134,7 @@ def allowed(search: Search, tolerance: float) -> list[Candidate]:
             reach.append(most)
     if len(found) <= MOST:
         return found
-    columns = search.fitter.columns(search.tried[()], found)
+    columns = search.fitter.columns(search.nominal, found)
     trials = np.array([candidate.trials[0].values[0, 0] for candidate in found])
     matters = np.linalg.norm(columns, axis=(0, 1)) * np.array(reach) / np.abs(trials)
     return [found[i] for i in np.sort(np.argsort(-matters)[:MOST])]
@@ -155,10 +155,14 @@ class Calibrated:
 
 def calibrated(search: Search, key: Key, parameters: Sequence[Candidate]) -> Calibrated:
     """A set fitted with all parameters free within their tolerance."""
+    if search.beside:
+        return Calibrated(
+            search.tried[key], search.currency.by_group(search.validated[key].squares)
+        )
     chosen = [search.candidates[i] for i in key]
     names = {candidate.label for candidate in chosen}
     free = [candidate for candidate in parameters if candidate.label not in names]
-    start = np.append(search.tried[key].theta, np.zeros(len(free)))
+    start = np.append(search.own(key), np.zeros(len(free)))
     fit = search.fitter.fit(Model(search.simulator, [*chosen, *free]), start, search.tried[key])
     squares = validate(search.fitter, fit).squares
     return Calibrated(fit, search.currency.by_group(squares))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from residual.gap.confirmation import FEW, TOO_FEW, Claim
 from residual.gap.fitting import Left
-from residual.gap.result import Blind, Doubt, Gap, Kind, Span, Verdict
-from residual.gap.search import Search
+from residual.gap.result import Blind, Doubt, Gap, Kind, Number, Span, Verdict
+from residual.gap.search import Key, Search
 
 #: Families that an effect may be mistaken for and still be worth a name.
 MOST_FAMILIES = 3
@@ -106,6 +108,32 @@ def doubts(claim: Claim) -> tuple[Doubt, ...]:
         "rivals": bool(claim.rivals or claim.alike),
     }
     return tuple(doubt for doubt, there in why.items() if there)
+
+
+def tolerance_verdicts(search: Search, key: Key) -> list[Verdict]:
+    """Parameters that were moved within their tolerance so that the rest could be named."""
+    fit = search.tried[key]
+    first = search.numbers(key)
+    taken = search.currency.share(
+        search.before.squares, search.validated[()].squares, np.random.default_rng(0)
+    )
+    found = []
+    for candidate, value, knob in zip(
+        search.beside, fit.theta[first:], fit.model.knobs[first:], strict=True
+    ):
+        effect, number = candidate.effect, Number(float(value), knob.low, knob.high, knob.unit)
+        says = (
+            f"{effect}: {knob.field} {number.value:.4g} (anything from {number.low:.4g} to "
+            f"{number.high:.4g}) {number.unit}; moved with the other parameters, within what they "
+            "may be off, so that the rest can be seen"
+        )
+        found.append(
+            Verdict(
+                "ambiguous", effect.name, effect.where, {knob.field: number}, (),
+                effect.family_in(search.simulator), says, Span(*taken), doubts=("calibration",),
+            )
+        )  # fmt: skip
+    return found
 
 
 def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdict:

@@ -35,7 +35,7 @@ def widened(search: Search, key: Key, claims: Sequence[Claim], beside: Fit) -> l
         beside: The set fitted with all parameters free within their tolerance.
     """
     sure = {claim.number for claim in claims if claim.sure}
-    shifts = by_parameters(beside, len(search.tried[key].theta))
+    shifts = by_parameters(beside, search.numbers(key))
     forecast_best = functools.cache(lambda smaller: best_forecasts(search, smaller))
     told = []
     for claim in claims:
@@ -97,7 +97,7 @@ def best_forecasts(search: Search, key: Key) -> Array:
     fitter, fit = search.fitter, search.tried[key]
     samples, windows = fitter.samples, fitter.blocks.windows
     seen = samples.seen[windows.index][..., samples.measured]
-    usual = np.sqrt(np.nanmean(search.validated[()].foretold.squares, axis=0))
+    usual = np.sqrt(np.nanmean(search.before.foretold.squares, axis=0))
     everywhere = np.zeros(len(windows), np.int64)
 
     def errors(theta: Array) -> Array:
