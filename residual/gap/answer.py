@@ -101,14 +101,6 @@ def confirm(
         search.add_exchanged(key, 3)
 
 
-def nameless(answer: Answer) -> bool:
-    """Whether there is a gap above the noise and nothing of it can be named."""
-    left = answer.found.search.fitter.left(
-        answer.found.search.tried[answer.key], answer.found.floor
-    )
-    return not answer.key and not left.adequate and left.ratio > FOOTNOTE
-
-
 def summed_up(answer: Answer) -> Gap:
     """The table of errors."""
     found, search = answer.found, answer.found.search
@@ -176,8 +168,7 @@ def verdicts(
     made: list[Verdict] = []
     for claim, label in zip(answer.claims, labels, strict=True):
         made.append(effect_verdict(search, claim, blocks, *dependent(label, labels, sets)))
-    if answer.key:
-        made += tolerance_verdicts(search, answer.key)
+    made += tolerance_verdicts(search, answer.key)
     left = search.fitter.left(search.tried[answer.key], found.floor)
     if tolerance is not None and table.before.value <= tolerance:
         made.insert(

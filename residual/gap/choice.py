@@ -12,8 +12,12 @@ import dataclasses
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
+from residual.gap.currency import Currency
 from residual.gap.search import Key, Search
+
+Array = NDArray[np.float64]
 
 #: Part of the remaining error that an effect must take off: over all joints, or at one of them.
 MATERIAL, AT_ONE = 0.2, 0.3
@@ -98,8 +102,13 @@ def as_good(search: Search, key: Key, best: Key) -> bool:
 
 def material(search: Search, smaller: Key, larger: Key) -> bool:
     """Whether a set takes a fifth off what a smaller one leaves, or three tenths at one joint."""
-    before = search.currency.by_group(search.validated[smaller].squares)
-    after = search.currency.by_group(search.validated[larger].squares)
+    squares = search.validated
+    return takes_off(search.currency, squares[smaller].squares, squares[larger].squares)
+
+
+def takes_off(currency: Currency, worse: Array, better: Array) -> bool:
+    """The same of mean squared errors of blocks, each (B, m)."""
+    before, after = currency.by_group(worse), currency.by_group(better)
     gained = before - after
     if gained.mean() <= 0:
         return False

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.aliases import aliases
-from residual.gap.answer import confirm, judged_apart, matters, nameless, summed_up, told
+from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
+from residual.gap.calibration import better, worth_freeing
 from residual.gap.candidates import Candidate, candidates
 from residual.gap.data import examine
 from residual.gap.explain import Explanation, explain
@@ -18,7 +19,7 @@ from residual.gap.horizon import usual_horizon
 from residual.gap.numerics import fits_better, forecast_error, held_as, held_otherwise, how_held
 from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import GapResult
-from residual.gap.tolerance import KNOWN, allowed
+from residual.gap.tolerance import KNOWN
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
 from sims.contract import refuse_unsound
@@ -121,11 +122,9 @@ def find_gap(
         other = held_otherwise(simulator) if hold is None else None
         if other is not None and fits_better(found.search, found.key, other):
             tell("inputs held the other way fit better: once more so")
-            again = explained(other)
-            if forecast_error(again[1].search, again[1].key) < forecast_error(
-                found.search, found.key
-            ):
-                prepared, found = again
+            ready, again = explained(other)
+            if forecast_error(again.search, again.key) < forecast_error(found.search, found.key):
+                prepared, found = ready, again
                 quality.append(
                     f"inputs were taken to {how_held(other)}: the data fit better so; set hold to "
                     "say otherwise"
@@ -134,14 +133,13 @@ def find_gap(
         tell("confirming")
         asked = matters(found, tolerance)
         answer = confirm(found, groups, asked, parameter_tolerance)
-        if asked and nameless(answer) and parameter_tolerance:
-            # Parameters that are a little off may hide what is missing.
-            beside = allowed(found.search, parameter_tolerance)
-            if beside:
-                tell("nothing can be named: once more with parameters free within their tolerance")
-                prepared, found = explained(found.search.simulator, beside)
-                second = confirm(found, groups, asked, parameter_tolerance)
-                answer = second if second.key else answer
+        beside = worth_freeing(answer, parameter_tolerance) if asked else []
+        if beside:
+            tell("once more with parameters free within their tolerance")
+            ready, again = explained(found.search.simulator, beside)
+            second = confirm(again, groups, asked, parameter_tolerance)
+            if better(second, answer):
+                prepared, answer = ready, second
         clock.lap("confirm")
         table = summed_up(answer)
         apart = None

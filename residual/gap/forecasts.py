@@ -86,8 +86,8 @@ def gap(
     return Gap(
         name, by_channel[name].unit, float(np.median(rows) - 1) * samples.step,
         by_channel[name].before, by_channel[name].after, by_channel[name].noise_floor,
-        tuple(steps), by_channel, *ratios, Span(*share) if key else Span(0.0, 0.0, 0.0),
-        len(blocks), blocks.folds,
+        tuple(steps), by_channel, *ratios,
+        Span(*share) if key or search.beside else Span(0.0, 0.0, 0.0), len(blocks), blocks.folds,
     )  # fmt: skip
 
 

@@ -146,23 +146,24 @@ class Calibrated:
 
     Attributes:
         fit: Its fit, the numbers of the set first.
-        errors: Cross-validated forecast errors by joint, (g,).
+        squares: Mean squared errors of cross-validated forecasts of blocks, (B, m).
+        errors: Relative to those of the nominal simulator, by joint, (g,).
     """
 
     fit: Fit
+    squares: Array
     errors: Array
 
 
 def calibrated(search: Search, key: Key, parameters: Sequence[Candidate]) -> Calibrated:
     """A set fitted with all parameters free within their tolerance."""
     if search.beside:
-        return Calibrated(
-            search.tried[key], search.currency.by_group(search.validated[key].squares)
-        )
+        squares = search.validated[key].squares
+        return Calibrated(search.tried[key], squares, search.currency.by_group(squares))
     chosen = [search.candidates[i] for i in key]
     names = {candidate.label for candidate in chosen}
     free = [candidate for candidate in parameters if candidate.label not in names]
     start = np.append(search.own(key), np.zeros(len(free)))
     fit = search.fitter.fit(Model(search.simulator, [*chosen, *free]), start, search.tried[key])
     squares = validate(search.fitter, fit).squares
-    return Calibrated(fit, search.currency.by_group(squares))
+    return Calibrated(fit, squares, search.currency.by_group(squares))

@@ -1,0 +1,40 @@
+"""Parameters that are a little off may hide what is missing: when to look again with them free."""
+
+from __future__ import annotations
+
+from residual.gap.answer import Answer
+from residual.gap.candidates import Candidate
+from residual.gap.choice import takes_off
+from residual.gap.explain import FOOTNOTE
+from residual.gap.tolerance import allowed, calibrated
+
+
+def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
+    """Parameters within their tolerance, if they hide something or explain much of what is left.
+
+    They do where nothing could be named, or where they take a material part of the error off,
+    free beside what was named. Parameters that were named are none of them.
+
+    Args:
+        answer: What was found with all parameters at their values.
+        tolerance: How well they are known, as a share of each.
+    """
+    search, key = answer.found.search, answer.key
+    left = search.fitter.left(search.tried[key], answer.found.floor)
+    if not tolerance or left.adequate or left.ratio <= FOOTNOTE:
+        return []
+    named = search.labels(key)
+    free = [one for one in allowed(search, tolerance) if one.label not in named]
+    if not free or not key:
+        return free
+    squares = calibrated(search, key, free).squares
+    return free if takes_off(search.currency, search.validated[key].squares, squares) else []
+
+
+def better(second: Answer, first: Answer) -> bool:
+    """Whether an answer with parameters free forecasts materially better than one without."""
+    search = first.found.search
+    before = search.validated[first.key].squares
+    after = second.found.search.validated[second.key].squares
+    gained, error = search.currency.difference(before, after)
+    return gained > error and takes_off(search.currency, before, after)
