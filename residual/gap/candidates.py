@@ -21,7 +21,16 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True)
 class Knob:
-    """One fitted number of an effect: name of the field, unit, bounds, and a small step."""
+    """One fitted number of an effect.
+
+    Attributes:
+        field: Its name in the effect.
+        unit: SI unit.
+        low, high: Bounds.
+        step: A small change.
+        strength: Whether the effect is absent where it is zero.
+        known: Standard deviation with which it is known to be zero beforehand.
+    """
 
     field: str
     unit: str
@@ -29,6 +38,7 @@ class Knob:
     high: float
     step: float
     strength: bool
+    known: float = np.inf
 
 
 @dataclasses.dataclass(frozen=True)
