@@ -27,10 +27,10 @@ import numpy as np
 import quick_gap
 from damage import damaged
 from fuzzed_results import TINY
+from one_log import one_log
 
 from simgap_files import read_sealed
 from studies import find_gap
-from studies.make_log import main as make_log
 
 GRID = TINY + "grid:\n- seed: [0, 1, 2]\n"
 #: Numbers that depend on the clock.
@@ -85,8 +85,8 @@ def grid(folder: Path, *more: str) -> None:
 
 def gap(folder: Path) -> None:
     """A search for two effects; nothing of it is kept, so it is there whole or not at all."""
-    log = sorted((folder.parent / "logs").glob("*.csv"))[0]
-    arguments = ["--simulator", "sims.pendulum_equation.PendulumEquation", "--logs", str(log)]
+    arguments = ["--simulator", "sims.pendulum_equation.PendulumEquation", "--logs"]
+    arguments += [str(one_log(folder.parent))]
     arguments += ["--effects", "mass", "viscous_friction", "--output", str(folder)]
     find_gap.main(arguments)
 
@@ -259,7 +259,7 @@ def main() -> None:
     given = parser.parse_args()
     rng, until = np.random.default_rng(given.seed), time.monotonic() + 60 * given.minutes
     home = Path(tempfile.mkdtemp(prefix="simgap-soak-"))
-    make_log(["--output", str(home / "logs")])
+    one_log(home)  # made by one process for all
     columns = ("runs", "kills", "early", "midway", "late", "survivors", "damaged")
     print(f"| study | {' | '.join(columns)} |\n|{'---|' * (1 + len(columns))}")
     for name in (given.only,) if given.only else (*STUDIES, "dask"):
