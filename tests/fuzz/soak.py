@@ -100,7 +100,7 @@ def left(folder: Path) -> dict[str, object]:
     for path in sorted(folder.rglob("*.json")):
         if path.name in ("results.json", "gap.json"):
             found[str(path.relative_to(folder))] = _timeless(read_sealed(path))
-    for path in sorted(folder.rglob("policies/*.safetensors")):
+    for path in sorted(folder.rglob("policies/[!.]*.safetensors")):
         found[str(path.relative_to(folder))] = path.read_bytes()
     return found
 
