@@ -62,10 +62,13 @@ class Cluster:
         return self.started[-1]
 
     def processes(self):
+        """Those with the mark, and their children: Ray's agents write over their environment."""
+        found = set()
         for process in psutil.process_iter():
             with contextlib.suppress(psutil.Error):
                 if process.environ().get(MARK) == self.environment[MARK]:
-                    yield process
+                    found |= {process, *process.children(recursive=True)}
+        return found
 
     def listening(self):
         """By process the addresses that it listens on."""
