@@ -13,7 +13,7 @@ import numpy as np
 from residual.trajectories import Trajectory
 
 #: Rows that are searched: of a system with two states they take about a gigabyte.
-MOST = 150_000
+MOST = 100_000
 #: Rows in a stretch, many times a window.
 STRETCH = 1000
 
