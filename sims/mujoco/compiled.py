@@ -54,7 +54,7 @@ class Source:
     @property
     def urdf(self) -> bool:
         """Whether it is a URDF."""
-        return self.path.suffix == ".urdf"
+        return self.path.suffix.lower() == ".urdf"
 
 
 def specification(source: Source) -> Any:
@@ -98,10 +98,7 @@ def model_text(source: Source) -> bytes | None:
     folder = source.path.parent.resolve()
     spec.compiler.meshdir = str(folder / spec.compiler.meshdir)
     spec.compiler.texturedir = str(folder / spec.compiler.texturedir)
-    try:
-        spec.compile()
-    except ValueError as error:
-        raise ValueError(f"{source.path}: {_one_line(error)}") from None
+    _compile(spec, source.path)
     return str(spec.to_xml()).encode()
 
 
@@ -134,16 +131,45 @@ def compiled(source: Source) -> tuple[Any, dict[int, float]]:
     for body in spec.bodies:
         body.simple = False
     late = _without_delays(spec, source.path)
-    try:
-        model = spec.compile()
-    except ValueError as error:
-        raise ValueError(f"{source.path}: {_one_line(error)}") from None
+    model = _compile(spec, source.path)
     _refuse_hidden_state(model, source.path)
     flags = mujoco.mjtDisableBit
     model.opt.disableflags |= int(flags.mjDSBL_AUTORESET) | int(flags.mjDSBL_CLAMPCTRL)
     soft = np.isclose(model.dof_solimp[:, :3], DEFAULT_FRICTION).all(axis=1)
     model.dof_solimp[soft & (model.dof_frictionloss == 0), :3] = HARD_FRICTION
     return model, late
+
+
+def _compile(spec: Any, path: Path) -> Any:
+    """The ``mujoco.MjModel``; what is not there is said with what was expected.
+
+    Raises:
+        ValueError: It cannot be compiled; the message is one line.
+    """
+    joints = [joint.name for joint in spec.joints]
+    for actuator in spec.actuators:
+        on = actuator.trntype in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+        if on and actuator.target not in joints:
+            raise ValueError(
+                f"{path}: actuator {actuator.name!r} drives joint {actuator.target!r}, which is "
+                f"not there; expected one of {', '.join(filter(None, joints)) or 'none'}"
+            )
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise ValueError(f"{path}: {_one_line(error)}{_missing_asset(spec, path)}") from None
+
+
+def _missing_asset(spec: Any, path: Path) -> str:
+    """Where the first file that a model lacks was expected; nothing if all are there."""
+    beside = path.parent.resolve()
+    meshes, pictures = beside / spec.compiler.meshdir, beside / spec.compiler.texturedir
+    for folder, assets in ((meshes, spec.meshes), (pictures, (*spec.textures, *spec.hfields))):
+        for asset in assets:
+            name = Path(asset.file).name if spec.strippath else asset.file
+            if name and not (folder / name).is_file():
+                return f": expected it at {folder / name}"
+    return ""
 
 
 def _without_delays(spec: Any, path: Path) -> dict[int, float]:
