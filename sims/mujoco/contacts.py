@@ -12,7 +12,8 @@ def touching_geoms(model: Any) -> list[int]:
     """Geoms that can be in a contact of bodies that move against each other, in their order.
 
     MuJoCo's own rule: contype of one and conaffinity of the other share a bit, the bodies are not
-    welded together, not parent and child (but for the world, and unless the file says that they do), and not excluded.
+    welded together, not parent and child (but for the world, and unless the file lets these
+    collide), and not excluded.
     """
     found: set[int] = set()
     excluded = {int(s) for s in np.ravel(model.exclude_signature)}
