@@ -112,9 +112,29 @@ def _read(path: Path) -> Any:
     except expat.ExpatError as error:
         raise ValueError(f"{path}: not well-formed XML: {error}") from None
     try:
-        return mujoco.MjSpec.from_file(str(path))
+        spec = mujoco.MjSpec.from_file(str(path))
     except ValueError as error:
         raise ValueError(f"{path}: {_one_line(error)}") from None
+    for mesh in spec.meshes:
+        mesh.file = _in_package(mesh.file, path)
+    return spec
+
+
+def _in_package(file: str, path: Path) -> str:
+    """The file behind ROS's ``package://name/...``: under a folder of that name around the model.
+
+    As it was, if it is no such name or the file is not there.
+    """
+    scheme, _, inside = file.partition("://")
+    if scheme != "package":
+        return file
+    name, _, rest = inside.partition("/")
+    for folder in path.resolve().parents:
+        places = [folder / name / rest, *([folder / rest] if folder.name == name else [])]
+        for place in places:
+            if place.is_file():
+                return str(place)
+    return file
 
 
 def compiled(source: Source) -> tuple[Any, dict[int, float]]:
@@ -171,6 +191,9 @@ def _missing_asset(spec: Any, path: Path) -> str:
     for folder, assets in ((meshes, spec.meshes), (pictures, (*spec.textures, *spec.hfields))):
         for asset in assets:
             name = Path(asset.file).name if spec.strippath else asset.file
+            if name.startswith("package://"):
+                package, _, rest = name.removeprefix("package://").partition("/")
+                return f": expected {package}/{rest} in a folder above {beside}"
             if name and not (folder / name).is_file():
                 return f": expected it at {folder / name}"
     return ""
