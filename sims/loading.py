@@ -20,14 +20,12 @@ from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
+from sims.model_files import model_settings, names_model
 from sims.simulator import Hold, Simulator
 from sims.trust import check_file, trusting
 
 #: In a list of effects: all that the simulator can host.
 LIBRARY = "library"
-
-#: Files that are a simulator by themselves, and the class that reads them.
-MODEL_FILES = {".xml": "sims.mujoco.MujocoSimulator", ".urdf": "sims.mujoco.MujocoSimulator"}
 
 
 def load_simulator(
@@ -55,17 +53,6 @@ def simulator_settings(
     with trusting(trusted):
         text = _parser().dump(_parsed(source), format="yaml", skip_unset=False)
     return yaml.safe_load(text)["simulator"]
-
-
-def model_settings(path: str | Path) -> dict[str, Any] | None:
-    """``class_path`` and ``init_args`` for a robot's model file; None for any other.
-
-    The path is made absolute, so that what is saved loads from any folder.
-    """
-    kind = MODEL_FILES.get(Path(path).suffix.lower())
-    if kind is None:
-        return None
-    return {"class_path": kind, "init_args": {"model": str(Path(path).expanduser().resolve())}}
 
 
 def with_effects(
@@ -230,7 +217,8 @@ def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
     if isinstance(value, str):
         value = model_settings(value) or value
     if isinstance(value, str) and Path(value).is_file():
-        check_file(value)
+        inside = check_file(value)
+        value = inside if names_model(inside) else value
     try:
         return _parser().parse_object({"simulator": value})
     except (jsonargparse.ArgumentError, TypeError) as error:

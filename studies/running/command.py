@@ -25,7 +25,8 @@ import jsonargparse
 import yaml
 
 import simgap_yaml
-from sims.loading import model_settings, not_found
+from sims.loading import not_found
+from sims.model_files import located, model_settings, names_model
 from sims.trust import check_file, named_packages, trusting
 
 _DEBUG, _DEBUG_VARIABLE, _TRUST = "--debug", "SIMGAP_DEBUG", "--trust"
@@ -88,6 +89,9 @@ class Parser(jsonargparse.ArgumentParser):
             raise ValueError(f"{path} is no YAML: {simgap_yaml.problem(error)}") from None
         # What a config names is the user's own choice, as what stands on the command line is.
         with trusting(named_packages(given)):
+            if path and names_model(given):
+                given = located(given, str(path))
+                content = yaml.safe_dump(given)
             for key in ("simulator", "corrected") if isinstance(given, dict) else ():
                 value = given.get(key)
                 if isinstance(value, str):
@@ -137,12 +141,15 @@ def _check_given(name: str, value: str) -> None:
 
 
 def _settings(source: str | Path) -> dict[str, Any] | None:
-    """What a robot's model file means; None for all else, a file of settings after a look at it."""
+    """What a robot's model file means, or a file that names one.
+
+    None for all else; a file of settings is looked at first.
+    """
     if settings := model_settings(source):
         return settings
     with contextlib.suppress(OSError):  # a name too long is no file
-        if Path(source).is_file():
-            check_file(source)
+        if Path(source).is_file() and names_model(inside := check_file(source)):
+            return dict(inside)
     return None
 
 
