@@ -146,7 +146,7 @@ def estimate(
     force = np.zeros((len(samples), len(driven)))
     local = np.einsum("wdt,lt->wld", weight.reshape(count, len(pushed), terms), series)
     rows = windows.index[windows.inside]
-    force[np.ix_(rows, pushed)] = local[windows.inside]
+    force[rows[:, None], pushed] = local[windows.inside]
     return Floor(sigma, error, nodes, slope, force)
 
 

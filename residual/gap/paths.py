@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 LONGEST = 400
 
 
-def unseen(channels: Sequence[Channel], measured: Sequence[int]) -> NDArray[np.bool_]:
+def unseen(channels: Sequence[Channel], measured: Iterable[int]) -> NDArray[np.bool_]:
     """States of which the log says nothing: not measured, nor rates of what was, (n_p,)."""
     seen = {channels[i].name for i in measured}
     return np.array([not {c.name, c.rate_of} & seen for c in channels], bool)

@@ -69,7 +69,10 @@ def effect_verdict(
     if claim.alike:
         says.append(f"the same motion in these data: {', '.join(claim.alike)}")
     if claim.rivals:
-        says.append(f"these data cannot exclude {', '.join(claim.rivals)}")
+        rivals = dict.fromkeys(
+            f"{name} of another order" if name == str(effect) else name for name in claim.rivals
+        )
+        says.append(f"these data cannot exclude {', '.join(rivals)}")
     twins = tuple(dict.fromkeys((*claim.twins, *stand_ins)))
     if twins:
         says.append(f"the same motion as {', '.join(twins)}")
@@ -139,7 +142,7 @@ def tolerance_verdicts(search: Search, key: Key) -> list[Verdict]:
 def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdict:
     """What has no name."""
     share = Span(1 - gap.share.value, 1 - gap.share.high, 1 - gap.share.low)
-    says = f"{100 * share.value:.2g} % of the gap has no name: {left.ratio:.3g} times the noise"
+    says = f"{100 * share.value:.3g} % of the gap has no name: {left.ratio:.3g} times the noise"
     if left.force:
         says += f"; it looks like a force that follows {left.force}"
     if leads:
