@@ -20,13 +20,13 @@ from residual.gap.search import Key
 from residual.gap.tolerance import KNOWN, allow_for_parameters
 from residual.gap.verdicts import (
     blind_verdict,
+    calibrated_verdict,
     dependent,
     effect_verdict,
     minor_verdict,
     nameable,
     no_gap_verdict,
     remainder_verdict,
-    tolerance_verdicts,
 )
 from residual.trajectories import Trajectory
 
@@ -168,7 +168,8 @@ def verdicts(
     made: list[Verdict] = []
     for claim, label in zip(answer.claims, labels, strict=True):
         made.append(effect_verdict(search, claim, blocks, *dependent(label, labels, sets)))
-    made += tolerance_verdicts(search, answer.key)
+    if search.beside:
+        made.append(calibrated_verdict(search, answer.key))
     left = search.fitter.left(search.tried[answer.key], found.floor)
     if tolerance is not None and table.before.value <= tolerance:
         made.insert(
@@ -178,7 +179,7 @@ def verdicts(
                 f"{table.before.value:.3g} {table.unit}, within the tolerance of {tolerance:.3g}"
             ),
         )
-    elif not answer.key and left.adequate:
+    elif not answer.key and left.adequate and not search.beside:
         made.append(no_gap_verdict("no gap above noise"))
     elif not left.adequate and left.ratio > FOOTNOTE:
         made.append(remainder_verdict(left, table, answer.leads))

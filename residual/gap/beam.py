@@ -78,6 +78,7 @@ def grow(search: Search, key: Key) -> list[Key]:
             if good >= wanted:
                 break
     if not key:
+        found += boldly(search)
         for pair in pair_gains(around, search.effort.pairs):
             numbers = [around.variants[v].candidate for v in pair.variants]
             fresh, theta = search.merged(key, zip(numbers, pair.values, strict=True))
@@ -85,6 +86,19 @@ def grow(search: Search, key: Key) -> list[Key]:
             if fresh in search.tried and search.sound(fresh):
                 found.append(fresh)
     return list(dict.fromkeys(found))
+
+
+def boldly(search: Search) -> list[Key]:
+    """Fit effects of which small trials tell little alone, such as friction that holds a joint."""
+    found: list[Key] = []
+    for number, candidate in enumerate(search.candidates):
+        fresh = (number,)
+        if candidate.bold is None or search.late or not search.fits_in(fresh):
+            continue
+        search.add({fresh: candidate.bold})
+        if fresh in search.tried and search.sound(fresh):
+            found.append(fresh)
+    return found
 
 
 def together(search: Search, key: Key, grown: list[Key]) -> list[Key]:

@@ -21,7 +21,16 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True)
 class Knob:
-    """One fitted number of an effect: name of the field, unit, bounds, and a small step."""
+    """One fitted number of an effect.
+
+    Attributes:
+        field: Its name in the effect.
+        unit: SI unit.
+        low, high: Bounds.
+        step: A small change.
+        strength: Whether the effect is absent where it is zero.
+        known: Standard deviation with which it is known to be zero beforehand.
+    """
 
     field: str
     unit: str
@@ -29,6 +38,7 @@ class Knob:
     high: float
     step: float
     strength: bool
+    known: float = np.inf
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,12 +64,14 @@ class Candidate:
         trials: What its signatures are computed at.
         rough: True if its signature depends on its size (dead zone, delay ...), so that several
             trials are worth a refit.
+        bold: Numbers from which it is fitted alone whatever the screen says, or None.
     """
 
     effect: Effect
     knobs: tuple[Knob, ...]
     trials: tuple[Trial, ...]
     rough: bool
+    bold: Array | None = None
 
     @property
     def name(self) -> str:
@@ -216,5 +228,6 @@ def _candidate(effect: Effect, known: dict[str, Quantity], reach: float) -> Cand
                 rows[row, i] = chosen if chosen is not None else sizes[row][0]
             sided = [knobs[i].low == 0 for i in strengths] or [True]
             trials.append(Trial(rows, np.array(sided)))
-    rough = len(trials) > 1
-    return Candidate(effect, knobs, tuple(trials), rough)
+    full = [quantity.bold for quantity in quantities if quantity.bold is not None]
+    bold = np.array(full) if len(full) == len(knobs) else None
+    return Candidate(effect, knobs, tuple(trials), len(trials) > 1, bold)

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from residual.gap.aliases import aliases
 from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
-from residual.gap.calibration import better, worth_freeing
 from residual.gap.candidates import Candidate, candidates
 from residual.gap.data import examine
 from residual.gap.explain import Explanation, explain
+from residual.gap.free_parameters import better, worth_freeing
 from residual.gap.horizon import usual_horizon
 from residual.gap.numerics import fits_better, forecast_error, held_as, held_otherwise, how_held
 from residual.gap.prepare import Prepared, prepare

@@ -36,7 +36,7 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
     One is Gauss-Newton's with start states projected out, times the residual variance; the other
     the sandwich over blocks, which allows for errors that go together within a block, with
     Student's t for few blocks. Source: White, "Maximum likelihood estimation of misspecified
-    models", Econometrica 50 (1982).
+    models", Econometrica 50 (1982). What is known of a number beforehand counts as an observation.
     """
     p = len(fit.theta)
     if not p:
@@ -45,7 +45,9 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
     rows, residual = fit.by_knob * root[..., None], fit.projected * root
     scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
     unit = rows / scale
-    inverse = np.linalg.pinv(np.einsum("wri,wrj->ij", unit, unit), rcond=1e-12)
+    known = np.array([knob.known for knob in fit.model.knobs]) * scale
+    matrix = np.einsum("wri,wrj->ij", unit, unit) + np.diag(known**-2)
+    inverse = np.linalg.pinv(matrix, rcond=1e-12)
     used = int((np.abs(residual) > 0).sum())
     freedom = max(used - fit.basis.shape[2] * len(residual) - p, 1)
     variance = max(1.0, float((residual**2).sum()) / freedom)

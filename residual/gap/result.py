@@ -12,7 +12,9 @@ from sims.effects.base import Effect
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
-Kind = Literal["confirmed", "ambiguous", "minor", "needs_data", "unexplained", "no_gap"]
+Kind = Literal[
+    "confirmed", "ambiguous", "calibrated", "minor", "needs_data", "unexplained", "no_gap"
+]
 #: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
 #: between folds or with the numerics, lies at its bound, parameters within their tolerance do as
 #: well, it is a time shorter than half a sample, or an effect of another kind does as well.
@@ -50,9 +52,10 @@ class Verdict:
 
     Attributes:
         kind: ``confirmed``: one effect (or one family of them), by forecasts of data that did not
-            fit it; ``ambiguous``: it or an alternative; ``minor``: it helps a little, and is not
-            added; ``needs_data``: this log cannot show it; ``unexplained``: a remainder without a
-            name; ``no_gap``: nothing above noise, or nothing that matters.
+            fit it; ``ambiguous``: it or an alternative; ``calibrated``: parameters that were moved
+            within their tolerance; ``minor``: it helps a little, and is not added; ``needs_data``:
+            this log cannot show it; ``unexplained``: a remainder without a name; ``no_gap``:
+            nothing above noise, or nothing that matters.
         effect: Name of the effect, empty if there is none.
         where: Joint, actuator, channel or parameter.
         parameters: Its numbers.

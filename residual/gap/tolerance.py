@@ -128,8 +128,9 @@ def allowed(search: Search, tolerance: float) -> list[Candidate]:
         (knob,) = candidate.knobs
         if most > 0:
             bounded = dataclasses.replace(
-                knob, low=max(knob.low, -most), high=min(knob.high, most), step=0.3 * most
-            )
+                knob, low=max(knob.low, -most), high=min(knob.high, most), step=0.3 * most,
+                known=most / np.sqrt(3),
+            )  # fmt: skip
             found.append(dataclasses.replace(candidate, knobs=(bounded,)))
             reach.append(most)
     if len(found) <= MOST:

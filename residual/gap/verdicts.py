@@ -113,30 +113,27 @@ def doubts(claim: Claim) -> tuple[Doubt, ...]:
     return tuple(doubt for doubt, there in why.items() if there)
 
 
-def tolerance_verdicts(search: Search, key: Key) -> list[Verdict]:
-    """Parameters that were moved within their tolerance so that the rest could be named."""
-    fit = search.tried[key]
-    first = search.numbers(key)
+def calibrated_verdict(search: Search, key: Key) -> Verdict:
+    """Parameters that were moved within their tolerance so that the rest can be seen.
+
+    Its parameters go by their own names; their intervals are all that was allowed.
+    """
+    fit, first = search.tried[key], search.numbers(key)
+    moved = {
+        str(candidate.effect): Number(float(value), knob.low, knob.high, knob.unit)
+        for candidate, value, knob in zip(
+            search.beside, fit.theta[first:], fit.model.knobs[first:], strict=True
+        )
+    }
     taken = search.currency.share(
         search.before.squares, search.validated[()].squares, np.random.default_rng(0)
     )
-    found = []
-    for candidate, value, knob in zip(
-        search.beside, fit.theta[first:], fit.model.knobs[first:], strict=True
-    ):
-        effect, number = candidate.effect, Number(float(value), knob.low, knob.high, knob.unit)
-        says = (
-            f"{effect}: {knob.field} {number.value:.4g} (anything from {number.low:.4g} to "
-            f"{number.high:.4g}) {number.unit}; moved with the other parameters, within what they "
-            "may be off, so that the rest can be seen"
-        )
-        found.append(
-            Verdict(
-                "ambiguous", effect.name, effect.where, {knob.field: number}, (),
-                effect.family_in(search.simulator), says, Span(*taken), doubts=("calibration",),
-            )
-        )  # fmt: skip
-    return found
+    changes = ", ".join(f"{name} {n.value:+.3g} {n.unit}" for name, n in moved.items())
+    return Verdict(
+        "calibrated", "", "", moved, (), "",
+        f"parameters moved within their tolerance, so that the rest can be seen: {changes}",
+        Span(*taken),
+    )  # fmt: skip
 
 
 def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdict:

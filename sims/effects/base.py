@@ -31,6 +31,8 @@ class Quantity:
         nominal: Value at which the effect is absent; zero but for the level of a saturation.
         starts: Values that a search should begin from, empty if any small one will do.
         integer: True if only whole numbers make sense.
+        bold: Value from which the effect is fitted in full whatever small trials say, if they can
+            mislead: what holds a joint at rest does nothing that is in proportion to its size.
     """
 
     unit: str
@@ -41,6 +43,7 @@ class Quantity:
     nominal: float
     starts: tuple[float, ...]
     integer: bool
+    bold: float | None = None
 
 
 def number(
@@ -53,6 +56,7 @@ def number(
     share: float = 1.0,
     starts: tuple[float, ...] = (),
     integer: bool = False,
+    bold: float | None = None,
     **dimension: int,
 ) -> Any:
     """A numeric field of an effect.
@@ -60,6 +64,7 @@ def number(
     Args:
         default: Value when none is given.
         role, low, high, nominal, integer: See ``Quantity``.
+        bold: See ``Quantity``, as a multiple of the typical size.
         share: The scale, as a share of the typical size of the dimension.
         starts: Values worth starting a search from, as multiples of the same typical size.
         dimension: Exponents of what the host names: ``force``, ``position``, ``rate`` (of the
@@ -74,6 +79,7 @@ def number(
         "share": share,
         "starts": starts,
         "integer": integer,
+        "bold": bold,
         "dimension": dimension,
     }
     return dataclasses.field(default=default, metadata=known)
@@ -194,6 +200,7 @@ class Effect(abc.ABC):
                 nominal=known["nominal"],
                 starts=tuple(_tidy(start * typical) for start in known["starts"]),
                 integer=known["integer"],
+                bold=None if known["bold"] is None else _tidy(known["bold"] * typical),
             )
         return found
 

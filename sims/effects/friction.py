@@ -36,7 +36,7 @@ class DryFriction(JointEffect):
 class CoulombFriction(DryFriction):
     """Friction of constant size ``level`` against the motion."""
 
-    level: Value = number(low=0.0, force=1, share=0.1, starts=(0.01, 0.3))
+    level: Value = number(low=0.0, force=1, share=0.1, bold=0.3)
 
     name: ClassVar[str] = "coulomb_friction"
     sentence: ClassVar[str] = "Dry friction of constant size that always opposes the motion."
@@ -58,9 +58,11 @@ class StribeckFriction(DryFriction):
     control of machines with friction", Automatica 30(7), 1994.
     """
 
-    sliding: Value = number(low=0.0, force=1, share=0.1)
-    breakaway: Value = number(low=0.0, force=1, share=0.1)
-    speed: Value = number(0.5, role="shape", low=1e-3, share=0.1, starts=(0.05, 0.15, 0.4), rate=1)
+    sliding: Value = number(low=0.0, force=1, share=0.1, bold=0.1)
+    breakaway: Value = number(low=0.0, force=1, share=0.1, bold=0.8)
+    speed: Value = number(
+        0.5, role="shape", low=1e-3, share=0.1, starts=(0.05, 0.15, 0.4), bold=0.15, rate=1
+    )
 
     name: ClassVar[str] = "stribeck_friction"
     sentence: ClassVar[str] = "Dry friction that holds harder at rest than it brakes in motion."

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from sims.host import HostSimulator
 
 
+#: Ranges of the readings by which zero lies outside them where a scale about zero means nothing.
+FAR = 5.0
+
+
 @dataclasses.dataclass(frozen=True)
 class SensorEffect(Effect):
     """A change of one state channel on its way to the log.
@@ -103,7 +107,7 @@ class SensorScale(SensorEffect):
 
         Between 290 and 310 K a scale about 0 K is next to nothing but an offset.
         """
-        reach = high - low
+        reach = FAR * (high - low)
         if low - reach <= 0.0 <= high + reach:
             return self
         return self.with_values(zero=float(0.5 * (low + high)))

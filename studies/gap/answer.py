@@ -53,9 +53,10 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
         allowed = quantity_text(tolerance, gap.unit)
         smaller = " What is named below is smaller than that." if result.effects else ""
         return f"Nothing that matters: the {ahead(gap)} is {before}, allowed is {allowed}.{smaller}"
-    if any(verdict.kind in ("confirmed", "ambiguous") for verdict in result.verdicts):
+    kinds = {verdict.kind for verdict in result.verdicts}
+    if kinds & {"confirmed", "ambiguous", "calibrated"}:
         return f"{_first(percent(gap.share.value))} of the gap is {_what(result)}."
-    if any(v.kind == "unexplained" for v in result.verdicts):
+    if "unexplained" in kinds:
         return f"The gap has no name: the {ahead(gap)} is {before}."
     floor = quantity_text(gap.noise_floor.value, gap.unit)
     return f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
@@ -65,7 +66,10 @@ def _what(result: GapResult) -> str:
     """What the gap is made of, certain names first."""
     certain = [v for v in result.verdicts if v.kind == "confirmed"]
     others = [v for v in result.verdicts if v.kind == "ambiguous"]
-    sure = listed(_by_place([_briefly(verdict, result) for verdict in certain]))
+    words = _by_place([_briefly(verdict, result) for verdict in certain])
+    if any(verdict.kind == "calibrated" for verdict in result.verdicts):
+        words.append("parameters that are off within their tolerance")
+    sure = listed(words)
     if not others:
         return sure
     if len(others) == 1:
@@ -123,6 +127,8 @@ def headline(verdict: Verdict, result: GapResult) -> str:
         return f"{_first(percent(verdict.share.value))} of the gap has no name."
     if verdict.kind == "needs_data":
         return _first(names_of(verdict.alternatives, "and")) + "."
+    if verdict.kind == "calibrated":
+        return f"Parameters moved within their tolerance: {_changes(verdict)}."
     name = _first(effect_name(label_of(verdict)))
     if verdict.kind == "minor":
         return f"{name}: {percent(verdict.share.value)} of the gap, not added."
@@ -139,6 +145,18 @@ def headline(verdict: Verdict, result: GapResult) -> str:
     if verdict.family:
         return f"{_first(verdict.family)}, form undecided: as {_lower(name)}, {numbers}."
     return f"{name}{shape(verdict, result)}: {numbers}."
+
+
+def _changes(verdict: Verdict) -> str:
+    """By how much parameters were moved."""
+    return listed(
+        [
+            f"{effect_name(name)} {change.value:+.3g}{unit_text(change.unit)}".replace(
+                "-", "\u2212"
+            )
+            for name, change in verdict.parameters.items()
+        ]
+    )
 
 
 def _named(field: str, number: Number) -> str:
@@ -163,6 +181,11 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     """What else there is to know of a verdict, each a clause without a full stop."""
     if verdict.kind == "unexplained":
         return _remainder_notes(verdict, result)
+    if verdict.kind == "calibrated":
+        return [
+            f"alone they take {percent(verdict.share.value)} of the gap off; which of them is off "
+            "is not known, and what else is missing may hide behind them"
+        ]
     if verdict.kind not in ("confirmed", "ambiguous"):
         return []
     found = [f"without it, {percent(verdict.share.value)} of the gap would be back"]

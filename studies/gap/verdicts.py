@@ -24,9 +24,12 @@ Tone = Literal["good", "warning", "bad", "neutral"]
 TONES: dict[str, Tone] = {
     "confirmed": "good",
     "ambiguous": "warning",
+    "calibrated": "neutral",
     "unexplained": "bad",
     "no_gap": "good",
 }
+#: Verdicts that have a banner of their own.
+BANNERS = ("confirmed", "ambiguous", "calibrated", "unexplained")
 #: Explanations listed.
 RIVALS = 12
 #: Sets of effects listed that make the same motion together.
@@ -44,7 +47,7 @@ def banners(result: GapResult, tolerance: float | None) -> list[Section]:
     sections: list[Section] = [Verdict(lead(result, tolerance), tone=tone, label="answer")]
     small = []
     for verdict in result.verdicts:
-        if verdict.kind in ("confirmed", "ambiguous", "unexplained") and not is_footnote(verdict):
+        if verdict.kind in BANNERS and not is_footnote(verdict):
             sections.append(banner(verdict, result))
         elif verdict.kind == "minor" or is_footnote(verdict):
             says = headline(verdict, result)

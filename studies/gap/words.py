@@ -13,6 +13,7 @@ from sims.effects.library import library
 KINDS = {
     "confirmed": "confirmed",
     "ambiguous": "not certain",
+    "calibrated": "calibrated",
     "minor": "minor",
     "needs_data": "this log cannot show",
     "unexplained": "unexplained",

@@ -32,9 +32,9 @@ def test_a_spring_rests_near_zero_or_what_was_measured(low, high):
 def test_a_scale_far_from_zero_is_one_about_the_middle():
     assert pool(-1.0, 1.0)["sensor_scale"].effect.zero == 0.0
     assert pool(0.5, 1.5)["sensor_scale"].effect.zero == 0.0
-    assert pool(90.0, 100.0)["sensor_scale"].effect.zero == pytest.approx(95.0)
-    scale = pool(90.0, 100.0)["sensor_scale"].effect.with_values(scale=0.1)
-    assert np.allclose(scale.read(np.array([90.0, 95.0, 100.0])), [89.5, 95.0, 100.5])
+    assert pool(290.0, 300.0)["sensor_scale"].effect.zero == pytest.approx(295.0)
+    scale = pool(290.0, 300.0)["sensor_scale"].effect.with_values(scale=0.1)
+    assert np.allclose(scale.read(np.array([290.0, 295.0, 300.0])), [289.5, 295.0, 300.5])
     assert np.allclose(scale.undo(scale.read(np.arange(9.0))), np.arange(9.0))
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from residual.gap.answer import Answer
 from residual.gap.candidates import Candidate
 from residual.gap.choice import takes_off
 from residual.gap.explain import FOOTNOTE
+from residual.gap.intervals import at_bound
 from residual.gap.tolerance import allowed, calibrated
 
 
@@ -32,9 +35,22 @@ def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
 
 
 def better(second: Answer, first: Answer) -> bool:
-    """Whether an answer with parameters free forecasts materially better than one without."""
+    """Whether an answer with parameters free forecasts materially better than one without.
+
+    Where nothing is named beside them, most parameters must lie inside their tolerance: what pulls
+    them all to its end is something else.
+    """
     search = first.found.search
+    if not second.key and _pinned(second) > 0.5:
+        return False
     before = search.validated[first.key].squares
     after = second.found.search.validated[second.key].squares
     gained, error = search.currency.difference(before, after)
     return gained > error and takes_off(search.currency, before, after)
+
+
+def _pinned(answer: Answer) -> float:
+    """Share of the free parameters that lie at an end of their tolerance."""
+    search = answer.found.search
+    fit, first = search.tried[answer.key], search.numbers(answer.key)
+    return float(np.mean([at_bound(fit, j) for j in range(first, len(fit.theta))]))
