@@ -17,6 +17,7 @@ from typing import Any
 import yaml
 
 import simgap_yaml
+from sims.model_files import located
 
 OURS = ("sims", "policy", "residual", "studies", "simgap")
 _IMPORT = re.compile(r"\w+(\.\w+)+")
@@ -36,25 +37,27 @@ def trusting(packages: Collection[str]) -> Iterator[None]:
         _allowed.reset(token)
 
 
-def check_file(path: str | Path) -> None:
+def check_file(path: str | Path) -> Any:
     """Refuse a file of settings that names classes of anybody else.
 
     Args:
         path: YAML or JSON.
 
+    Returns:
+        The settings, with the paths of robot models in full.
+
     Raises:
-        ValueError: It does, or is no YAML; the message says what to do.
+        ValueError: It does, is no YAML, or names a model that is not there; the message says what
+            to do.
     """
-    try:
-        settings = simgap_yaml.load(Path(path).read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path} is no YAML: {' '.join(str(error).split())}") from None
+    settings = located(simgap_yaml.read(path), path)
     strange = foreign(settings)
     if strange:
         raise ValueError(
             f"{path} names {strange!r:.80}, and whoever loads it runs that code: if you trust it, "
             f"say so with --trust {strange.partition('.')[0]:.40} or, in Python, trusted=[...]"
         )
+    return settings
 
 
 def foreign(settings: Any) -> str:

@@ -2,6 +2,8 @@
 
 ``python -m studies.benchmarks`` runs ``tests/benchmarks`` on one thread and prints the tables of
 ``docs/benchmarks.md``; it needs a checkout of the project and its extras ``test`` and ``bench``.
+``--mujoco`` measures the section on MuJoCo models. With ``--output docs/benchmarks.md`` each leaves
+what the other measured.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ ONE_THREAD = {
     name: "1"
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
 }
+MUJOCO = "## MuJoCo models\n"
 # What takes most of the time: large fits, and the second problem size of DDPG.
 QUICK = "not leo and not 15000 and not 100000 and not (3750 and GaussianProcessRegressor)"
 
@@ -60,6 +63,29 @@ NOTES = """\
   one Euler step per control period; it stands for what a step of a plain environment costs.
   Wrappers are left off. The one-step error is that against an adaptive method of order 8; for
   `Pendulum + Linear` against the true pendulum that it was fitted to."""
+
+
+ROBOTS = """\
+Measured by `python -m studies.benchmarks --mujoco`.
+
+Control steps per second of processor time, 1024 rows, own masses and dampings in each row or rows
+alike; medians of five rounds that take turns with `mujoco.rollout` of the bare model, of whose
+speed at least half is wanted:
+
+{speeds}
+
+[What they are](mujoco.md). On the same logs (arm2, three records of 7.5 s at 100 Hz, encoders
+0.5 mrad, rates unmeasured; errors over 0.3 s on a fourth from smoothed starts, which alone cost
+1.85 mrad) find_gap with its whole library, and `mujoco.sysid`, to which damping, frictionloss,
+quadratic damping and armature of every joint, mass and center of mass of every body are listed. A
+name of sysid is one whose 95 % interval excludes the nominal value. Processor seconds:
+
+{rivals}
+
+sysid fits the dynamics too and is quick. It does not say which of the significant values to
+believe: its start states are not fitted, and where one value cannot be seen most intervals are
+infinite.
+"""
 
 
 def build_parser() -> Parser:
@@ -145,6 +171,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         found = records(data)
         picture = Path(given.output).parent / FIGURE if given.output else None
         page = document(data, picture is not None and write_figure(found, picture) is not None)
+        if given.output and Path(given.output).is_file():
+            page = with_robots(page, robots_in(Path(given.output).read_text(encoding="utf-8")))
     except ValueError as problem:
         fail(f"{given.read}: {problem}" if given.read else str(problem))
     except OSError as problem:
@@ -168,15 +196,25 @@ def robots(output: str | None) -> None:
         rivals = beside.table(lambda text: print(text, file=sys.stderr, flush=True))
     except ImportError as problem:
         fail(f"{problem}; the comparison needs pip install 'simgap[mujoco]' 'mujoco[sysid]'")
-    page = (
-        "# MuJoCo models\n\nMeasured by `python -m studies.benchmarks --mujoco`.\n\n"
-        "Control steps per second, 1024 rows (own masses and dampings in each row, or alike):\n\n"
-        f"{found}\n\nOn the same logs (three records of 7.5 s at 100 Hz, encoders 0.5 mrad, no "
-        f"rates; errors over 0.3 s on a fourth):\n\n{rivals}\n"
-    )
+    page = f"{MUJOCO}\n{ROBOTS.format(speeds=found, rivals=rivals)}"
     print(page)
     if output:
-        atomic_write_text(output, page)
+        there = Path(output)
+        whole = there.read_text(encoding="utf-8") if there.is_file() else "# Benchmarks\n"
+        atomic_write_text(output, with_robots(whole, page))
+
+
+def robots_in(page: str) -> str:
+    """The section on MuJoCo models of a page; empty if it has none."""
+    _, heading, rest = f"\n{page}".partition(f"\n{MUJOCO}")
+    own, _, _ = rest.partition("\n## ")
+    return f"{MUJOCO}{own.rstrip()}\n" if heading else ""
+
+
+def with_robots(page: str, section: str) -> str:
+    """A page whose section on MuJoCo models, the last one, is this."""
+    rest = page.replace(robots_in(page), "") if robots_in(page) else page
+    return f"{rest.rstrip()}\n\n{section}" if section else page
 
 
 def measure(quick: bool) -> tuple[dict[str, Any], bool]:

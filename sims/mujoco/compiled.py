@@ -19,6 +19,8 @@ except ImportError as missing:  # pragma: no cover - depends on what is installe
         "MuJoCo models need the package mujoco, 3.17 or newer: pip install 'simgap[mujoco]'"
     ) from missing
 
+from sims.mujoco.contacts import touching_geoms
+
 #: Dry friction in MuJoCo is soft: held, a joint creeps. With these impedances it creeps ten times
 #: less than by default; they count only where frictionloss is above zero.
 HARD_FRICTION = (0.99, 0.999, 0.001)
@@ -54,7 +56,7 @@ class Source:
     @property
     def urdf(self) -> bool:
         """Whether it is a URDF."""
-        return self.path.suffix == ".urdf"
+        return self.path.suffix.lower() == ".urdf"
 
 
 def specification(source: Source) -> Any:
@@ -98,10 +100,7 @@ def model_text(source: Source) -> bytes | None:
     folder = source.path.parent.resolve()
     spec.compiler.meshdir = str(folder / spec.compiler.meshdir)
     spec.compiler.texturedir = str(folder / spec.compiler.texturedir)
-    try:
-        spec.compile()
-    except ValueError as error:
-        raise ValueError(f"{source.path}: {_one_line(error)}") from None
+    _compile(spec, source.path)
     return str(spec.to_xml()).encode()
 
 
@@ -113,9 +112,29 @@ def _read(path: Path) -> Any:
     except expat.ExpatError as error:
         raise ValueError(f"{path}: not well-formed XML: {error}") from None
     try:
-        return mujoco.MjSpec.from_file(str(path))
+        spec = mujoco.MjSpec.from_file(str(path))
     except ValueError as error:
         raise ValueError(f"{path}: {_one_line(error)}") from None
+    for mesh in spec.meshes:
+        mesh.file = _in_package(mesh.file, path)
+    return spec
+
+
+def _in_package(file: str, path: Path) -> str:
+    """The file behind ROS's ``package://name/...``: under a folder of that name around the model.
+
+    As it was, if it is no such name or the file is not there.
+    """
+    scheme, _, inside = file.partition("://")
+    if scheme != "package":
+        return file
+    name, _, rest = inside.partition("/")
+    for folder in path.resolve().parents:
+        places = [folder / name / rest, *([folder / rest] if folder.name == name else [])]
+        for place in places:
+            if place.is_file():
+                return str(place)
+    return file
 
 
 def compiled(source: Source) -> tuple[Any, dict[int, float]]:
@@ -134,16 +153,50 @@ def compiled(source: Source) -> tuple[Any, dict[int, float]]:
     for body in spec.bodies:
         body.simple = False
     late = _without_delays(spec, source.path)
-    try:
-        model = spec.compile()
-    except ValueError as error:
-        raise ValueError(f"{source.path}: {_one_line(error)}") from None
+    model = _compile(spec, source.path)
     _refuse_hidden_state(model, source.path)
     flags = mujoco.mjtDisableBit
     model.opt.disableflags |= int(flags.mjDSBL_AUTORESET) | int(flags.mjDSBL_CLAMPCTRL)
+    if not touching_geoms(model):  # a fifth of the time goes into looking for contacts
+        model.opt.disableflags |= int(flags.mjDSBL_CONTACT)
     soft = np.isclose(model.dof_solimp[:, :3], DEFAULT_FRICTION).all(axis=1)
     model.dof_solimp[soft & (model.dof_frictionloss == 0), :3] = HARD_FRICTION
     return model, late
+
+
+def _compile(spec: Any, path: Path) -> Any:
+    """The ``mujoco.MjModel``; what is not there is said with what was expected.
+
+    Raises:
+        ValueError: It cannot be compiled; the message is one line.
+    """
+    joints = [joint.name for joint in spec.joints]
+    for actuator in spec.actuators:
+        on = actuator.trntype in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+        if on and actuator.target not in joints:
+            raise ValueError(
+                f"{path}: actuator {actuator.name!r} drives joint {actuator.target!r}, which is "
+                f"not there; expected one of {', '.join(filter(None, joints)) or 'none'}"
+            )
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise ValueError(f"{path}: {_one_line(error)}{_missing_asset(spec, path)}") from None
+
+
+def _missing_asset(spec: Any, path: Path) -> str:
+    """Where the first file that a model lacks was expected; nothing if all are there."""
+    beside = path.parent.resolve()
+    meshes, pictures = beside / spec.compiler.meshdir, beside / spec.compiler.texturedir
+    for folder, assets in ((meshes, spec.meshes), (pictures, (*spec.textures, *spec.hfields))):
+        for asset in assets:
+            name = Path(asset.file).name if spec.strippath else asset.file
+            if name.startswith("package://"):
+                package, _, rest = name.removeprefix("package://").partition("/")
+                return f": expected {package}/{rest} in a folder above {beside}"
+            if name and not (folder / name).is_file():
+                return f": expected it at {folder / name}"
+    return ""
 
 
 def _without_delays(spec: Any, path: Path) -> dict[int, float]:

@@ -17,6 +17,7 @@ from residual.gap import GapResult
 from residual.logs import Finding
 from simgap_files import atomic_write_text, write_sealed
 from sims.loading import corrected_settings
+from sims.model_files import relative
 from studies.gap.answer import lead
 from studies.gap.report import write_report
 from studies.running.command import versions
@@ -51,7 +52,7 @@ def write_gap(
     with staged(Path(folder)) as stage:
         corrected = corrected_settings(config["simulator"], result.effects, record["hold"])
         about = "# The simulator with what find_gap added; loadable as --simulator corrected.yaml\n"
-        text = yaml.safe_dump(corrected, sort_keys=False)
+        text = yaml.safe_dump(relative(corrected, folder), sort_keys=False)
         atomic_write_text(stage / CORRECTED, about + text)
         for name, content in result.corrected.own_files().items():
             (stage / name).write_bytes(content)

@@ -111,12 +111,13 @@ def strengths(case: Case) -> dict[str, float]:
         low, high = 1e-4, 30.0
         for _ in range(12):
             middle = np.sqrt(low * high)
-            size = sign * middle * quantity.scale
+            size = max(sign * middle * quantity.scale, 0.95 * quantity.low)
             changed = simulator.with_effects([effect.with_values(**{field: size})])
-            if _deviation(simulator, changed, logs) > SIZE * NOISE:
-                high = middle
-            else:
+            # A motion that cannot be computed, as of a link without mass, is not near either.
+            if _deviation(simulator, changed, logs) <= SIZE * NOISE:
                 low = middle
+            else:
+                high = middle
         found[name] = float(max(sign * low * quantity.scale, 0.95 * quantity.low))
     return found
 

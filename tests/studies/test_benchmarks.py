@@ -229,3 +229,19 @@ def test_a_wrong_file_is_one_line_and_exit_code_2(tmp_path, capsys, content):
     said = capsys.readouterr().err
     assert said.startswith("error: ") and str(source) in said and said.count("\n") == 1
     assert not target.exists()
+
+
+def test_the_section_on_mujoco_models_and_the_rest_leave_each_other_alone(
+    measured, tmp_path, monkeypatch, capsys
+):
+    (tmp_path / "kept.json").write_text(json.dumps(measured))
+    page = tmp_path / "page.md"
+    monkeypatch.setattr("studies.robots.speed.speeds", lambda: [])
+    for size in ("12", "34"):
+        rivals = f"| {size} |"
+        monkeypatch.setattr("studies.robots.beside.table", lambda tell, said=rivals: said)
+        main(["--mujoco", "--output", str(page)])
+        main(["--read", str(tmp_path / "kept.json"), "--output", str(page)])
+        text = page.read_text()
+        assert text.count("# MuJoCo models") == text.count("# How it was measured") == 1
+        assert rivals in text and ("12" in text.partition("# MuJoCo")[2]) == (size == "12")

@@ -35,7 +35,31 @@ def test_files_that_are_missing_broken_or_lack_a_mesh(tmp_path):
         '<mujoco><asset><mesh name="arm" file="arm.stl"/></asset><worldbody><body><joint/>'
         '<geom type="mesh" mesh="arm"/></body></worldbody></mujoco>',
     )
-    assert "arm.stl" in refused(lacks)
+    assert f"expected it at {tmp_path / 'arm.stl'}" in refused(lacks)
+    lost = written(
+        tmp_path,
+        '<mujoco><worldbody><body><joint name="elbow"/><geom size="1"/></body></worldbody>'
+        '<actuator><motor name="drive" joint="elbw"/></actuator></mujoco>',
+    )
+    assert "'drive' drives joint 'elbw', which is not there; expected one of elbow" in refused(lost)
+
+
+def test_meshes_of_a_ros_package_are_found_around_the_urdf(tmp_path):
+    urdf = tmp_path / "my_arm" / "urdf" / "arm.urdf"
+    urdf.parent.mkdir(parents=True)
+    urdf.write_text(
+        '<robot name="arm"><link name="base"/><link name="link"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry>'
+        '<mesh filename="package://my_arm/meshes/link.obj"/></geometry></collision></link>'
+        '<joint name="elbow" type="continuous"><parent link="base"/><child link="link"/></joint>'
+        "</robot>"
+    )
+    assert "expected my_arm/meshes/link.obj in a folder above" in refused(urdf, motors=["all"])
+    mesh = tmp_path / "my_arm" / "meshes" / "link.obj"
+    mesh.parent.mkdir()
+    corners = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "v 0 0 1"]
+    mesh.write_text("\n".join([*corners, "f 1 3 2", "f 1 2 4", "f 1 4 3", "f 2 3 4"]))
+    assert MujocoSimulator(str(urdf), motors=["all"]).model.nmesh == 1
 
 
 def test_models_with_hidden_state_or_without_motion(tmp_path):
