@@ -181,7 +181,7 @@ def verdicts(
         )
     elif not answer.key and left.adequate and not search.beside:
         made.append(no_gap_verdict("no gap above noise"))
-    elif not left.adequate and left.ratio > FOOTNOTE:
+    elif not left.adequate and (left.ratio > FOOTNOTE or not made):
         made.append(remainder_verdict(left, table, answer.leads))
     for number, with_it in found.choice.minor.items():
         if number not in answer.key:

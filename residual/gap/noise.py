@@ -54,6 +54,18 @@ def driven_states(model: Model) -> list[int]:
     return [i for i, c in enumerate(channels) if c.kind in ("rate", "other")]
 
 
+def seen_driven(model: Model, samples: Samples) -> list[int]:
+    """Places in ``driven_states`` of what was measured itself, or by the position of its rate.
+
+    What nobody measured moves what was measured through the model alone. A free force on it as
+    well would fit a short window exactly, and leave no residual to read the noise from.
+    """
+    channels = model.simulator.physical_channels
+    seen = {channels[i].name for i in samples.measured}
+    columns = driven_states(model)
+    return [j for j, c in enumerate(columns) if {channels[c].name, channels[c].rate_of} & seen]
+
+
 def push(model: Model, samples: Samples) -> Array:
     """Change of the next state by a unit acceleration held over the interval, (n, n_s, driven)."""
     channels = model.simulator.physical_channels
@@ -80,8 +92,8 @@ def estimate(
 ) -> Floor:
     """Fit short windows by the model plus a smooth free force; what is left is noise.
 
-    The force is a cosine series over the window, for each driven state, so that a missing effect
-    does not count as noise however large it is.
+    The force is a cosine series over the window, for each driven state that was measured, so that a
+    missing effect does not count as noise however large it is.
 
     Args:
         sigma: First guess of the noise, (m,).
@@ -89,6 +101,7 @@ def estimate(
     """
     measured = samples.measured
     driven = driven_states(model)
+    pushed = seen_driven(model, samples)
     free = model.free
     if terms is None:
         terms = 4 if set(measured) & set(driven) else 3
@@ -98,8 +111,8 @@ def estimate(
     count, places = windows.index.shape
     phase = np.pi * (np.arange(places) + 0.5) / (places - 1)
     series = np.cos(np.outer(phase, np.arange(terms)))
-    unit = push(model, samples)
-    weight = np.zeros((count, len(driven) * terms))
+    unit = push(model, samples)[..., pushed]
+    weight = np.zeros((count, len(pushed) * terms))
     error = sigma
     for turn in range(iterations):
         slope = slopes(model, samples, nodes, theta, model.step, scale)
@@ -123,8 +136,9 @@ def estimate(
             sigma, error = _spread(samples, windows, left, leverage, sigma)
     slope = slopes(model, samples, nodes, theta, model.step, scale)
     force = np.zeros((len(samples), len(driven)))
-    local = np.einsum("wdt,lt->wld", weight.reshape(count, len(driven), terms), series)
-    force[windows.index[windows.inside]] = local[windows.inside]
+    local = np.einsum("wdt,lt->wld", weight.reshape(count, len(pushed), terms), series)
+    rows = windows.index[windows.inside]
+    force[rows[:, None], pushed] = local[windows.inside]
     return Floor(sigma, error, nodes, slope, force)
 
 

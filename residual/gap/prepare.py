@@ -112,13 +112,13 @@ def smooth_fitter(
         raise ValueError("no state channel was measured: every value in the trajectories is NaN")
     model = Model(simulator)
     nodes = paths.measured(model, samples, np.zeros(0))
-    scale = paths.variation(samples, nodes)
+    scale = _scales(simulator, samples, nodes)
     floor = noise.estimate(model, samples, nodes, np.zeros(0), noise.local_noise(samples), scale)
     least = FINEST * scale[samples.measured]
     seconds = horizon / (1 - LEAD)
     sigma = noise.with_walks(simulator, samples, np.maximum(floor.sigma, least), seconds)
     floor = dataclasses.replace(floor, sigma=sigma)
-    windows = cut(samples, floor.slope.by_state, _foreseen(simulator, samples, scale), seconds)
+    windows = cut(samples, floor.slope.by_state, scale, seconds)
     moving = np.array(noise.driven_states(model))
     most = min(AT_ONCE, STATES // len(scale)) if simulator.advances_rows_at_once else BY_ROW
     grouped = blocks(samples, windows, drive(samples, nodes, moving), most)
@@ -129,17 +129,13 @@ def smooth_fitter(
     return fitter.with_substeps(few), floor
 
 
-def _foreseen(simulator: HostSimulator, samples: Samples, scale: Array) -> Array:
-    """Scales by which to judge how the error of a start state grows.
-
-    The variation of a position that nobody measured is not known, so its channel's scale stands
-    for it: what moves nothing that was measured must not forbid a forecast.
-    """
+def _scales(simulator: HostSimulator, samples: Samples, nodes: Array) -> Array:
+    """Typical variation of every state; of what the log says nothing of, at least its scale."""
     channels = simulator.physical_channels
+    physical = paths.variation(samples, nodes[:, : len(channels)])
     usual = np.array([channel.scale for channel in channels])
-    seen = np.isin(np.arange(len(channels)), samples.measured)
-    moving = np.array([channel.kind == "rate" for channel in channels])
-    return np.where(seen | moving, scale, np.maximum(scale, usual))
+    hidden = paths.unseen(channels, samples.measured)
+    return np.where(hidden, np.maximum(physical, usual), physical)
 
 
 def weighted(fitter: SmoothFitter, fit: Fit, sigma: Array) -> SmoothFitter:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.candidates import Candidate, candidates
-from residual.gap.confirmation import CLEARLY, Claim, tie, where_it_matters
+from residual.gap.confirmation import CLEARLY, Claim, may_vanish, tie, where_it_matters
 from residual.gap.fitting import Fit
 from residual.gap.model import Model
 from residual.gap.search import Key, Search
@@ -74,10 +74,12 @@ def allow_for_parameters(
             ]
             claim = dataclasses.replace(claim, rivals=tuple(dict.fromkeys(rivals)))
         told.append(claim)
-    return [
-        dataclasses.replace(claim, calibration=True) if within(search, claim, tolerance) else claim
-        for claim in widened(search, key, told, beside.fit)
-    ]
+    final = []
+    for claim in widened(search, key, told, beside.fit):
+        if within(search, claim, tolerance) or may_vanish(search, claim):
+            claim = dataclasses.replace(claim, calibration=True)
+        final.append(claim)
+    return final
 
 
 def within(search: Search, claim: Claim, tolerance: float) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from residual.gap.confirmation import FEW, TOO_FEW, Claim
+from residual.gap.confirmation import FEW, TOO_FEW, Claim, may_vanish
 from residual.gap.fitting import Left
 from residual.gap.result import Blind, Doubt, Gap, Kind, Number, Span, Verdict
 from residual.gap.search import Key, Search
@@ -19,13 +19,6 @@ def nameable(search: Search, claim: Claim, blocks: int) -> bool:
     """Whether an effect has few enough rivals, a size, and data enough, to be named at all."""
     few = len(families(search, claim)) <= MOST_FAMILIES
     return few and blocks >= TOO_FEW and not may_vanish(search, claim)
-
-
-def may_vanish(search: Search, claim: Claim) -> bool:
-    """Whether none of an effect's strengths is known to be other than zero."""
-    strengths = [knob.field for knob in search.candidates[claim.number].knobs if knob.strength]
-    numbers = [claim.numbers[field] for field in strengths if field in claim.numbers]
-    return bool(numbers) and all(n.low <= 0 <= n.high and not n.at_bound for n in numbers)
 
 
 def families(search: Search, claim: Claim) -> set[str]:
@@ -69,7 +62,10 @@ def effect_verdict(
     if claim.alike:
         says.append(f"the same motion in these data: {', '.join(claim.alike)}")
     if claim.rivals:
-        says.append(f"these data cannot exclude {', '.join(claim.rivals)}")
+        rivals = dict.fromkeys(
+            f"{name} of another order" if name == str(effect) else name for name in claim.rivals
+        )
+        says.append(f"these data cannot exclude {', '.join(rivals)}")
     twins = tuple(dict.fromkeys((*claim.twins, *stand_ins)))
     if twins:
         says.append(f"the same motion as {', '.join(twins)}")
@@ -136,7 +132,7 @@ def calibrated_verdict(search: Search, key: Key) -> Verdict:
 def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdict:
     """What has no name."""
     share = Span(1 - gap.share.value, 1 - gap.share.high, 1 - gap.share.low)
-    says = f"{100 * share.value:.2g} % of the gap has no name: {left.ratio:.3g} times the noise"
+    says = f"{100 * share.value:.3g} % of the gap has no name: {left.ratio:.3g} times the noise"
     if left.force:
         says += f"; it looks like a force that follows {left.force}"
     if leads:

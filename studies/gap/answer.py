@@ -88,7 +88,8 @@ def _briefly(verdict: Verdict, result: GapResult) -> str:
 
 
 def _with_rivals(verdict: Verdict, result: GapResult) -> str:
-    name, others = _briefly(verdict, result), rivals(verdict)
+    name = _briefly(verdict, result)
+    others = [label for label in rivals(verdict) if label != label_of(verdict)]
     if not others:
         return f"perhaps {name}"
     if len(others) <= FEW_RIVALS:
@@ -112,7 +113,7 @@ def _short(verdict: Verdict, result: GapResult) -> str:
 
 
 def rivals(verdict: Verdict) -> tuple[str, ...]:
-    """Effects of another kind that these data cannot exclude."""
+    """Effects of another kind that these data cannot exclude; its own label is another order."""
     known = {*verdict.same_motion, *verdict.form}
     return tuple(label for label in verdict.alternatives if label not in known)
 
@@ -190,11 +191,12 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     found = [f"without it, {percent(verdict.share.value)} of the gap would be back"]
     found += [if_exact(number) for number in verdict.parameters.values() if much_surer(number)]
     doubts = [DOUBTS[doubt] for doubt in verdict.doubts if doubt != "rivals"]
-    others = rivals(verdict)
+    own = label_of(verdict)
+    if own in rivals(verdict):
+        found.append("not certain: of another order it would do nearly as well")
+    others = [label for label in rivals(verdict) if label != own]
     if others:
-        found.append(
-            f"one of {names_of((label_of(verdict), *others))}: these data cannot tell which"
-        )
+        found.append(f"one of {names_of((own, *others))}: these data cannot tell which")
     if doubts:
         found.append(f"not certain: {listed(doubts)}")
     if verdict.form:

@@ -109,7 +109,7 @@ def apart(result: GapResult) -> list[Section]:
             continue
         label = label_of(answer)
         groups = (
-            (rivals(answer), "these data", False),
+            ([name for name in rivals(answer) if name != label], "these data", False),
             (answer.form, "these data, and it is of the same family", False),
             (answer.same_motion, "the same motion in any data", True),
             (

@@ -108,6 +108,17 @@ def test_a_provisional_answer_says_how_much_more_data_would_do():
     assert "NOT CERTAIN, PROVISIONAL" in summary(result(DELAY, blocks=5))
 
 
+def test_another_order_of_a_cogging_is_no_other_effect():
+    cogging = Verdict(
+        "ambiguous", "cogging", "pivot", {"sine": Number(0.01, 0.005, 0.015, "N m")},
+        ("cogging@pivot",), "", "never parsed", Span(0.8, 0.7, 0.9), doubts=("rivals",),
+    )  # fmt: skip
+    assert "perhaps cogging" in lead(result(cogging))
+    assert "not certain: of another order it would do nearly as well" in notes(
+        cogging, result(cogging)
+    )
+
+
 def test_what_moves_alike_is_told_apart_from_what_these_data_leave_open():
     assert "no motion can tell it from length or gravity" in notes(MASS, result(MASS))
     assert headline(FRICTION, result(MASS, FRICTION)).startswith(

@@ -1,0 +1,96 @@
+"""States that nobody measured: their start is free in every window, and they are no noise."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from residual.gap import find_gap
+from residual.gap.prepare import prepare
+from residual.trajectories import Trajectory
+from sims.equations import EquationOfMotion, FirstOrderSystem
+from sims.simulator import Channel, Parameter
+
+NOISE = 0.01
+
+
+class Tanks(FirstOrderSystem):
+    """A pump into an upper tank, which runs into a lower one."""
+
+    dt = 4.0
+    state_channels = (
+        Channel("upper", "m", "other", scale=5.0),
+        Channel("lower", "m", "other", scale=5.0),
+    )
+    action_channels = (Channel("pump", "V", "input", scale=5.0, low=0.0, high=10.0),)
+    parameters = {"outlet": Parameter(0.05, "m^0.5/s", "of the lower tank", low=1e-4)}  # noqa: RUF012
+
+    def derivative(self, x, u, p):
+        upper, lower = np.sqrt(np.maximum(x, 0.0)).T
+        down = 0.05 * upper
+        return np.stack([0.05 * u[:, 0] - down, down - p.outlet * lower], axis=1)
+
+
+def levels(outlet, n=400, seed=0):
+    """The lower level alone, integrated by SciPy; the log begins with water in both tanks."""
+    rng = np.random.default_rng(seed)
+    pump = np.repeat(rng.uniform(2.0, 4.0, n // 8), 8)
+    state, seen = np.array([5.0, 6.0]), np.full((n + 1, 2), np.nan)
+    for k in range(n + 1):
+        seen[k, 1] = state[1] + rng.normal(0, NOISE)
+        if k < n:
+            flow = solve_ivp(
+                lambda _, x, u: [
+                    0.05 * (u - np.sqrt(x[0])), 0.05 * np.sqrt(x[0]) - outlet * np.sqrt(x[1])
+                ],
+                (0, 4.0), state, args=(pump[k],), rtol=1e-8, atol=1e-8,
+            )  # fmt: skip
+            state = flow.y[:, -1]
+    return Trajectory("tanks", 4.0 * np.arange(n + 1), seen, pump[:, None])
+
+
+class Swing(EquationOfMotion):
+    """A pendulum of which a gyroscope alone is logged."""
+
+    dt = 0.02
+    state_channels = (
+        Channel("angle", "rad", "position", angle=True),
+        Channel("rate", "rad/s", "rate", rate_of="angle", scale=3.0),
+    )
+    action_channels = ()
+    parameters = {"length": Parameter(0.5, "m", "to the bob", low=0.01)}  # noqa: RUF012
+
+    def acceleration(self, q, v, u, force, p):
+        return np.stack([-9.81 / p.length * np.sin(q[:, 0]) + force[:, 0]], axis=1)
+
+
+def gyro(n=1200, seed=0):
+    """Rates alone, integrated by SciPy."""
+    rng = np.random.default_rng(seed)
+    times = 0.02 * np.arange(n + 1)
+    path = solve_ivp(
+        lambda _, x: [x[1], -9.81 / 0.5 * np.sin(x[0])],
+        (0, times[-1]), [1.2, 0.0], t_eval=times, rtol=1e-9, atol=1e-9,
+    ).y.T  # fmt: skip
+    seen = np.column_stack([np.full(n + 1, np.nan), path[:, 1] + rng.normal(0, NOISE, n + 1)])
+    return Trajectory("gyro", times, seen, np.zeros((n, 0)))
+
+
+@pytest.mark.parametrize(
+    ("simulator", "run", "horizon"), [(Tanks(), levels(0.05), 80.0), (Swing(), gyro(), 0.5)]
+)
+def test_noise_is_found_beside_a_state_that_nobody_measured(simulator, run, horizon):
+    (sigma,) = prepare(simulator, [run], horizon).floor.sigma
+    assert 0.7 * NOISE < sigma < 1.6 * NOISE
+
+
+def test_a_right_simulator_has_no_gap_although_a_level_was_not_measured():
+    found = find_gap(Tanks(), [levels(0.05)], horizon=80.0, minutes=1, parameter_tolerance=0)
+    assert {v.kind for v in found.verdicts} <= {"no_gap", "needs_data"}
+    assert found.gap.before.value < 3 * NOISE
+
+
+def test_a_wrong_outlet_is_named_below_a_tank_without_a_sensor():
+    found = find_gap(Tanks(), [levels(0.06)], horizon=80.0, minutes=1)
+    first = found.verdicts[0]
+    assert "outlet" in {first.effect, *first.same_motion}
+    assert first.parameters["change"].value == pytest.approx(0.01, rel=0.2)
