@@ -13,7 +13,7 @@ import math
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from simgap_files import atomic_path
 VERSION = 2
 #: What may always be unpacked, in bytes; more only if the file is not much smaller than that.
 _SMALL, _RATIO = 2**28, 100
+_END_RECORD = 22  # bytes before the comment, with which a ZIP archive ends (APPNOTE 4.3.16)
 _HEADERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
@@ -71,7 +72,11 @@ def read_npz(path: str | Path, content: bytes | None = None) -> dict[str, NDArra
         raise FileNotFoundError(f"there is no file {path}")
     try:
         size = Path(path).stat().st_size if content is None else len(content)
-        with zipfile.ZipFile(path if content is None else io.BytesIO(content)) as archive:
+        with (
+            open(path, "rb") if content is None else io.BytesIO(content) as stream,
+            zipfile.ZipFile(stream) as archive,
+        ):
+            _check_end(stream, archive)
             entries = archive.infolist()
             check_unpacked(path, sum(entry.file_size for entry in entries), size)
             arrays = {e.filename.removesuffix(".npy"): _array(archive, e) for e in entries}
@@ -93,6 +98,13 @@ def read_npz(path: str | Path, content: bytes | None = None) -> dict[str, NDArra
         if says.get("checksum") != _checksum(arrays):
             raise FileError(f"{path} is damaged: its content does not have its checksum")
     return arrays
+
+
+def _check_end(stream: BinaryIO, archive: zipfile.ZipFile) -> None:
+    """What lost its comment, or its list of arrays, has bytes behind its end, or no arrays."""
+    stream.seek(-_END_RECORD - len(archive.comment), io.SEEK_END)
+    if not archive.infolist() or stream.read(4) != b"PK\x05\x06":
+        raise ValueError("it does not end as an archive of arrays does")
 
 
 def _array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:

@@ -5,6 +5,7 @@ Importing this module makes jsonargparse, and so every command, read YAML this w
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import jsonargparse
@@ -21,6 +22,34 @@ def load(text: str) -> Any:
         yaml.YAMLError: It is no YAML, nested too deep, or refers to itself.
     """
     return _ending(yaml.safe_load, text)
+
+
+def read(path: str | Path) -> Any:
+    """Plain values from a file of settings.
+
+    Raises:
+        ValueError: There is no such file, or it is no YAML; the message names file and place.
+    """
+    try:
+        return load(Path(path).read_text(encoding="utf-8"))
+    except (FileNotFoundError, IsADirectoryError):
+        raise ValueError(f"{path}: there is no such file, expected one of settings") from None
+    except UnicodeDecodeError as error:
+        told = f"byte {error.object[error.start]:#x} at {error.start} is not UTF-8"
+        raise ValueError(f"{path} is no YAML: {told}; save it as UTF-8 text") from None
+    except yaml.YAMLError as error:
+        raise ValueError(f"{path} is no YAML: {problem(error)}") from None
+
+
+def problem(error: yaml.YAMLError) -> str:
+    """What is wrong with a text, and where, in one line."""
+    mark = getattr(error, "problem_mark", None)
+    if isinstance(error, yaml.MarkedYAMLError) and mark is not None:
+        said = " ".join(filter(None, (error.context, error.problem)))
+        return f"line {mark.line + 1}, column {mark.column + 1}: {said}"
+    if isinstance(error, yaml.reader.ReaderError):
+        return f"character {error.position + 1}: {error.reason}"
+    return " ".join(str(error).split())
 
 
 def _load_option(text: str) -> Any:

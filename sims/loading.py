@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import importlib
 import importlib.util
 import inspect
+import pydoc
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -220,27 +222,34 @@ def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
     try:
         return _parser().parse_object({"simulator": value})
     except (jsonargparse.ArgumentError, TypeError) as error:
-        lacking = _not_found(value)
+        lacking = not_found(value)
         raise ValueError(f"simulator {source}: {lacking or _one_line(error)}") from None
 
 
-def _not_found(source: str | Mapping[str, Any]) -> str:
-    """Which module of a class path, or of a YAML file of them, Python cannot find; or nothing."""
+def not_found(source: str | Mapping[str, Any]) -> str:
+    """Which class of an import path, or of a YAML file of them, Python cannot find; or nothing.
+
+    What a file names has to be trusted already: to look for a class is to import its module.
+    """
     settings: Any = source
     if isinstance(source, str) and Path(source).suffix in (".yaml", ".yml"):
         if not Path(source).is_file():
             return "there is no such file"
         try:
-            settings = simgap_yaml.load(Path(source).read_text(encoding="utf-8"))
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            return f"it is no YAML: {_one_line(error)}"
+            settings = simgap_yaml.read(source)
+        except ValueError as error:
+            return str(error)
     for path in _class_paths(settings):
-        module = path.partition(".")[0]
+        module, _, inside = path.partition(".")
         if module and importlib.util.find_spec(module) is None:
             return (
                 f"there is no module {module!r} for {path}; start Python in the folder that "
                 "holds it, or name that folder in PYTHONPATH"
             )
+        # What goes wrong while it is imported is told by whoever loads it.
+        with contextlib.suppress(pydoc.ErrorDuringImport):
+            if inside and pydoc.locate(path) is None:
+                return f"there is no class {path}; expected MODULE.CLASS, as import would find it"
     return ""
 
 

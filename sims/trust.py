@@ -50,11 +50,7 @@ def check_file(path: str | Path) -> Any:
         ValueError: It does, is no YAML, or names a model that is not there; the message says what
             to do.
     """
-    try:
-        settings = simgap_yaml.load(Path(path).read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path} is no YAML: {' '.join(str(error).split())}") from None
-    settings = located(settings, path)
+    settings = located(simgap_yaml.read(path), path)
     strange = foreign(settings)
     if strange:
         raise ValueError(

@@ -31,10 +31,11 @@ def describe(path: str | Path) -> str:
     Raises:
         ValueError: It cannot be read.
     """
-    signals = signals_of(path)
+    signals, others = signals_of(path)
     width = max(map(len, signals), default=5)
     lines = [f"{path}", f"  {'field':<{width}}  {'samples':>8}  {'Hz':>8}  range"]
-    return "\n".join(lines + [_line(name, signal, width) for name, signal in signals.items()])
+    lines += [_line(name, signal, width) for name, signal in signals.items()]
+    return "\n".join([*lines, *(f"  no numbers: {reason}" for reason in others.values())])
 
 
 def _line(name: str, signal: Signal, width: int) -> str:

@@ -13,9 +13,17 @@ from residual.gap.aliases import aliases
 from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
 from residual.gap.candidates import candidates
 from residual.gap.data import examine
+from residual.gap.excerpt import excerpt
 from residual.gap.explain import Explanation, explain
 from residual.gap.horizon import usual_horizon
-from residual.gap.numerics import fits_better, forecast_error, held_as, held_otherwise, how_held
+from residual.gap.numerics import (
+    fits_better,
+    forecast_error,
+    held_as,
+    held_otherwise,
+    how_held,
+    stride_for,
+)
 from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import GapResult
 from residual.gap.tolerance import KNOWN
@@ -91,9 +99,11 @@ def find_gap(
     examined = examine(simulator, trajectories)
     runs = examined.trajectories
     quality = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
+    horizon = horizon or usual_horizon(simulator, runs)
+    runs, left_out = excerpt(runs, stride_for(runs, horizon))
+    quality += [left_out] if left_out else []
     for says in quality:
         tell(says)
-    horizon = horizon or usual_horizon(simulator, runs)
     groups, sets = aliases(simulator, offered)
     # Of effects that make the same motion the first stands for all.
     kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
@@ -132,7 +142,8 @@ def find_gap(
         table = summed_up(answer)
         apart = None
         if held:
-            apart = judged_apart(answer, prepared, examine(simulator, held).trajectories, table)
+            others, _ = excerpt(examine(simulator, held).trajectories, stride_for(held, horizon))
+            apart = judged_apart(answer, prepared, others, table)
         clock.lap("forecast")
     return told(answer, table, apart, sets, tolerance, quality, clock.laps)
 

@@ -15,6 +15,9 @@ from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
+#: Windows that are fitted in one batch: a long record takes little memory beside its own rows.
+AT_ONCE = 4096
+
 
 @dataclasses.dataclass(frozen=True)
 class Noise:
@@ -95,40 +98,29 @@ def estimate(
     count, places = windows.index.shape
     phase = np.pi * (np.arange(places) + 0.5) / (places - 1)
     series = np.cos(np.outer(phase, np.arange(terms)))
-    unit = push(model, samples)[windows.index]
-    forces = np.einsum("wlsd,lt->wlsdt", unit, series).reshape(*unit.shape[:3], -1)
-    weight = np.zeros((count, forces.shape[-1]))
-    f, q = len(free), forces.shape[-1]
-    ridge = 1e-2 / scale[free]
+    unit = push(model, samples)
+    weight = np.zeros((count, len(driven) * terms))
     error = sigma
     for turn in range(iterations):
         slope = slopes(model, samples, nodes, theta, model.step, scale)
-        gaps = defects(samples, slope, nodes)[windows.index]
-        added = (forces @ weight[:, None, :, None])[..., 0]
-        response = carry(
-            windows, slope.by_state, start,
-            np.concatenate([forces, (gaps + added)[..., None]], axis=3),
-        )  # fmt: skip
-        shown = observe(samples, windows, slope, response, sigma)
-        residual = (misfit(samples, windows, slope, sigma) - shown[..., -1]).reshape(count, -1)
-        columns = shown[..., :-1].reshape(count, -1, f + q)
-        pad = np.zeros((count, f, f + q))
-        pad[:, range(f), range(f)] = ridge
-        basis, triangle = np.linalg.qr(np.concatenate([columns, pad], axis=1))
-        # A force that moves nothing measured has no direction of its own, and takes no freedom.
-        basis *= (np.abs(np.einsum("wii->wi", triangle)) > 1e-9)[:, None, :]
-        basis_rows = basis[:, : residual.shape[1]]
-        triangle = triangle + 1e-12 * np.eye(f + q)
-        move = np.linalg.solve(triangle, basis_rows.transpose(0, 2, 1) @ residual[..., None])
-        left = residual - (columns @ move)[..., 0]
-        move = move[..., 0]
-        move[:, :f] = np.clip(move[:, :f], -3 * scale[free], 3 * scale[free])
-        shift = (response[..., :-1] @ move[:, None, :, None])[..., 0] + response[..., -1]
-        weight = weight + move[:, f:]
+        gaps = defects(samples, slope, nodes)
         nodes = nodes.copy()
-        nodes[windows.index[windows.inside]] += shift[windows.inside]
+        found = []
+        for begin in range(0, count, AT_ONCE):
+            part = slice(begin, begin + AT_ONCE)
+            some = windows[part]
+            forces = np.einsum("wlsd,lt->wlsdt", unit[some.index], series)
+            forces = forces.reshape(*forces.shape[:3], -1)
+            shift, change, *seen = _refitted(
+                samples, some, slope, gaps[some.index], forces, weight[part], start, sigma,
+                scale[free],
+            )  # fmt: skip
+            weight[part] += change
+            nodes[some.index[some.inside]] += shift[some.inside]
+            found.append(seen)
         if turn >= 1:
-            sigma, error = _spread(samples, windows, basis_rows, left, sigma)
+            left, leverage = (np.concatenate(parts) for parts in zip(*found, strict=True))
+            sigma, error = _spread(samples, windows, left, leverage, sigma)
     slope = slopes(model, samples, nodes, theta, model.step, scale)
     force = np.zeros((len(samples), len(driven)))
     local = np.einsum("wdt,lt->wld", weight.reshape(count, len(driven), terms), series)
@@ -136,14 +128,47 @@ def estimate(
     return Floor(sigma, error, nodes, slope, force)
 
 
+def _refitted(
+    samples: Samples, windows: Windows, slope: Slope, gaps: Array, forces: Array, weight: Array,
+    start: Array, sigma: Array, scale: Array,
+) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+    """A Gauss-Newton turn of some windows.
+
+    Returns:
+        What to add to the nodes (W, L, n_s) and to the weights of the forces (W, q), and of every
+        whitened measurement what is left and how far the fit follows it, (W, L m) each.
+    """
+    count, f = len(windows), start.shape[1]
+    columns = f + forces.shape[-1]
+    added = (forces @ weight[:, None, :, None])[..., 0]
+    injected = np.concatenate([forces, (gaps + added)[..., None]], axis=3)
+    response = carry(windows, slope.by_state, start, injected)
+    shown = observe(samples, windows, slope, response, sigma)
+    residual = (misfit(samples, windows, slope, sigma) - shown[..., -1]).reshape(count, -1)
+    seen = shown[..., :-1].reshape(count, -1, columns)
+    pad = np.zeros((count, f, columns))
+    pad[:, range(f), range(f)] = 1e-2 / scale
+    basis, triangle = np.linalg.qr(np.concatenate([seen, pad], axis=1))
+    # A force that moves nothing measured has no direction of its own, and takes no freedom.
+    basis *= (np.abs(np.einsum("wii->wi", triangle)) > 1e-9)[:, None, :]
+    basis = basis[:, : residual.shape[1]]
+    triangle = triangle + 1e-12 * np.eye(columns)
+    move = np.linalg.solve(triangle, basis.transpose(0, 2, 1) @ residual[..., None])
+    left = residual - (seen @ move)[..., 0]
+    move = move[..., 0]
+    move[:, :f] = np.clip(move[:, :f], -3 * scale, 3 * scale)
+    shift = (response[..., :-1] @ move[:, None, :, None])[..., 0] + response[..., -1]
+    return shift, move[:, f:], left, (basis**2).sum(axis=2)
+
+
 def _spread(
-    samples: Samples, windows: Windows, basis: Array, left: Array, sigma: Array
+    samples: Samples, windows: Windows, left: Array, leverage: Array, sigma: Array
 ) -> tuple[Array, Array]:
     """Noise of every channel from residual and leverage, windows that did not settle left out."""
     measured = samples.measured
     count, places = windows.index.shape
     valid = np.isfinite(samples.seen[:, measured])[windows.index] & windows.inside[..., None]
-    leverage = (basis**2).sum(axis=2).reshape(count, places, -1)
+    leverage = leverage.reshape(count, places, -1)
     square = (left**2).reshape(count, places, -1)
     total = square.sum(axis=(1, 2))
     settled = total < 12 * np.median(total) + 1e-300

@@ -30,6 +30,9 @@ class Windows:
     def __len__(self) -> int:
         return len(self.index)
 
+    def __getitem__(self, part: slice) -> Windows:
+        return Windows(self.index[part], self.inside[part], self.run[part])
+
     @classmethod
     def cut(cls, pieces: list[tuple[int, int, int]]) -> Windows:
         """Windows from (run, first row, one past last row)."""

@@ -88,9 +88,10 @@ def check_rate(position: Signal, rate: Signal, where: str) -> list[Finding]:
             mended = min(_misfit(on_position * m, on_rate * i, turning) for m, i in spans)
             if mended < min(0.3, as_is / 3):
                 raise ValueError(
-                    f"column {signal.column!r}: {signal.channel.name!r} {_looks(fix)}: set {fix} "
-                    f"(the change of {position.channel.name!r} is not the integral of "
-                    f"{rate.channel.name!r}, and would be then)"
+                    f"column {signal.column!r}: {signal.channel.name!r} {_looks(fix)}: set {fix}"
+                    f"{_or_time(on_rate / on_position)} (the change of "
+                    f"{position.channel.name!r} is not the integral of {rate.channel.name!r}, and "
+                    "would be then)"
                 )
     if not math.isfinite(as_is):
         return []
@@ -159,6 +160,12 @@ _WORDS = {
 def _looks(fix: str) -> str:
     unit = fix.removeprefix("unit: ")
     return "has the wrong sign" if unit == fix else f"looks like {_WORDS.get(unit, unit)}"
+
+
+def _or_time(factor: float) -> str:
+    """Times in another unit than seconds change the integral of a rate as its own unit does."""
+    found = [n for n, unit in UNITS.items() if unit.base == "s" and unit.factor == factor != 1]
+    return f", or unit: {found[0]} for the time" if found else ""
 
 
 def _repairs(position: Signal, rate: Signal) -> list[tuple[Signal, str, tuple[float, float]]]:

@@ -36,7 +36,7 @@ def read_table(
         LogError: The file cannot be read, or does not look like a table.
     """
     if not path.exists():
-        raise LogError("there is no such file", path)
+        raise LogError("there is no such file, expected a log; mend the path", path)
     if not path.is_file():
         raise LogError("this is not a file; give the log files themselves", path)
     suffix = path.suffix.lower()

@@ -65,7 +65,9 @@ def read_hdf5(path: Path) -> Table:
         raise LogError(str(error), path) from None
     # Broken bytes make the library raise nearly anything.
     except Exception as error:
-        raise LogError(f"cannot be read as HDF5 ({shortened(str(error))})", path) from None
+        raise LogError(
+            f"cannot be read as HDF5 ({shortened(str(error))}); write the file again", path
+        ) from None
     if not episodes:
         return _joined(path, [single], None)
     order = sorted(episodes)

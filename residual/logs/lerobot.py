@@ -45,7 +45,9 @@ def read_lerobot(path: Path) -> Table:
             check_parquet(opened, file.stat().st_size)
             table = opened.read()
         except Exception as error:  # broken bytes raise nearly anything
-            raise LogError(f"cannot be read as Parquet ({shortened(str(error))})", file) from error
+            raise LogError(
+                f"cannot be read as Parquet ({shortened(str(error))}); write the file again", file
+            ) from error
         columns: dict[str, Any] = {}
         for name in table.column_names:
             values = table[name].to_numpy()

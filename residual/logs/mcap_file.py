@@ -49,7 +49,9 @@ def read_mcap(path: Path) -> dict[str, Signal]:
         raise
     except Exception as error:  # on broken bytes these libraries raise nearly anything
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise LogError(f"cannot be read as MCAP ({shortened(reason)})", path) from error
+        raise LogError(
+            f"cannot be read as MCAP ({shortened(reason)}); write the file again", path
+        ) from error
     if not rows:
         raise LogError("holds no message with a number", path)
     stamped = all(stamp is not None for messages in rows.values() for _, stamp, _ in messages)

@@ -65,7 +65,7 @@ def open_log(
             )
     suffix = path.suffix.lower()
     if suffix in (*HDF5, *MCAP) and not path.is_file():
-        raise LogError("there is no such file", path)
+        raise LogError("there is no such file, expected a log; mend the path", path)
     if suffix in MCAP:
         signals = read_mcap(path)
         return on_one_clock(path, signals, columns, states, actions, findings), columns
@@ -77,26 +77,32 @@ def open_log(
     return read_table(path, columns.delimiter, columns.header, columns.comment), columns
 
 
-def signals_of(source: str | Path) -> dict[str, Signal]:
-    """Every field of a file with its times, for a look at what there is.
+def signals_of(source: str | Path) -> tuple[dict[str, Signal], dict[str, str]]:
+    """Every field of a file with its times, for a look at what there is; and which hold no numbers.
 
     Fields of a table without a column ``time`` have the numbers of its rows for times.
+
+    Returns:
+        Signals by name, and for all other fields what was found in place of a number.
+
+    Raises:
+        LogError: It cannot be read.
     """
     path = Path(source)
     if path.suffix.lower() in MCAP:
-        return read_mcap(path)
+        return read_mcap(path), {}
     table, _ = open_log(path, 1, LogFormat(), (), (), [])
     times = np.arange(len(table), dtype=float)
     clock = next((name for name in ("time", lerobot.TIME) if name in table.columns), None)
     if clock is not None:
         times = table.numbers(clock)
-    found = {}
+    found, others = {}, {}
     for name in table.names:
         try:
             found[str(name)] = Signal(times, table.numbers(name), "")
-        except LogError:
-            continue
-    return found
+        except LogError as error:
+            others[str(name)] = str(error)
+    return found, others
 
 
 def _episodes(columns: LogFormat, column: str) -> LogFormat:

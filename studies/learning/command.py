@@ -60,6 +60,10 @@ def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
     except ValueError as error:
         fail(str(error))
     check_output(output or home)
+    if execution.backend != "local" and not grid:
+        fail(
+            f"--backend {execution.backend} runs the trials of a grid, expected a config with grid:"
+        )
     if grid:
         name = Path(str(given.config[0])).stem if given.config else "grid"
         target = Path(output) if output else home / name

@@ -25,13 +25,16 @@ import jsonargparse
 import yaml
 
 import simgap_yaml
+from sims.loading import not_found
 from sims.model_files import located, model_settings, names_model
 from sims.trust import check_file, named_packages, trusting
 
 _DEBUG, _DEBUG_VARIABLE, _TRUST = "--debug", "SIMGAP_DEBUG", "--trust"
 _SIMULATORS = ("--simulator", "--corrected")
+_CLASSES = (*_SIMULATORS, "--estimator")
 # What a check of a disk writes before the work: less would fit on a disk that is full.
 _PROBE = bytes(2**16)
+_IMPORT_PATH = re.compile(r"\w+(\.\w+)+")
 _HOME = Path(__file__).parents[2]
 _LIBRARIES = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "purelib", "platlib")]
 _PACKAGES = ("torch", "scikit-learn", "gpytorch", "pymunk", "numpy", "scipy", "gymnasium")
@@ -61,13 +64,12 @@ class Parser(jsonargparse.ArgumentParser):
         try:
             for i, text in enumerate(given):
                 name, equals, value = text.partition("=")
+                _check_given(name, value if equals else "".join(given[i + 1 : i + 2]))
                 if name in _SIMULATORS and equals:
                     given[i] = f"{name}={_simulator(value)}"
                 elif name in _SIMULATORS and i + 1 < len(given):
                     given[i + 1] = _simulator(given[i + 1])
             return super().parse_args(given, *rest, **options)
-        except UnicodeDecodeError as error:
-            self.error(f"a settings file is not UTF-8 text ({error}): save it as UTF-8", error)
         except ValueError as error:
             self.error(str(error), error)
 
@@ -83,8 +85,8 @@ class Parser(jsonargparse.ArgumentParser):
         """As usual; a robot's model file, also one beside the config, may be the simulator."""
         try:
             given = simgap_yaml.load(content)
-        except yaml.YAMLError:
-            given = None  # whoever reads it next says what is wrong
+        except yaml.YAMLError as error:
+            raise ValueError(f"{path} is no YAML: {simgap_yaml.problem(error)}") from None
         # What a config names is the user's own choice, as what stands on the command line is.
         with trusting(named_packages(given)):
             if path and names_model(given):
@@ -117,6 +119,25 @@ class Parser(jsonargparse.ArgumentParser):
 def _simulator(value: str) -> str:
     settings = _settings(value)
     return json.dumps(settings) if settings else value
+
+
+def _check_given(name: str, value: str) -> None:
+    """Refuse files of settings, and classes, that are not there, before the parser tries them.
+
+    Raises:
+        ValueError: The message names the option, and the file or the class.
+    """
+    if not name.startswith("--") or name == "--output":
+        return
+    if value.endswith((".yaml", ".yml")):
+        try:
+            simgap_yaml.read(value)
+        except ValueError as error:
+            raise ValueError(f"{name} {error}") from None
+    elif name in _CLASSES and _IMPORT_PATH.fullmatch(value) and not Path(value).exists():
+        lacking = not_found(value)
+        if lacking:
+            raise ValueError(f"{name}: {lacking}")
 
 
 def _settings(source: str | Path) -> dict[str, Any] | None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -33,6 +34,7 @@ ONE_THREAD = {
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
 }
 CONNECT_SECONDS = 20
+_RAY_ON_LOOPBACK = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
 _LOST = "the {} at {} was lost: start it and give the same command again; nothing finished is lost"
 
 
@@ -151,13 +153,19 @@ def _dask(scheduler: str) -> Iterator[Run]:
 
 @contextlib.contextmanager
 def _ray(scheduler: str) -> Iterator[Run]:
+    host, _, port = scheduler.removeprefix("ray://").rpartition(":")
+    if host in ("127.0.0.1", "localhost"):
+        # Else it takes the loopback for this machine's address in its network.
+        os.environ.setdefault(_RAY_ON_LOOPBACK, "0")
     try:
         import ray
     except ModuleNotFoundError:
         raise WorkersError("Ray is not installed: pip install 'simgap[ray]'") from None
     try:
+        if host:  # Ray itself would wait for many minutes
+            socket.create_connection((host, int(port)), CONNECT_SECONDS).close()
         ray.init(scheduler, log_to_driver=False)
-    except (OSError, ValueError) as problem:
+    except (OSError, ValueError, RuntimeError) as problem:
         raise WorkersError(f"no Ray cluster at {scheduler}: {problem}") from None
 
     def run(attempt: Attempt, trials: Mapping[Path, Config]) -> Iterator[Ended]:

@@ -1,4 +1,4 @@
-"""Damage to bytes, and how an attempt to read what came of it may end."""
+"""Damage to bytes and to settings, and how an attempt to read what came of it may end."""
 
 from __future__ import annotations
 
@@ -11,6 +11,16 @@ REFUSED, SAME, TOLD, OTHER = "refused", "as it was", "told", "another sound file
 
 class Defect(AssertionError):
     """Something was accepted, or raised, that must not be."""
+
+
+def places(tree: dict | list) -> list[tuple[dict | list, str | int]]:
+    """Every place in nested settings: what holds a value, and the key or number of the value."""
+    found: list[tuple[dict | list, str | int]] = []
+    for key in tree if isinstance(tree, dict) else range(len(tree)):
+        found.append((tree, key))
+        if isinstance(tree[key], dict | list):
+            found += places(tree[key])
+    return found
 
 
 def damaged(content: bytes, rng: np.random.Generator) -> bytes:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import functools
 import importlib
 import io
 import re
@@ -17,9 +16,8 @@ from unittest import mock
 
 import numpy as np
 import yaml
-from damage import OTHER, REFUSED, Defect, damaged
-
-from studies.make_log import main as make_log
+from damage import OTHER, REFUSED, Defect, damaged, places
+from one_log import one_log
 
 ROOT = Path(__file__).parents[2]
 PLAIN = "sims.pendulum_equation.PendulumEquation"
@@ -94,7 +92,7 @@ def attempt(kind: str, rng: np.random.Generator, folder: Path) -> str:
     if module == "studies.find_gap":
         if kind.endswith("corrected.yaml"):
             arguments[:2] = ["--simulator", str(config)]
-        arguments += ["--logs", _log(folder)]
+        arguments += ["--logs", str(one_log(folder))]
     ended, said = _given(module, arguments)
     if trap.exists():
         trap.unlink()
@@ -133,13 +131,6 @@ def _given(module: str, arguments: list[str]) -> tuple[int | None, str]:
     raise Defect("ended without work and without an error")
 
 
-@functools.cache
-def _log(folder: Path) -> str:
-    with contextlib.redirect_stdout(io.StringIO()):
-        make_log(["--output", str(folder / "logs")])
-    return str(sorted((folder / "logs").glob("*.csv"))[0])
-
-
 _TRAP = "touch /tmp/simgap-fuzz-trap"
 _ODD = (
     None, -1, 0, 3.5, 1e300, float("nan"), float("inf"), "", "x", [], {}, [None], True, 10**30,
@@ -162,16 +153,8 @@ _BOMBS = (
 
 def _edited(settings: dict, rng: np.random.Generator) -> bool:
     """Another value or key somewhere; whether the key is one that does not exist."""
-    places: list = []
-
-    def walk(node):
-        for key in node if isinstance(node, dict) else range(len(node)):
-            places.append((node, key))
-            if isinstance(node[key], dict | list):
-                walk(node[key])
-
-    walk(settings)
-    node, key = places[rng.integers(len(places))]
+    everywhere = places(settings)
+    node, key = everywhere[rng.integers(len(everywhere))]
     match rng.integers(6):
         case 0 if isinstance(node, dict):
             node[f"{key}_x"] = node.pop(key)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import gymnasium
 import numpy as np
-from damage import OTHER, REFUSED, SAME, Defect, damaged
+from damage import OTHER, REFUSED, SAME, Defect, damaged, places
 from sklearn.linear_model import Ridge
 
 import residual
@@ -147,24 +147,16 @@ _ODD = (
 
 def _forge(header: dict, arrays: dict, rng: np.random.Generator) -> None:
     """Another value somewhere in the header, or an array of other shape, type or content."""
-    places = []
-
-    def walk(node):
-        for key in node if isinstance(node, dict) else range(len(node)):
-            places.append((node, key))
-            if isinstance(node[key], dict | list):
-                walk(node[key])
-
-    walk(header)
-    chosen = int(rng.integers(len(places) + len(arrays)))
-    if chosen < len(places):
-        node, key = places[chosen]
+    everywhere = places(header)
+    chosen = int(rng.integers(len(everywhere) + len(arrays)))
+    if chosen < len(everywhere):
+        node, key = everywhere[chosen]
         if rng.random() < 0.25 and isinstance(node, dict):
             del node[key]
         else:
             node[key] = copy.deepcopy(_ODD[rng.integers(len(_ODD))])
         return
-    name = sorted(arrays)[chosen - len(places)]
+    name = sorted(arrays)[chosen - len(everywhere)]
     array = arrays[name]
     changes = [
         lambda: array.ravel()[:-1], lambda: array[None], lambda: array.astype(np.int8),

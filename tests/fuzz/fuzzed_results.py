@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from damage import OTHER, REFUSED, SAME, TOLD, Defect, damaged
+from damage import OTHER, REFUSED, SAME, TOLD, Defect, damaged, places
 
 from policy import Algorithm, DDPGConfig
 from residual import Linear
@@ -92,16 +92,8 @@ def _forged(content: bytes, rng: np.random.Generator) -> bytes:
     """An edited value somewhere, and no checksum."""
     found = json.loads(content)
     found.pop("checksum", None), found.pop("format", None)
-    places = []
-
-    def walk(node):
-        for key in node if isinstance(node, dict) else range(len(node)):
-            places.append((node, key))
-            if isinstance(node[key], dict | list):
-                walk(node[key])
-
-    walk(found)
-    node, key = places[rng.integers(len(places))]
+    everywhere = places(found)
+    node, key = everywhere[rng.integers(len(everywhere))]
     odd = (None, -1, 1e300, "x", "../../etc/passwd", [], {}, [None], True, 10**30, [[1.0]], "os")
     if rng.random() < 0.3 and isinstance(node, dict):
         del node[key]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import io
 import shutil
 import sys
@@ -13,10 +12,10 @@ from unittest import mock
 import numpy as np
 from damage import OTHER, REFUSED, SAME, TOLD, Defect
 from faulty_simulators import FAULTY, HARMLESS
+from one_log import one_log
 
 from sims.checks import check_simulator
 from studies import find_gap
-from studies.make_log import main as make_log
 
 sys.path.append(str(Path(__file__).parent))
 KINDS = (*(f"{name}, checked" for name in FAULTY), *(f"{name}, find_gap" for name in FAULTY))
@@ -49,7 +48,7 @@ def attempt(kind: str, rng: np.random.Generator, folder: Path, whole: bool = Fal
             raise Defect(f"no table: {findings}")
         return TOLD
     arguments = ["--simulator", f"faulty_simulators.{name}", "--minutes", "0.02"]
-    arguments += ["--logs", _log(folder), "--output", str(folder / "gap")]
+    arguments += ["--logs", str(one_log(folder)), "--output", str(folder / "gap")]
     said = io.StringIO()
     with contextlib.ExitStack() as stack:
         if not whole:
@@ -68,10 +67,3 @@ def attempt(kind: str, rng: np.random.Generator, folder: Path, whole: bool = Fal
         finally:
             shutil.rmtree(folder / "gap", ignore_errors=True)
     return OTHER
-
-
-@functools.cache
-def _log(folder: Path) -> str:
-    with contextlib.redirect_stdout(io.StringIO()):
-        make_log(["--output", str(folder / "logs")])
-    return str(sorted((folder / "logs").glob("*.csv"))[0])

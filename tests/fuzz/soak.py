@@ -4,7 +4,8 @@
   python tests/fuzz/soak.py --kills 10 --only dask
 
 Every kill is a SIGKILL at a random moment; after half of them a random file is damaged. Two
-processes share one folder in every other run.
+processes share one folder in every other run. The code must not change meanwhile: what is kept
+of other code is computed anew, and says so.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ import os
 import shutil
 import signal
 import socket
-import subprocess
 import sys
 import tempfile
 import time
@@ -27,17 +27,17 @@ import numpy as np
 import quick_gap
 from damage import damaged
 from fuzzed_results import TINY
+from one_log import one_log
 
 from simgap_files import read_sealed
 from studies import find_gap
-from studies.make_log import main as make_log
 
 GRID = TINY + "grid:\n- seed: [0, 1, 2]\n"
 #: Numbers that depend on the clock.
 CLOCKED = ("seconds", "fit_seconds", "versions", "processor_seconds", "config")
 
 
-def begun(run: Callable[[Path], None], folder: Path) -> int:
+def begun(run: Callable[..., None], *given: object) -> int:
     """A process of its own that runs a command; it shares what is imported already."""
     child = os.fork()
     if child:
@@ -47,7 +47,7 @@ def begun(run: Callable[[Path], None], folder: Path) -> int:
     os.dup2(quiet, 1), os.dup2(quiet, 2)
     code = 1
     try:
-        run(folder)
+        run(*given)
         code = 0
     except SystemExit as ended:
         code = int(ended.code or 0)
@@ -76,17 +76,17 @@ def learn(folder: Path) -> None:
     quick_gap.main(["--config", str(config), "--output", str(folder)])
 
 
-def grid(folder: Path) -> None:
+def grid(folder: Path, *more: str) -> None:
     """Three trials."""
     config = folder.with_suffix(".yaml")
     config.write_text(GRID)
-    quick_gap.main(["--config", str(config), "--output", str(folder)])
+    quick_gap.main(["--config", str(config), "--output", str(folder), *more])
 
 
 def gap(folder: Path) -> None:
     """A search for two effects; nothing of it is kept, so it is there whole or not at all."""
-    log = sorted((folder.parent / "logs").glob("*.csv"))[0]
-    arguments = ["--simulator", "sims.pendulum_equation.PendulumEquation", "--logs", str(log)]
+    arguments = ["--simulator", "sims.pendulum_equation.PendulumEquation", "--logs"]
+    arguments += [str(one_log(folder.parent))]
     arguments += ["--effects", "mass", "viscous_friction", "--output", str(folder)]
     find_gap.main(arguments)
 
@@ -100,7 +100,7 @@ def left(folder: Path) -> dict[str, object]:
     for path in sorted(folder.rglob("*.json")):
         if path.name in ("results.json", "gap.json"):
             found[str(path.relative_to(folder))] = _timeless(read_sealed(path))
-    for path in sorted(folder.rglob("policies/*.safetensors")):
+    for path in sorted(folder.rglob("policies/[!.]*.safetensors")):
         found[str(path.relative_to(folder))] = path.read_bytes()
     return found
 
@@ -129,26 +129,25 @@ def soak(name: str, kills: int, home: Path, rng: np.random.Generator, until: flo
         AssertionError: A run that was killed and resumed is not the same as one that was not.
     """
     run, counted = STUDIES[name], Counter[str]()
-    begin = time.perf_counter()
-    assert _wait(begun(run, home / f"{name}-whole")) == 0
-    seconds, whole = time.perf_counter() - begin, left(home / f"{name}-whole")
-    assert whole
+    seconds, whole, steps = undisturbed(run, home, name)
     while counted["kills"] < kills and time.monotonic() < until:
         folder = home / f"{name}-{counted['runs']}"
-        two = name != "find_gap" and counted["runs"] % 2
         for again in range(1000):
-            children = [begun(run, folder) for _ in range(2 if two else 1)]
+            children = [begun(run, folder) for _ in range(1 + counted["runs"] % 2)]
+            since = time.perf_counter()
             # Later and later, so that every run comes to its end.
             time.sleep(float(rng.uniform(0, seconds * (1 + again / 4))))
             codes = [ended(child) for child in children]
             alive = [c for c, code in zip(children, codes, strict=True) if code is None]
+            assert {code for code in codes if code is not None} <= {0}, codes
             if not alive:
-                assert set(codes) == {0}, codes
                 break
-            victim = alive[rng.integers(len(alive))]
-            kill(victim)
-            counted["kills"] += 1
-            for child in set(alive) - {victim}:
+            for victim in rng.permutation(alive)[: rng.integers(1, len(alive) + 1)]:
+                counted[moment(time.perf_counter() - since, seconds, folder, steps)] += 1
+                kill(int(victim))
+                alive.remove(int(victim))
+                counted["kills"] += 1
+            for child in alive:
                 assert _wait(child) == 0, "the other process of the same folder failed"
                 counted["survivors"] += 1
             if rng.random() < 0.5 and hurt(folder, rng):
@@ -159,6 +158,33 @@ def soak(name: str, kills: int, home: Path, rng: np.random.Generator, until: flo
         shutil.rmtree(folder, ignore_errors=True)
     print(file=sys.stderr)
     return counted
+
+
+def undisturbed(
+    run: Callable[..., None], home: Path, name: str, *more: str
+) -> tuple[float, dict[str, object], int]:
+    """Seconds of a run that nobody kills, what it leaves, and how many steps it keeps."""
+    for _ in range(2):  # the second knows what libraries find out once, as the killed ones do
+        folder = home / f"{name}-whole"
+        shutil.rmtree(folder, ignore_errors=True)
+        begin = time.perf_counter()
+        assert _wait(begun(run, folder, *more)) == 0
+        seconds = time.perf_counter() - begin
+    assert left(folder)
+    return seconds, left(folder), len(kept(folder))
+
+
+def kept(folder: Path) -> list[Path]:
+    """Records of the steps that are finished."""
+    return list(folder.glob("stages/*-*/step.json"))
+
+
+def moment(elapsed: float, seconds: float, folder: Path, steps: int) -> str:
+    """When a process is killed, in words: by the steps that are kept, or by the clock."""
+    if not steps:
+        return "early" if elapsed < seconds / 3 else "late" if elapsed > seconds / 1.5 else "midway"
+    done = len(kept(folder))
+    return "early" if not done else "late" if done >= steps else "midway"
 
 
 def _wait(child: int) -> int:
@@ -173,54 +199,53 @@ def _same(found: dict[str, object], whole: dict[str, object], folder: Path) -> N
 
 def soak_dask(kills: int, home: Path, rng: np.random.Generator, until: float) -> Counter[str]:
     """Kill workers of a Dask cluster, and now and then the command, until the grid is done."""
+    from distributed.cli import dask_scheduler, dask_worker
+
     counted: Counter[str] = Counter()
-    assert _wait(begun(grid, home / "dask-whole")) == 0
-    whole = left(home / "dask-whole")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        address = f"tcp://127.0.0.1:{probe.getsockname()[1]}"
-    places = os.pathsep.join([*sys.path[:2], str(Path(quick_gap.__file__).parent), os.getcwd()])
-    options = {
-        "env": {**os.environ, "PYTHONPATH": places}, "start_new_session": True,
-        "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL,
-    }  # fmt: skip
-    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1"]
-    worker = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1",
-              "--host", "127.0.0.1", "--no-dashboard", "--no-nanny"]  # fmt: skip
-    port = address.rpartition(":")[2]
-    running = [subprocess.Popen([*dask, "--port", port, "--no-dashboard"], **options)]
-    workers = [subprocess.Popen(worker, **options) for _ in range(2)]
+        port = probe.getsockname()[1]
+    address, here = f"tcp://127.0.0.1:{port}", ["--host", "127.0.0.1", "--no-dashboard"]
+    joined = [address, *here, "--nthreads", "1", "--no-nanny"]
+
+    def worker() -> int:
+        return begun(dask_worker.main, joined)
+
+    on = ("--backend", "dask", "--scheduler", address)
+    scheduler = begun(dask_scheduler.main, [*here, "--port", str(port)])
+    workers = [worker() for _ in range(2)]
+    study = 0
     try:
+        seconds, whole, steps = undisturbed(grid, home, "dask", *on)
+        _same(whole, undisturbed(grid, home, "no-dask")[1], home)
         while counted["kills"] < kills and time.monotonic() < until:
             folder = home / f"dask-{counted['runs']}"
-            config = folder.with_suffix(".yaml")
-            config.write_text(GRID)
-            command = [sys.executable, quick_gap.__file__, "--config", str(config), "--output"]
-            command += [str(folder), "--backend", "dask", "--scheduler", address]
-            for _ in range(50):
-                study = subprocess.Popen(command, **options)
-                while study.poll() is None and counted["kills"] < kills:
-                    time.sleep(float(rng.uniform(2, 12)))
-                    if study.poll() is not None:
-                        break
+            code: int | None = 1
+            while code != 0:
+                study, code, since = begun(grid, folder, *on), None, time.perf_counter()
+                while code is None:
+                    wait = float(rng.uniform(0, seconds if counted["kills"] < kills else 0.5))
+                    time.sleep(wait)
+                    code = ended(study)
+                    if code is not None or counted["kills"] >= kills:
+                        continue
+                    counted[moment(time.perf_counter() - since, seconds, folder, steps)] += 1
                     if rng.random() < 0.3:
-                        os.killpg(study.pid, signal.SIGKILL)
+                        kill(study)
+                        code = -9
                     else:
                         k = int(rng.integers(len(workers)))
-                        os.killpg(workers[k].pid, signal.SIGKILL)
-                        workers[k].wait()
-                        workers[k] = subprocess.Popen(worker, **options)
+                        kill(workers[k])
+                        workers[k] = worker()
                     counted["kills"] += 1
                     print(f"\rdask: {counted['kills']} kills", end="", file=sys.stderr, flush=True)
-                if study.wait() == 0:
-                    break
+                study = 0
             _same(left(folder), whole, folder)
             counted["runs"] += 1
     finally:
-        for process in (*running, *workers):
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+        for process in (scheduler, *workers, study):
+            if process:
+                kill(process)
     print(file=sys.stderr)
     return counted
 
@@ -234,15 +259,15 @@ def main() -> None:
     given = parser.parse_args()
     rng, until = np.random.default_rng(given.seed), time.monotonic() + 60 * given.minutes
     home = Path(tempfile.mkdtemp(prefix="simgap-soak-"))
-    make_log(["--output", str(home / "logs")])
-    print("| study | runs | kills | other process went on | files damaged |\n|---|---|---|---|---|")
+    one_log(home)  # made by one process for all
+    columns = ("runs", "kills", "early", "midway", "late", "survivors", "damaged")
+    print(f"| study | {' | '.join(columns)} |\n|{'---|' * (1 + len(columns))}")
     for name in (given.only,) if given.only else (*STUDIES, "dask"):
         if name == "dask":
             counted = soak_dask(given.kills, home, rng, until)
         else:
             counted = soak(name, given.kills, home, rng, until)
-        numbers = [counted[n] for n in ("runs", "kills", "survivors", "damaged")]
-        print(f"| {name} | {' | '.join(map(str, numbers))} |", flush=True)
+        print(f"| {name} | {' | '.join(str(counted[c]) for c in columns)} |", flush=True)
     shutil.rmtree(home, ignore_errors=True)
 
 

@@ -28,10 +28,9 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("fuzz")
 
 
-@pytest.mark.parametrize("area", QUICK)
-def test_nothing_damaged_does_harm(area, folder):
-    for number, kind, run in attempts(area, QUICK[area], folder):
-        if kind.startswith("effects"):  # which take seconds to be found
+def try_all(area, count, folder, but="nothing"):
+    for number, kind, run in attempts(area, count, folder):
+        if kind.startswith(but):
             continue
         try:
             run()
@@ -39,14 +38,15 @@ def test_nothing_damaged_does_harm(area, folder):
             raise AssertionError(f"{area}, attempt {number}, {kind}") from error
 
 
+@pytest.mark.parametrize("area", QUICK)
+def test_nothing_damaged_does_harm(area, folder):
+    try_all(area, QUICK[area], folder, but="effects")  # which take seconds to be found
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("area", LONG)
 def test_thousands_of_them(area, folder):
-    for number, kind, run in attempts(area, LONG[area], folder):
-        try:
-            run()
-        except Exception as error:
-            raise AssertionError(f"{area}, attempt {number}, {kind}") from error
+    try_all(area, LONG[area], folder)
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))

@@ -164,3 +164,39 @@ def test_control_c_in_a_study(tmp_path):
             said = process.communicate(timeout=10)[1]
     assert process.returncode == 130
     assert said.endswith("stopped; the same command goes on\n") and "Traceback" not in said
+
+
+WRONG = {
+    "bad.yaml": b"seed: 0\nsimulator: [", "latin.yaml": b"seed: 0 # \xe9",
+    "bytes.yaml": b"\x00" * 9,
+}  # fmt: skip
+SIMULATOR = ("--simulator", "sims.pendulum_equation.PendulumEquation")
+SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "says"),
+    [
+        ("find_gap", ("--config", "none.yaml"), "--config none.yaml: there is no such file"),
+        ("find_gap", ("--config", "bad.yaml"), "--config bad.yaml is no YAML: line 2, column 13: "),
+        ("find_gap", ("--config", "latin.yaml"), "byte 0xe9 at 10 is not UTF-8; save it as UTF-8"),
+        ("find_gap", ("--simulator", "bytes.yaml"), "bytes.yaml is no YAML: character 1: "),
+        ("find_gap", ("--simulator=sims.None",), "--simulator: there is no class sims.None; expec"),
+        ("find_gap", ("--simulator", "no_such.X"), "there is no module 'no_such' for no_such"),
+        ("find_gap", (*SIMULATOR, "--columns", "none.yaml"), "--columns none.yaml: there is no"),
+        ("find_gap", (*SIMULATOR, "--logs", "none.csv"), "none.csv: there is no such file"),
+        ("learn", (*SYSTEM, "--corrected", "none.yaml"), "--corrected none.yaml: there is no"),
+        ("learn", (*SYSTEM, "--estimator", "residual.No"), "--estimator: there is no class res"),
+        ("learn", (*SYSTEM, "--backend", "dask"), "--backend dask runs the trials of a grid"),
+    ],
+)  # fmt: skip
+def test_what_is_not_there_is_named(name, arguments, says, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for file, content in WRONG.items():
+        Path(file).write_bytes(content)
+    with pytest.raises(SystemExit, match="2"):
+        importlib.import_module(f"studies.{name}").main([*arguments, "--output", "out"])
+    said = capsys.readouterr().err
+    assert said.startswith("error: ") and said.count("\n") == 1
+    assert says in said
+    assert not Path("out").exists()

@@ -43,6 +43,16 @@ def test_noise_is_found_although_the_model_is_wrong(kind):
     assert np.all(np.abs(floor.sigma / NOISE[kind] - 1) < 0.25)
 
 
+@pytest.mark.parametrize("kind", ["A", "B"])
+def test_noise_does_not_depend_on_how_many_windows_are_fitted_at_once(kind, monkeypatch):
+    truth = Truth(mass=0.03)
+    _, whole = surveyed(truth, "strong", kind, runs=2)
+    monkeypatch.setattr("residual.gap.noise.AT_ONCE", 7)
+    _, parts = surveyed(truth, "strong", kind, runs=2)
+    for name in ("sigma", "error", "nodes", "force"):
+        assert np.array_equal(getattr(parts, name), getattr(whole, name))
+
+
 @pytest.mark.parametrize("first", [0.3, 1.0, 3.0])
 @pytest.mark.parametrize(
     ("label", "truth", "value"),
