@@ -1,0 +1,32 @@
+"""The truth of studies.robots is one: its integrator leaves no gap that could get a name."""
+
+import numpy as np
+import pytest
+
+from studies.robots.cases import Case, nominal, strengths
+from studies.robots.drives import MODELS
+from studies.robots.truth import Sensors, Truth
+
+
+@pytest.mark.parametrize("robot", ["arm2", "arm6"])
+def test_what_is_left_of_it_in_a_forecast_is_far_below_the_noise(robot):
+    simulator = nominal(robot)
+    truth = Truth(MODELS / f"{robot}.xml", {})
+    high = truth.model.actuator_ctrlrange[:, 1]
+
+    def drive(t, q, v):
+        return 0.1 * high * np.sin(9 * t + np.arange(len(high)))
+
+    rng = np.random.default_rng(0)
+    run = truth.run(drive, 1.0, Sensors(noise=0.0, rates=True), rng)
+    starts = run.states[:-31:10]
+    windows = np.stack([run.actions[a : a + 30] for a in range(0, 10 * len(starts), 10)])
+    ends = simulator.rollout(simulator.augment(starts, windows[:, 0]), windows)[:, -1]
+    wrong = (ends - run.states[30 : 30 + 10 * len(starts) : 10])[:, : truth.model.nq]
+    # What is left is the nominal: stiff servos at 5 ms.
+    assert np.sqrt(np.mean(np.square(wrong))) < 0.05 * Sensors().noise
+
+
+def test_no_link_is_hidden_away():
+    (size,) = strengths(Case("arm2", ("mass of body fore",), 3)).values()
+    assert abs(size) < 0.3 * nominal("arm2").parameters["mass of body fore"].value
