@@ -12,8 +12,8 @@ import numpy as np
 
 from residual.trajectories import Trajectory
 
-#: Rows that are searched: of a system with two states they take about a gigabyte.
-MOST = 100_000
+#: Rows that are searched: of a system with two states they take less than two gigabytes.
+MOST = 50_000
 #: Rows in a stretch, many times a window.
 STRETCH = 1000
 

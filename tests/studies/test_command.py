@@ -149,7 +149,11 @@ def test_output_is_checked_before_anything_is_computed(name, output, says, capsy
 def test_control_c_in_a_study(tmp_path):
     command = [sys.executable, "-m", "studies.pendulum_gap", "--output", str(tmp_path / "out")]
     root = Path(__file__).parents[2]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=root)
+    # A suite in the background ignores interrupts, and so would what it starts.
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, cwd=root,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
     end = time.monotonic() + 120
     while not (tmp_path / "out").exists():
         assert time.monotonic() < end and process.poll() is None
