@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.logs.checks import Finding
+from residual.logs.rounded_clock import even_clock
 from residual.logs.table import LogError
 
 Array = NDArray[np.float64]
@@ -119,12 +120,20 @@ def report_sampling(runs: Sequence[Run]) -> list[Finding]:
 
 
 def _ordered(run: Run, minimum: int, findings: list[Finding]) -> Run:
-    """Without samples that have no time, or the time of the one before."""
+    """Without samples that have no time, or the time of the one before; rounded clocks evened."""
     untimed = int(np.isnan(run.times).sum())
     ordered = run.take(np.isfinite(run.times))
     if untimed:
         says = f"{untimed} samples without a time were dropped."
         findings.append(Finding("untimed", run.name, says, {"samples": untimed}))
+    even, rounding = even_clock(ordered.times)
+    if rounding:
+        says = (
+            f"times were rounded to {rounding:g} s, rows come every "
+            f"{float(np.diff(even[:2])[0]):.4g} s: the even clock behind them is used."
+        )
+        findings.append(Finding("rounded_clock", run.name, says, {"rounding_s": rounding}))
+        ordered = dataclasses.replace(ordered, times=even)
     fresh = np.append(True, np.diff(ordered.times) > 0)[: len(ordered)]
     repeats = int((~fresh).sum())
     if repeats:

@@ -26,6 +26,26 @@ def test_repeated_times_are_dropped(csv):
     assert finding.says == ("2 samples repeat the time before them (first in row 11); dropped.")
 
 
+@pytest.mark.parametrize(("rate", "decimals"), [(120, 2), (120, 3), (33, 2), (7, 1)])
+def test_a_clock_rounded_in_print_is_evened(tmp_path, rate, decimals):
+    true = swing(dt=1 / rate)
+    printed = true | {"time": np.round(true["time"], decimals)}
+    data = read(write(tmp_path / "log.csv", printed))
+    (run,) = data.trajectories
+    assert "rounded_clock" in kinds(data) and "repeated" not in kinds(data)
+    assert len(run.times) == len(true["time"])
+    assert np.abs(np.diff(run.times) * rate - 1).max() < 0.02
+    assert np.abs(run.times - true["time"]).max() <= 10.0**-decimals
+    assert np.array_equal(run.states[:, 0], np.unwrap(true["angle"]))
+
+
+def test_a_row_written_twice_is_no_rounded_clock(tmp_path):
+    rows = np.insert(np.arange(200), 70, 70)
+    columns = {name: values[rows] for name, values in swing().items()}
+    data = read(write(tmp_path / "log.csv", columns))
+    assert "repeated" in kinds(data) and "rounded_clock" not in kinds(data)
+
+
 def test_jitter_is_kept_and_reported(tmp_path):
     rng = np.random.default_rng(0)
     t = np.cumsum(rng.uniform(0.03, 0.07, 200))

@@ -1,0 +1,52 @@
+"""Times that were rounded when they were printed, put back to the even clock behind them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Samples that an even clock has to agree with before it is believed.
+ENOUGH = 20
+#: Rounding below this part of a period is of no consequence.
+COARSE = 0.05
+#: Decimals of a second that are looked at.
+DECIMALS = 6
+
+
+def even_clock(times: Array) -> tuple[Array, float]:
+    """Evenly spaced times that agree with rounded ones, and to what these were rounded, in s.
+
+    Rows that come every 8.3 ms with times printed to 0.01 s seem to repeat some times and to leave
+    others out. Where one even clock is within the rounding of every time, it is the better one.
+
+    Args:
+        times: In s, not decreasing, (n,).
+
+    Returns:
+        The even clock, (n,), and the rounding; the times as they are and 0 if no such clock is.
+    """
+    n = len(times)
+    if n < ENOUGH:
+        return times, 0.0
+    place = np.arange(n)
+    period, start = np.polyfit(place, times, 1)
+    rounding = _rounding(times)
+    steps = np.diff(times)
+    uneven = steps.max() - steps.min() > 0.5 * rounding
+    if not uneven or rounding < COARSE * period:
+        return times, 0.0
+    even = start + period * place
+    if np.abs(times - even).max() > rounding:
+        return times, 0.0
+    return even, rounding
+
+
+def _rounding(times: Array) -> float:
+    """The largest power of ten of which all times are multiples, at least a microsecond, or 0."""
+    for decimals in range(DECIMALS + 1):
+        scaled = times * 10.0**decimals
+        if np.abs(scaled - np.round(scaled)).max() < 1e-3:
+            return float(10.0**-decimals)
+    return 0.0
