@@ -223,13 +223,6 @@ def brief(search: Search, number: int, values: Array) -> bool:
     )
 
 
-def may_vanish(search: Search, claim: Claim) -> bool:
-    """Whether none of an effect's strengths is known to be other than zero."""
-    strengths = [knob.field for knob in search.candidates[claim.number].knobs if knob.strength]
-    numbers = [claim.numbers[field] for field in strengths if field in claim.numbers]
-    return bool(numbers) and all(n.low <= 0 <= n.high and not n.at_bound for n in numbers)
-
-
 def share(search: Search, key: Key, number: int) -> tuple[float, float, float]:
     """Part of the nominal squared error that an effect takes off, last of all in its set."""
     rest = tuple(i for i in key if i != number)

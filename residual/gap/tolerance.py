@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.candidates import Candidate, candidates
-from residual.gap.confirmation import CLEARLY, Claim, may_vanish, tie, where_it_matters
+from residual.gap.confirmation import CLEARLY, Claim, tie, where_it_matters
 from residual.gap.fitting import Fit
+from residual.gap.intervals import deviations
 from residual.gap.model import Model
 from residual.gap.search import Key, Search
 from residual.gap.significance import size
@@ -74,12 +75,21 @@ def allow_for_parameters(
             ]
             claim = dataclasses.replace(claim, rivals=tuple(dict.fromkeys(rivals)))
         told.append(claim)
+    half = 1.96 * deviations(beside.fit, search.fitter.blocks)
     final = []
     for claim in widened(search, key, told, beside.fit):
-        if within(search, claim, tolerance) or may_vanish(search, claim):
+        own = beside.fit.model.owner == key.index(claim.number)
+        own &= strengths_of(beside.fit)
+        lost = bool(own.any()) and not (np.abs(beside.fit.theta) > half)[own].any()
+        if lost or within(search, claim, tolerance):
             claim = dataclasses.replace(claim, calibration=True)
         final.append(claim)
     return final
+
+
+def strengths_of(fit: Fit) -> NDArray[np.bool_]:
+    """Which numbers of a fit are zero where their effect is absent."""
+    return np.array([knob.strength for knob in fit.model.knobs])
 
 
 def within(search: Search, claim: Claim, tolerance: float) -> bool:

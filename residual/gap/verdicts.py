@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from residual.gap.confirmation import FEW, TOO_FEW, Claim, may_vanish
+from residual.gap.confirmation import FEW, TOO_FEW, Claim
 from residual.gap.fitting import Left
 from residual.gap.result import Blind, Doubt, Gap, Kind, Number, Span, Verdict
 from residual.gap.search import Key, Search
@@ -19,6 +19,13 @@ def nameable(search: Search, claim: Claim, blocks: int) -> bool:
     """Whether an effect has few enough rivals, a size, and data enough, to be named at all."""
     few = len(families(search, claim)) <= MOST_FAMILIES
     return few and blocks >= TOO_FEW and not may_vanish(search, claim)
+
+
+def may_vanish(search: Search, claim: Claim) -> bool:
+    """Whether none of an effect's strengths is known to be other than zero."""
+    strengths = [knob.field for knob in search.candidates[claim.number].knobs if knob.strength]
+    numbers = [claim.numbers[field] for field in strengths if field in claim.numbers]
+    return bool(numbers) and all(n.low <= 0 <= n.high and not n.at_bound for n in numbers)
 
 
 def families(search: Search, claim: Claim) -> set[str]:
