@@ -51,7 +51,7 @@ def effect(truth, kind, name, field, value, *marks):
         effect(Truth(delay=0.04), "C", "delay", "time", 0.04, pytest.mark.long),
         effect(Truth(sensor_offset=0.1), "A", "sensor_offset", "offset", 0.1, pytest.mark.long),
         effect(Truth(saturation=2.2), "A", "saturation", "level", 2.2, pytest.mark.long),
-        effect(Truth(backlash=0.3), "A", "backlash", "width", 0.3, pytest.mark.long),
+        effect(Truth(backlash=0.35), "A", "backlash", "width", 0.35, pytest.mark.long),
     ],
 )
 def test_hidden_effect_is_named_and_measured(truth, kind, effect, field, value):
