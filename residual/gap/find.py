@@ -110,9 +110,8 @@ def find_gap(
     kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
 
     def explained(
-        simulator: HostSimulator, beside: Sequence[Candidate] = ()
-    ) -> tuple[Prepared, Explanation]:
-        ready = prepare(simulator, runs, horizon)
+        simulator: HostSimulator, ready: Prepared, beside: Sequence[Candidate] = ()
+    ) -> Explanation:
         free = {candidate.label for candidate in beside}
         pool = ready.pool(candidates(simulator, kept, ready.fitter.samples))
         pool = [candidate for candidate in pool if candidate.label not in free]
@@ -120,7 +119,7 @@ def find_gap(
             f"{len(ready.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s, "
             f"{len(pool)} candidate effects"
         )
-        return ready, explain(
+        return explain(
             simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, tell, until,
             beside,
         )  # fmt: skip
@@ -128,11 +127,13 @@ def find_gap(
     with workers(n_jobs):
         simulator = held_as(simulator, hold)
         clock.lap("read")
-        prepared, found = explained(simulator)
+        prepared = prepare(simulator, runs, horizon)
+        found = explained(simulator, prepared)
         other = held_otherwise(simulator) if hold is None else None
         if other is not None and fits_better(found.search, found.key, other):
             tell("inputs held the other way fit better: once more so")
-            ready, again = explained(other)
+            ready = prepare(other, runs, horizon)
+            again = explained(other, ready)
             if forecast_error(again.search, again.key) < forecast_error(found.search, found.key):
                 prepared, found = ready, again
                 quality.append(
@@ -146,10 +147,10 @@ def find_gap(
         beside = worth_freeing(answer, parameter_tolerance) if asked else []
         if beside:
             tell("once more with parameters free within their tolerance")
-            ready, again = explained(found.search.simulator, beside)
+            again = explained(found.search.simulator, prepared, beside)
             second = confirm(again, groups, asked, parameter_tolerance)
             if better(second, answer):
-                prepared, answer = ready, second
+                answer = second
         clock.lap("confirm")
         table = summed_up(answer)
         apart = None
