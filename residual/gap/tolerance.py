@@ -78,18 +78,13 @@ def allow_for_parameters(
     half = 1.96 * deviations(beside.fit, search.fitter.blocks)
     final = []
     for claim in widened(search, key, told, beside.fit):
-        own = beside.fit.model.owner == key.index(claim.number)
-        own &= strengths_of(beside.fit)
-        lost = bool(own.any()) and not (np.abs(beside.fit.theta) > half)[own].any()
+        own = np.flatnonzero(beside.fit.model.owner == key.index(claim.number))
+        sizes = own[search.candidates[claim.number].linear]
+        lost = bool(sizes.size) and not (np.abs(beside.fit.theta) > half)[sizes].any()
         if lost or within(search, claim, tolerance):
             claim = dataclasses.replace(claim, calibration=True)
         final.append(claim)
     return final
-
-
-def strengths_of(fit: Fit) -> NDArray[np.bool_]:
-    """Which numbers of a fit are zero where their effect is absent."""
-    return np.array([knob.strength for knob in fit.model.knobs])
 
 
 def within(search: Search, claim: Claim, tolerance: float) -> bool:
