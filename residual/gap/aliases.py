@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -17,20 +17,45 @@ from sims.host import HostSimulator
 def aliases(
     simulator: HostSimulator, offered: Sequence[Effect]
 ) -> tuple[dict[str, tuple[str, ...]], tuple[tuple[str, ...], ...]]:
-    """Exact aliases among the offered effects: twins by name, and dependent sets."""
-    names = {str(effect) for effect in offered}
+    """Exact aliases among the offered effects: twins by name, and dependent sets.
+
+    A law with more numbers, as a spring with a free rest, does what its twin does and more: it is
+    the twin's alias, and the twin is not its.
+    """
+    effects = {str(effect): effect for effect in offered}
     groups: dict[str, tuple[str, ...]] = {}
     sets = []
     for alias in exact_aliases(simulator):
-        inside = tuple(name for name in alias.effects if name in names)
+        inside = tuple(name for name in alias.effects if name in effects)
         if len(inside) < 2:
             continue
         if alias.combination:
             if len(inside) == len(alias.effects):
                 sets.append(inside)
         else:
-            groups.update({name: inside for name in inside})
+            width = {name: numbers(effects[name], simulator) for name in inside}
+            for name in inside:
+                groups[name] = tuple(other for other in inside if width[other] >= width[name])
     return groups, tuple(sets)
+
+
+def numbers(effect: Effect, simulator: HostSimulator) -> int:
+    """How many numbers of an effect are fitted."""
+    return sum(quantity.fitted for quantity in effect.quantities(simulator).values())
+
+
+def representatives(
+    simulator: HostSimulator, offered: Sequence[Effect], groups: Mapping[str, tuple[str, ...]]
+) -> list[Effect]:
+    """The offered effects without those that the first of their twins stands for."""
+    width = {str(effect): numbers(effect, simulator) for effect in offered}
+    kept = []
+    for effect in offered:
+        name = str(effect)
+        equal = [n for n in groups.get(name, (name,)) if width[n] == width[name]]
+        if equal[0] == name:
+            kept.append(effect)
+    return kept
 
 
 def hidden(

@@ -23,6 +23,7 @@ from residual.gap.verdicts import (
     calibrated_verdict,
     dependent,
     effect_verdict,
+    may_vanish,
     minor_verdict,
     nameable,
     no_gap_verdict,
@@ -92,6 +93,9 @@ def confirm(
         lost = [claim for claim in made if not nameable(search, claim, blocks)]
         if not lost:
             made = allow_for_parameters(search, key, made, found.adequate, parameter_tolerance)
+            # Now that intervals allow for the parameters, too.
+            lost = [c for c in made if not c.needed and may_vanish(search, c)]
+        if not lost:
             return Answer(found, key, tuple(made), leads)
         # The one that matters least goes first: what is left may have fewer rivals.
         gone = lost[-1].number

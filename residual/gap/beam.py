@@ -2,36 +2,61 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.screening import Gain, Signatures, gains, pair_gains
 from residual.gap.search import Key, Proposals, Search
+from residual.gap.significance import score
 
 Array = NDArray[np.float64]
 
 
-def run(search: Search, seeds: Proposals | None = None) -> Key:
-    """Grow sets until one more effect no longer pays; returns the one that forecasts best."""
+def run(
+    search: Search, seeds: Proposals | None = None, quiet: Callable[[Key], bool] = lambda _: False
+) -> Key:
+    """Grow sets until one more effect no longer pays; returns the one that forecasts best.
+
+    Args:
+        search: What is tried goes there.
+        seeds: Sets to begin with.
+        quiet: Whether a set leaves noise alone.
+    """
     effort = search.effort
     frontier: list[Key] = [()]
+    grown: set[Key] = set()
     reached = 1.0
     if seeds:
         frontier = _best(search, search.add(seeds)) or frontier
         reached = search.error(frontier[0])
+        frontier = _alone(search, quiet) or frontier
     for level in range(1, effort.most + 1):
         fresh: list[Key] = []
         for key in frontier:
-            grown = grow(search, key)
-            fresh += grown + together(search, key, grown)
+            more = grow(search, key)
+            fresh += more + together(search, key, more)
+        grown.update(frontier)
         if not fresh or search.late:
             break
+        frontier = _alone(search, quiet)
+        if grown & set(frontier):
+            break
+        if frontier:
+            continue
         frontier = _best(search, fresh)
         now = search.error(frontier[0])
         if (level > 1 or seeds) and not _pays(search, frontier[0], reached):
             break
         reached = min(reached, now)
     return search.best()
+
+
+def _alone(search: Search, quiet: Callable[[Key], bool]) -> list[Key]:
+    """The likeliest set, if it leaves noise alone: no other is worth growing then."""
+    likeliest = min(search.usable(), key=lambda key: score(search, key))
+    return [likeliest] if quiet(likeliest) else []
 
 
 def _best(search: Search, keys: list[Key]) -> list[Key]:

@@ -193,11 +193,7 @@ def _within_reach(
 
 
 def _candidate(effect: Effect, known: dict[str, Quantity], reach: float) -> Candidate:
-    free = {
-        n: q
-        for n, q in known.items()
-        if q.role == "strength" or (q.role == "shape" and not q.integer)
-    }
+    free = {name: quantity for name, quantity in known.items() if quantity.fitted}
     knobs = tuple(
         Knob(
             n, q.unit, q.low, q.high, 0.1 * q.scale,

@@ -13,6 +13,7 @@ import numpy as np
 
 from residual.gap.inspection import (
     bounds,
+    clipped,
     faults,
     faulty,
     measured,
@@ -73,7 +74,7 @@ def findings(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
         return [refusal("empty", "", "there are no trajectories: give at least one measured run")]
     found = _refusals(simulator, trajectories)
     if not found:
-        checks = (sampling, bounds, still, faults, rounded, sums, nominal)
+        checks = (sampling, bounds, still, faults, clipped, rounded, sums, nominal)
         found = [one for check in checks for one in check(simulator, trajectories)]
     ranks = {"refuse": 0, "warning": 1, "note": 2}
     return sorted(found, key=lambda one: ranks[one.severity])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -99,7 +100,7 @@ def explain(
         if len(search.currency.groups) > 1 and not simulator.has_contacts:
             alone = noise_floor(fitter, search.nominal, floor.sigma)
             search.currency = search.currency.only_where_wrong(alone)
-        run(search, seeds)
+        run(search, seeds, functools.partial(_quiet, search, floor))
         key = choose(search).key
         fresh, floor = weigh(fitter, search.tried[key])
         ratio = fresh.sigma / fitter.sigma
@@ -124,7 +125,7 @@ def settle(search: Search, floor: Noise) -> Explanation:
     for _ in range(EXCHANGES):
         likeliest = min(search.usable(), key=lambda k: score(search, k))
         best = {(), choice.key, search.best(), likeliest}
-        quiet = [k for k in best if _quiet(search, k, floor)]
+        quiet = [k for k in best if _quiet(search, floor, k)]
         if quiet:
             needed = fitter.needed(search.signatures(()), search.tried[()])
             key = significant(search, needed)
@@ -143,5 +144,5 @@ def settle(search: Search, floor: Noise) -> Explanation:
     return Explanation(search, choice, left, nominal_left, floor, needed)
 
 
-def _quiet(search: Search, key: Key, floor: Noise) -> bool:
+def _quiet(search: Search, floor: Noise, key: Key) -> bool:
     return search.fitter.left(search.tried[key], floor).adequate

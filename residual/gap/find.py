@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.aliases import aliases
+from residual.gap.aliases import aliases, representatives
 from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
 from residual.gap.candidates import Candidate, candidates
 from residual.gap.data import examine
@@ -106,8 +106,7 @@ def find_gap(
     for says in quality:
         tell(says)
     groups, sets = aliases(simulator, offered)
-    # Of effects that make the same motion the first stands for all.
-    kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
+    kept = representatives(simulator, offered, groups)
 
     def explained(
         simulator: HostSimulator, ready: Prepared, beside: Sequence[Candidate] = ()

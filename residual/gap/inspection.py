@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from residual.logs.checks import Finding
 from residual.logs.faults import (
+    clipped_samples,
     dropped_samples,
     frozen_samples,
     rounding,
@@ -109,6 +110,25 @@ def faults(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list
                 says = f"{len(rows)} of {total} samples {words}{_first(rows)}; taken as missing"
                 numbers = {"samples": len(rows)}
                 found.append(Finding(kind, channel.name, says, numbers, "warning", rows))
+    return found
+
+
+def clipped(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Channels that stay at the end of what they reach."""
+    found = []
+    for channel, runs in measured(simulator, trajectories):
+        masks = clipped_samples(runs)
+        rows = _rows(trajectories, masks)
+        if rows:
+            ends = {float(v) for values, mask in zip(runs, masks, strict=True) for v in values[mask]}
+            values = " and ".join(f"{end:.4g}" for end in sorted(ends))
+            says = (
+                f"{len(rows)} samples stay at {values} {channel.unit}, the end of all values, and "
+                f"come and go in full motion{_first(rows)}: a sensor at the end of its range, or a "
+                "stop. If the sensor, leave those cells empty: they count as measured here"
+            )
+            numbers = {"samples": len(rows)}
+            found.append(Finding("clipped", channel.name, says, numbers, "warning", rows))
     return found
 
 

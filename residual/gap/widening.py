@@ -35,7 +35,8 @@ def widened(search: Search, key: Key, claims: Sequence[Claim], beside: Fit) -> l
         beside: The set fitted with all parameters free within their tolerance.
     """
     sure = {claim.number for claim in claims if claim.sure}
-    shifts = by_parameters(beside, search.numbers(key))
+    half = 1.96 * deviations(beside, search.fitter.blocks)
+    freed = [(float(v - h), float(v + h)) for v, h in zip(beside.theta, half, strict=True)]
     forecast_best = functools.cache(lambda smaller: best_forecasts(search, smaller))
     told = []
     for claim in claims:
@@ -44,14 +45,26 @@ def widened(search: Search, key: Key, claims: Sequence[Claim], beside: Fit) -> l
         )
         search.add({smaller: theta})
         best = forecast_best(smaller) if search.sound(smaller) else None
-        told.append(_widened(search, key, claim, shifts, smaller, best))
+        told.append(_widened(search, key, claim, freed, smaller, best))
     return told
 
 
 def _widened(
-    search: Search, key: Key, claim: Claim, shifts: Array, smaller: Key, best: Array | None
+    search: Search,
+    key: Key,
+    claim: Claim,
+    freed: Sequence[tuple[float, float]],
+    smaller: Key,
+    best: Array | None,
 ) -> Claim:
-    """One claim, see ``widened``; ``best`` are the numbers of the smaller set, if it is sound."""
+    """One claim, see ``widened``.
+
+    Args:
+        search, key, claim: As there.
+        freed: Intervals of the set's numbers with all parameters free.
+        smaller: The set without companions that are not certain.
+        best: Numbers with which that forecasts best, if it is sound.
+    """
     fit, alone = search.tried[key], search.tried[smaller]
     own = np.flatnonzero(fit.model.owner == key.index(claim.number))
     there = np.flatnonzero(alone.model.owner == smaller.index(claim.number))
@@ -60,11 +73,9 @@ def _widened(
     for j, k in zip(own, there, strict=True):
         knob = fit.model.knobs[j]
         number = claim.numbers[knob.field]
-        # In quadrature: errors of the data have nothing to do with those of the parameters.
-        low = number.value - np.hypot(number.value - number.low, shifts[j])
-        high = number.value + np.hypot(number.high - number.value, shifts[j])
+        low, high = min(number.low, freed[j][0]), max(number.high, freed[j][1])
         if best is not None:
-            reach = float(np.hypot(half[k], shifts[j]))
+            reach = max(float(half[k]), 0.5 * (freed[j][1] - freed[j][0]))
             least, most = sorted((alone.theta[k], best[k]))
             low, high = min(low, least - reach), max(high, most + reach)
         numbers[knob.field] = dataclasses.replace(
@@ -74,22 +85,6 @@ def _widened(
             if_exact=(number.low, number.high),
         )
     return dataclasses.replace(claim, numbers=numbers)
-
-
-def by_parameters(fit: Fit, count: int) -> Array:
-    """How far the first numbers of a fit lie off if its last ones do by their tolerance, (count,).
-
-    Errors of the parameters are taken to be independent.
-    """
-    rows = np.sqrt(fit.weights)[:, None, None] * fit.by_knob
-    own, others = rows[..., :count], rows[..., count:]
-    scale = np.sqrt(np.maximum((own**2).sum(axis=(0, 1)), 1e-300))
-    own = own / scale
-    matrix = np.einsum("wri,wrj->ij", own, own)
-    right = np.einsum("wri,wrj->ij", own, others)
-    most = np.array([max(knob.high, -knob.low) for knob in fit.model.knobs[count:]])
-    shifts = np.linalg.pinv(matrix, rcond=1e-12) @ right * most / scale[:, None]
-    return np.sqrt((shifts**2).sum(axis=1))
 
 
 def best_forecasts(search: Search, key: Key) -> Array:

@@ -21,6 +21,8 @@ _WILD = 8.0
 _RARE = 0.01
 # Equal samples in a row that a moving channel does not have by chance.
 _STILL = 10
+# Samples in a row at the end of a sensor's range.
+_CLIPPED = 4
 # Share of the range of values above which a step of rounding is worth a word.
 _COARSE = 3e-4
 # Zeros in a row that are a drop-out rather than a time at which nothing happened.
@@ -116,6 +118,39 @@ def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) 
             fast = entry > max(0.3 * typical, 1.5 * step)
             if steady and fast and (thawed or contradicted):
                 mask[a + 1 : b + 1] = True
+    return found
+
+
+def clipped_samples(runs: Sequence[Array]) -> list[Mask]:
+    """Repeats of the greatest or least value of all, reached and left in full motion twice or more.
+
+    A sensor at the end of its range shows so, and so does a joint at a stop; motion that turns back
+    by itself is slow there.
+
+    Args:
+        runs: As for ``wild_samples``.
+    """
+    found = [np.zeros(len(values), bool) for values in runs]
+    known = np.concatenate([values[np.isfinite(values)] for values in runs] or [np.zeros(0)])
+    moving = np.abs(np.concatenate([np.diff(values) for values in runs] or [np.zeros(0)]))
+    moving = moving[moving > 0]
+    if not moving.size:
+        return found
+    least = max(0.3 * float(np.median(moving)), 1.5 * rounding(runs))
+    for end in (known.min(), known.max()):
+        reached = [np.zeros(len(values), bool) for values in runs]
+        times = 0
+        for values, mask in zip(runs, reached, strict=True):
+            for a, b in _stretches(values == end):
+                around = values[max(a - 3, 0) : a + 1], values[b - 1 : b + 3]
+                steps = [np.diff(part) for part in around if len(part) > 3]
+                moves = [np.ptp(np.sign(own)) == 0 and abs(own.mean()) > least for own in steps]
+                if b - a >= _CLIPPED and len(moves) == 2 and all(moves):
+                    mask[a:b] = True
+                    times += 1
+        if times > 1:
+            for mask, its in zip(found, reached, strict=True):
+                mask |= its
     return found
 
 

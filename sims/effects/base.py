@@ -45,6 +45,11 @@ class Quantity:
     integer: bool
     bold: float | None = None
 
+    @property
+    def fitted(self) -> bool:
+        """Whether data decide it: a strength, or a shape that is not a whole number."""
+        return self.role == "strength" or (self.role == "shape" and not self.integer)
+
 
 def number(
     default: float = 0.0,

@@ -157,6 +157,27 @@ def test_a_sensor_that_freezes_for_good_is_told_by_the_rate():
     assert ("frozen", "angle") in kinds(bad)
 
 
+def test_a_sensor_at_the_end_of_its_range_is_told():
+    run = noisy()
+    clipped = np.minimum(run.states[:, 1], 1.5)
+    told = findings(PendulumEquation(), [changed(run, 1, slice(None), clipped)])
+    (found,) = [one for one in told if one.kind == "clipped"]
+    assert found.where == "rate"
+    at_end = set(run.times[clipped == 1.5])
+    assert {time for _, time in found.rows} <= at_end
+    assert len(found.rows) > 0.9 * len(at_end)
+
+
+@given(step=st.floats(0.001, 0.3), phase=st.floats(0, 6))
+@settings(max_examples=40, deadline=None)
+def test_a_rounded_swing_is_not_taken_for_a_clipped_one(step, phase):
+    times = 0.01 * np.arange(1000)
+    angle = np.pi + step * np.round(np.sin(2 * times + phase) / step)
+    states = np.stack([angle, np.full(1000, np.nan)], axis=1)
+    run = Trajectory("run", times, states, np.sin(times)[:-1, None])
+    assert ("clipped", "angle") not in kinds(run)
+
+
 def test_rest_is_no_frozen_sensor():
     times = 0.01 * np.arange(600)
     slowing = np.where(times < 2, 2 * times - 0.5 * times**2, 2.0)
