@@ -120,10 +120,10 @@ def clipped(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
         masks = clipped_samples(runs)
         rows = _rows(trajectories, masks)
         if rows:
-            ends = {float(v) for values, mask in zip(runs, masks, strict=True) for v in values[mask]}
-            values = " and ".join(f"{end:.4g}" for end in sorted(ends))
+            inside = np.concatenate([values[m] for values, m in zip(runs, masks, strict=True)])
+            ends = " and ".join(f"{end:.4g}" for end in np.unique(inside))
             says = (
-                f"{len(rows)} samples stay at {values} {channel.unit}, the end of all values, and "
+                f"{len(rows)} samples stay at {ends} {channel.unit}, the end of all values, and "
                 f"come and go in full motion{_first(rows)}: a sensor at the end of its range, or a "
                 "stop. If the sensor, leave those cells empty: they count as measured here"
             )
