@@ -29,6 +29,8 @@ ROUNDS = 3
 WORTH = 1.3
 #: Effects tried in place of each chosen one, and rounds of that.
 RIVALS, EXCHANGES = 10, 3
+#: Effects tried in place of each at the least.
+LEAST = 2
 #: Sets that a new search begins with.
 SEEDS = 12
 
@@ -135,7 +137,7 @@ def settle(search: Search, floor: Noise) -> Explanation:
             choice = choose(search, enough)
             key = choice.key
         before = len(search.tried)
-        search.add_exchanged(key, max(2, RIVALS // max(len(key), 1)))
+        search.add_exchanged(key, LEAST if search.late else max(LEAST, RIVALS // max(len(key), 1)))
         if len(search.tried) == before or search.late:
             break
         if not quiet and choose(search, enough).key == key:

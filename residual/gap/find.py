@@ -93,7 +93,8 @@ def find_gap(
     refuse_unsound(simulator)
     clock = Clock()
     tell = progress or (lambda _: None)
-    until = time.process_time() + 60 * minutes * SEARCHING
+    over = time.process_time() + 60 * minutes
+    until = over - 60 * minutes * (1 - SEARCHING)
     offered = chosen_effects(simulator, [LIBRARY] if effects is None else list(effects))
     if measured_input:
         offered = tuple(e for e in offered if not e.upstream_of_sensor)
@@ -144,7 +145,12 @@ def find_gap(
         asked = matters(found, tolerance)
         answer = confirm(found, groups, asked, parameter_tolerance)
         beside = worth_freeing(answer, parameter_tolerance) if asked else []
-        if beside:
+        if beside and time.process_time() > over:
+            quality.append(
+                "parameters within their tolerance may hide what is missing, or explain some of "
+                "what is left: there was no time to look, give more --minutes"
+            )
+        elif beside:
             tell("once more with parameters free within their tolerance")
             again = explained(found.search.simulator, prepared, beside)
             second = confirm(again, groups, asked, parameter_tolerance)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
@@ -71,6 +72,7 @@ class Verdict:
         form: Those of ``alternatives`` that belong to its family and do nearly as well.
         doubts: Why it is not certain.
         follows: What the force that has no name looks like, empty if it follows nothing.
+        shape: Whole numbers that were chosen rather than fitted, such as the order of a cogging.
     """
 
     kind: Kind
@@ -87,6 +89,7 @@ class Verdict:
     form: tuple[str, ...] = ()
     doubts: tuple[Doubt, ...] = ()
     follows: str = ""
+    shape: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"Verdict({self.kind}: {self.says})"[:180]

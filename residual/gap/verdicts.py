@@ -63,7 +63,13 @@ def effect_verdict(
         f"{name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}"
         for name, n in claim.numbers.items()
     )
-    says = [f"{effect}: {numbers}"]
+    whole = {
+        name: float(getattr(effect, name))
+        for name, quantity in effect.quantities(search.simulator).items()
+        if quantity.role == "shape" and quantity.integer
+    }
+    spelt = "".join(f", {name} {value:g}" for name, value in whole.items())
+    says = [f"{effect}{spelt}: {numbers}"]
     if claim.form:
         says.append(f"{family}, form undecided: {', '.join(claim.form)} would do as well")
     if claim.alike:
@@ -95,7 +101,7 @@ def effect_verdict(
         kind, effect.name, effect.where, claim.numbers,
         tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
         "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
-        doubts(claim),
+        doubts(claim), shape=whole,
     )  # fmt: skip
 
 
@@ -152,7 +158,8 @@ def minor_verdict(search: Search, number: int, share: tuple[float, float, float]
     effect = search.candidates[number].effect
     return Verdict(
         "minor", effect.name, effect.where, {}, (), effect.family_in(search.simulator),
-        f"{effect}: takes off less than a fifth of what remains without it, so it is not added",
+        f"{effect}: takes too little off the error that is left without it (a fifth is asked, or "
+        "three tenths at one joint), so it is not added",
         Span(*share),
     )  # fmt: skip
 

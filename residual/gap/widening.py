@@ -36,7 +36,7 @@ def widened(search: Search, key: Key, claims: Sequence[Claim], beside: Fit) -> l
     """
     sure = {claim.number for claim in claims if claim.sure}
     half = 1.96 * deviations(beside, search.fitter.blocks)
-    freed = [(float(v - h), float(v + h)) for v, h in zip(beside.theta, half, strict=True)]
+    freed = np.stack([beside.theta - half, beside.theta + half], axis=1)
     forecast_best = functools.cache(lambda smaller: best_forecasts(search, smaller))
     told = []
     for claim in claims:
@@ -50,18 +50,13 @@ def widened(search: Search, key: Key, claims: Sequence[Claim], beside: Fit) -> l
 
 
 def _widened(
-    search: Search,
-    key: Key,
-    claim: Claim,
-    freed: Sequence[tuple[float, float]],
-    smaller: Key,
-    best: Array | None,
+    search: Search, key: Key, claim: Claim, freed: Array, smaller: Key, best: Array | None
 ) -> Claim:
     """One claim, see ``widened``.
 
     Args:
         search, key, claim: As there.
-        freed: Intervals of the set's numbers with all parameters free.
+        freed: Intervals of the set's numbers with all parameters free, (p, 2).
         smaller: The set without companions that are not certain.
         best: Numbers with which that forecasts best, if it is sound.
     """
@@ -73,9 +68,9 @@ def _widened(
     for j, k in zip(own, there, strict=True):
         knob = fit.model.knobs[j]
         number = claim.numbers[knob.field]
-        low, high = min(number.low, freed[j][0]), max(number.high, freed[j][1])
+        low, high = min(number.low, freed[j, 0]), max(number.high, freed[j, 1])
         if best is not None:
-            reach = max(float(half[k]), 0.5 * (freed[j][1] - freed[j][0]))
+            reach = max(float(half[k]), 0.5 * float(np.ptp(freed[j])))
             least, most = sorted((alone.theta[k], best[k]))
             low, high = min(low, least - reach), max(high, most + reach)
         numbers[knob.field] = dataclasses.replace(

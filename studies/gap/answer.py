@@ -144,7 +144,7 @@ def headline(verdict: Verdict, result: GapResult) -> str:
     numbers = ", ".join(_named(field, number) for field, number in verdict.parameters.items())
     if verdict.family:
         return f"{_first(verdict.family)}, form undecided: as {_lower(name)}, {numbers}."
-    return f"{name}{shape(verdict, result)}: {numbers}."
+    return f"{name}{shape(verdict)}: {numbers}."
 
 
 def _changes(verdict: Verdict) -> str:
@@ -163,18 +163,10 @@ def _named(field: str, number: Number) -> str:
     return f"{field.replace('_', ' ')} {number_text(number)}"
 
 
-def shape(verdict: Verdict, result: GapResult) -> str:
-    """Numbers that were chosen rather than fitted, such as the order of a cogging."""
-    for effect in result.effects:
-        if str(effect) != label_of(verdict):
-            continue
-        words = [
-            f"{name} {getattr(effect, name):g}{unit_text(quantity.unit)}"
-            for name, quantity in effect.quantities(result.corrected).items()
-            if name not in verdict.parameters and quantity.role == "shape"
-        ]
-        return f" ({', '.join(words)})" if words else ""
-    return ""
+def shape(verdict: Verdict) -> str:
+    """Whole numbers that were chosen rather than fitted, such as the order of a cogging."""
+    words = [f"{name} {value:g}" for name, value in verdict.shape.items()]
+    return f" ({', '.join(words)})" if words else ""
 
 
 def notes(verdict: Verdict, result: GapResult) -> list[str]:
