@@ -37,7 +37,7 @@ def build_parser() -> Parser:
     parser.add_argument("--seeds", type=PositiveInt, default=1, help="how many seeds")
     parser.add_argument("--first", type=NonNegativeInt, default=0, help="the first seed")
     parser.add_argument("--sample", type=PositiveInt | None, help="only so many, drawn at random")
-    parser.add_argument("--minutes", type=PositiveFloat, default=1.0, help="budget of each answer")
+    parser.add_argument("--minutes", type=PositiveFloat, default=2.0, help="budget of each answer")
     parser.add_argument("--output", type=Path, required=True, help="JSON lines of answers")
     return parser
 
