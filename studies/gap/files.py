@@ -20,7 +20,7 @@ from sims.loading import corrected_settings
 from sims.model_files import relative
 from studies.gap.answer import lead
 from studies.gap.report import write_report
-from studies.running.command import versions
+from studies.running.versions import versions
 
 JSON, CORRECTED, REPORT = "gap.json", "corrected.yaml", "report.html"
 

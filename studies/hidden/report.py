@@ -17,7 +17,7 @@ from studies.hidden.strengths import HIDDEN
 from studies.reporting.figures import new_figure, save_figure, styled
 from studies.reporting.page import Report
 from studies.reporting.sections import Code, Figure, Prose, Section, Table
-from studies.running.command import versions
+from studies.running.versions import versions
 
 #: Residual over noise on held-out windows at which a gap counts as closed.
 CLOSED = 1.1

@@ -19,9 +19,9 @@ from studies.learning.loop import run_loop
 from studies.learning.settings import instantiate
 from studies.learning.steps import Steps
 from studies.learning.study import Config, Study
-from studies.running.command import versions
 from studies.running.grids import class_label
 from studies.running.progress import Progress
+from studies.running.versions import versions
 
 
 def run_trial(

@@ -7,17 +7,14 @@ import contextlib
 import functools
 import json
 import os
-import platform
 import re
 import signal
-import subprocess
 import sys
 import sysconfig
 import tempfile
 import traceback
 from argparse import RawDescriptionHelpFormatter
 from collections.abc import Callable, Mapping, Sequence
-from importlib import metadata
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -34,10 +31,11 @@ _SIMULATORS = ("--simulator", "--corrected")
 _CLASSES = (*_SIMULATORS, "--estimator")
 # What a check of a disk writes before the work: less would fit on a disk that is full.
 _PROBE = bytes(2**16)
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_GROUPED = re.compile(r"--\w+(\.\w+)+")
 _IMPORT_PATH = re.compile(r"\w+(\.\w+)+")
 _HOME = Path(__file__).parents[2]
 _LIBRARIES = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "purelib", "platlib")]
-_PACKAGES = ("torch", "scikit-learn", "gpytorch", "pymunk", "numpy", "scipy", "gymnasium")
 
 
 class HelpFormatter(jsonargparse.DefaultHelpFormatter, RawDescriptionHelpFormatter):
@@ -59,8 +57,8 @@ class Parser(jsonargparse.ArgumentParser):
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, *rest: Any, **options: Any
     ) -> Any:
-        """As usual; a robot's model file may stand where a simulator is expected."""
-        given = list(sys.argv[1:] if args is None else args)
+        """As usual; a model file may stand for a simulator, and several numbers for a list."""
+        given = _with_lists(list(sys.argv[1:] if args is None else args))
         try:
             for i, text in enumerate(given):
                 name, equals, value = text.partition("=")
@@ -114,6 +112,20 @@ class Parser(jsonargparse.ArgumentParser):
         reason = re.sub(r"\s*\n\s*-?\s*", " ", str(message).strip())
         sys.stderr.write(f"error: {reason} (see --help)\n")
         raise SystemExit(2)
+
+
+def _with_lists(arguments: Sequence[str]) -> list[str]:
+    """The arguments, several numbers after a setting of a group, ``--a.b 1 2``, as one list."""
+    found: list[str] = []
+    after = ""
+    for text in arguments:
+        if after and _NUMBER.fullmatch(text):
+            found[-1] = f"[{found[-1].strip('[]')}, {text}]"
+            continue
+        after = found[-1] if found and _NUMBER.fullmatch(text) else ""
+        after = after if _GROUPED.fullmatch(after) else ""
+        found.append(text)
+    return found
 
 
 def _simulator(value: str) -> str:
@@ -277,23 +289,3 @@ def check_output(output: str | Path) -> None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         fail(f"--output {folder} cannot be written: {reason}")
-
-
-def versions() -> dict[str, str]:
-    """Versions of Python, of this package and of what the numbers depend on."""
-    found = {"python": platform.python_version(), "simgap": own_version()}
-    return found | {package: metadata.version(package) for package in _PACKAGES}
-
-
-@functools.cache
-def own_version() -> str:
-    """The version of this package, and in a checkout the commit, with a plus if files differ."""
-    version, root = metadata.version("simgap"), Path(__file__).parents[2]
-    if not (root / ".git").exists():
-        return version
-    command = ["git", "-C", str(root), "describe", "--always", "--dirty=+", "--exclude=*"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
-    except (OSError, subprocess.SubprocessError):
-        return version
-    return f"{version} ({done.stdout.strip()})"

@@ -15,6 +15,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from studies.learning.settings import build_parser
+from studies.pendulum_gap import STUDY
 from studies.running import command
 from studies.running.command import check_output, fail, guarded
 from studies.running.grids import expand_grid
@@ -67,6 +69,16 @@ def ended(capsys, fault, arguments=(), **options):
     with pytest.raises(SystemExit) as stopped:
         faulty([*arguments])
     return stopped.value.code, capsys.readouterr().err
+
+
+def test_several_numbers_after_a_setting_of_a_group_are_a_list():
+    parser = build_parser(STUDY)
+    written = ["--measure.noise", "0.01", "0.2", "--ddpg.hidden", "64", "64", "--seed", "3"]
+    plain = ["--measure.noise=[0.01, 0.2]", "--ddpg.hidden=[64, 64]", "--seed=3"]
+    parsed, same = (parser.parse_args(arguments) for arguments in (written, plain))
+    assert list(parsed.measure.noise) == [0.01, 0.2]
+    assert parsed.as_dict() == same.as_dict()
+    assert parsed.seed == 3
 
 
 def test_a_stopped_command_says_how_to_go_on(capsys):
