@@ -31,8 +31,8 @@ WORTH = 1.3
 RIVALS, EXCHANGES = 10, 3
 #: Effects tried in place of each at the least.
 LEAST = 2
-#: Sets that a new search begins with.
-SEEDS = 12
+#: Sets that a new search begins with, and their error over that of the best.
+SEEDS, HOPEFUL = 12, 3.0
 
 
 #: From the fitter that made a fit, and the fit: the fitter whose channels are weighed by what that
@@ -109,7 +109,8 @@ def explain(
         if search.late or ((ratio > 1 / WORTH).all() and (ratio < WORTH).all()):
             break
         best = sorted(search.usable(), key=search.error)[:SEEDS]
-        seeds = {k: search.own(k) for k in {*best, key} if k}
+        near = [k for k in best if search.error(k) <= HOPEFUL * search.error(best[0])]
+        seeds = {k: search.own(k) for k in {*near, key} if k}
         fitter = fresh
     return settle(search, floor)
 

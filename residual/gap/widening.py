@@ -34,7 +34,8 @@ def widened(search: Search, key: Key, claims: Sequence[Claim], beside: Fit) -> l
         claims: Of its members.
         beside: The set fitted with all parameters free within their tolerance.
     """
-    sure = {claim.number for claim in claims if claim.sure}
+    # What parameters may stand in for stays: they are free in the fit beside.
+    sure = {c.number for c in claims if dataclasses.replace(c, calibration=False).sure}
     half = 1.96 * deviations(beside, search.fitter.blocks)
     freed = np.stack([beside.theta - half, beside.theta + half], axis=1)
     forecast_best = functools.cache(lambda smaller: best_forecasts(search, smaller))
