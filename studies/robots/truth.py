@@ -106,7 +106,7 @@ class Truth:
             else:
                 raise ValueError(f"no effect {effect!r} can be hidden")
             return
-        what, _, place = name.partition(" of ")
+        what, _, place = name.rpartition(" of ") if " of " in name else (name, "", "")
         kind, _, element = place.partition(" ")
         if kind == "joint":
             d = self._dof(element)

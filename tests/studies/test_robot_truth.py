@@ -30,3 +30,24 @@ def test_what_is_left_of_it_in_a_forecast_is_far_below_the_noise(robot):
 def test_no_link_is_hidden_away():
     (size,) = strengths(Case("arm2", ("mass of body fore",), 3)).values()
     assert abs(size) < 0.3 * nominal("arm2").parameters["mass of body fore"].value
+
+
+@pytest.mark.parametrize("robot", ["cart_pole", "arm2", "arm6", "hopper"])
+def test_all_that_may_be_missing_can_be_hidden(robot):
+    plain = Truth(MODELS / f"{robot}.xml", {})
+    for effect in nominal(robot).offered_effects():
+        hidden = Truth(MODELS / f"{robot}.xml", {str(effect): 0.1})
+        assert differs(plain, hidden), effect
+
+
+def differs(one, other):
+    """Whether two truths are not the same."""
+    own = [one.loads, one.delay, one.lag, one.bias, one.zone, one.level, one.offset]
+    its = [other.loads, other.delay, other.lag, other.bias, other.zone, other.level, other.offset]
+    names = [
+        "body_mass", "body_ipos", "dof_damping", "dof_dampingpoly", "dof_frictionloss",
+        "dof_armature", "jnt_stiffness", "actuator_gainprm", "actuator_biasprm", "geom_friction",
+    ]  # fmt: skip
+    own += [getattr(one.model, name) for name in names] + [one.model.opt.gravity]
+    its += [getattr(other.model, name) for name in names] + [other.model.opt.gravity]
+    return not all(np.array_equal(a, b) for a, b in zip(own, its, strict=True))
