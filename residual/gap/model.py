@@ -40,6 +40,7 @@ class Model:
         self.low = np.array([knob.low for knob in self.knobs])
         self.high = np.array([knob.high for knob in self.knobs])
         self.step = np.array([knob.step for knob in self.knobs])
+        self.known = np.array([knob.known for knob in self.knobs])
         plays = sum(isinstance(c.effect, Backlash) for c in self.chosen)
         self.physical = len(simulator.physical_channels)
         self.width = len(simulator.integrated_channels) + plays

@@ -257,15 +257,19 @@ def capped(costs: Array, cap: float) -> Array:
 def _step(
     by_knob: Array, projected: Array, weight: Array, theta: Array, model: Model, damping: float
 ) -> Array:
-    """Gauss-Newton step of the unknowns within their bounds."""
+    """Gauss-Newton step of the unknowns within their bounds.
+
+    What is known of a number beforehand counts as an observation.
+    """
     if len(theta) == 0:
         return np.zeros(0)
     rows = by_knob * np.sqrt(weight)[:, None, None]
     aims = projected * np.sqrt(weight)[:, None]
     limit = 10 * model.step + np.abs(theta)
+    weight_of_known = model.known**-2
     return bounded_step(
-        np.einsum("wri,wrj->ij", rows, rows),
-        np.einsum("wri,wr->i", rows, aims),
+        np.einsum("wri,wrj->ij", rows, rows) + np.diag(weight_of_known),
+        np.einsum("wri,wr->i", rows, aims) - weight_of_known * theta,
         np.maximum(model.low - theta, -limit),
         np.minimum(model.high - theta, limit),
         damping,
