@@ -85,8 +85,8 @@ def table(answers: Sequence[object]) -> str:
     """Markdown over all answers."""
     rows = [_plain(answer) for answer in answers]
     lines = [
-        "| robot | hidden | sets | right | confirmed wrong | s, median and most |",
-        "|---|---|---|---|---|---|",
+        "| robot | hidden | sets | right | of them by family | confirmed wrong | s, median, most |",
+        "|---|---|---|---|---|---|---|",
     ]
     groups: dict[tuple[str, int], list[dict]] = {}
     for row in rows:
@@ -95,9 +95,10 @@ def table(answers: Sequence[object]) -> str:
         seconds = [row["processor"] for row in own]
         what = ("nothing", "one effect", "two effects")[min(count, 2)]
         right = sum(row["right"] for row in own)
+        family = sum(bool(row.get("by_family")) for row in own)
         wrong = sum(bool(row["confirmed_wrong"]) for row in own)
         lines.append(
-            f"| {robot} | {what} | {len(own)} | {right} | {wrong} | "
+            f"| {robot} | {what} | {len(own)} | {right} | {family} | {wrong} | "
             f"{np.median(seconds):.0f}, {max(seconds):.0f} |"
         )
     return "\n".join(lines)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from residual.gap.choice import AT_ONE
 from residual.gap.intervals import at_bound, bounded, deviations
+from residual.gap.numerics import at_half_step
 from residual.gap.result import Number
 from residual.gap.search import Key, Search
 from residual.gap.significance import score
@@ -150,11 +151,13 @@ def excluded(
 ) -> bool:
     """Whether a rival with one effect exchanged is out.
 
-    Down to the noise, chance decides. While a remainder is left, a rival has to be clearly worse;
-    one that differs in form alone has to lose at the horizon and at half of it.
+    Down to the noise, chance decides, at half the step, too, where that matters: a delay may fit
+    what a lag did only because steps are coarse. While a remainder is left, a rival has to be
+    clearly worse; one that differs in form alone has to lose at the horizon and at half of it.
     """
     if adequate:
-        return score(search, rival) - score(search, key) > tie(search)
+        behind = score(search, rival) - score(search, key)
+        return behind > tie(search) and not _by_numerics(search, key, rival, behind)
     group = where_it_matters(search, key, number)
     own, its = (search.validated[k] for k in (key, rival))
     ratio = _ratio(search, its.squares, own.squares, group)
@@ -164,6 +167,15 @@ def excluded(
         return False
     behind, error = search.currency.difference(its.squares, own.squares, group)
     return behind > error and _ratio(search, its.half, own.half, group) > 1.0 and ratio > 1.05
+
+
+def _by_numerics(search: Search, key: Key, rival: Key, behind: float) -> bool:
+    """Whether a rival is behind at the usual step alone."""
+    own = at_half_step(search, key).merit - search.tried[key].merit
+    if behind > 2 * abs(own) or abs(own) < tie(search):
+        return False
+    its = at_half_step(search, rival).merit - search.tried[rival].merit
+    return behind + its - own <= tie(search)
 
 
 def tie(search: Search) -> float:

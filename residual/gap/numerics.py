@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.fitting import Fit
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from residual.gap.search import Key, Search
@@ -118,6 +119,14 @@ def forecast_error(search: Search, key: Key) -> float:
     return float(np.nanmean(search.validated[key].squares / np.maximum(spread, 1e-300)))
 
 
+def at_half_step(search: Search, key: Key) -> Fit:
+    """A set fitted at half the integration step."""
+    if key not in search.halved:
+        fit = search.tried[key]
+        search.halved[key] = search.fitter.halved().fit(fit.model, fit.theta, fit)
+    return search.halved[key]
+
+
 def other_numerics(search: Search, key: Key, tie: float) -> list[Array]:
     """Numbers of a set fitted at half the step, and with inputs held the other way, each (p,).
 
@@ -129,7 +138,7 @@ def other_numerics(search: Search, key: Key, tie: float) -> list[Array]:
         tie: Rise of the loss beyond which the other hold is out.
     """
     fitter, fit = search.fitter, search.tried[key]
-    found = [fitter.halved().fit(fit.model, fit.theta, fit).theta]
+    found = [at_half_step(search, key).theta]
     flipped = held_otherwise(search.simulator)
     if flipped is not None:
         other = fitter.fit(Model(flipped, fit.model.chosen), fit.theta)

@@ -70,6 +70,7 @@ class Search:
         tried: Every fitted set: sorted candidate numbers -> fit.
         unfit: Sets that did not converge.
         refused: Sets that cannot be right whatever they take off, and why.
+        halved: Those that were fitted at half the step, too, see ``numerics.at_half_step``.
         validated: Cross-validated forecasts of the sets.
         currency: Relative errors.
     """
@@ -94,6 +95,7 @@ class Search:
         self.tried: dict[Key, Fit] = {(): base}
         self.unfit: set[Key] = set()
         self.refused: dict[Key, str] = {}
+        self.halved: dict[Key, Fit] = {}
         self._signatures: dict[Key, Signatures] = {}
         channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
         found = validate(fitter, base) if free else self.before

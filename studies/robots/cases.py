@@ -45,8 +45,10 @@ class Answer:
         case: The case.
         sizes: What was hidden.
         named: Labels that it named, strongest first, with kind and numbers.
-        right: Whether the names are those hidden, or cannot be told from them by any motion; with
-            several hidden, whether all of them are among the first as many names.
+        right: Whether the names are those hidden, or cannot be told from them by any motion, or
+            leave the form within its family undecided; with several hidden, whether all of them
+            are among the first as many names.
+        by_family: Whether that rests on a form that was left undecided.
         confirmed_wrong: Names confirmed that are neither.
         remainder: Whether it says that something is left.
         processor: Seconds of processor time.
@@ -56,6 +58,7 @@ class Answer:
     sizes: dict[str, float]
     named: tuple[tuple[str, str, dict[str, tuple[float, float, float]]], ...]
     right: bool
+    by_family: bool
     confirmed_wrong: tuple[str, ...]
     remainder: bool
     processor: float
@@ -150,13 +153,14 @@ def ask(case: Case, minutes: float) -> Answer:
     begin = time.process_time()
     result = find_gap(simulator, logs, minutes=minutes)
     processor = time.process_time() - begin
-    named = []
+    named, forms = [], {}
     for verdict in result.verdicts:
         if verdict.effect and verdict.kind in ("confirmed", "ambiguous", "minor"):
             same = verdict.effect == verdict.where
             label = verdict.effect if same else f"{verdict.effect}@{verdict.where}"
             numbers = {k: (n.value, n.low, n.high) for k, n in verdict.parameters.items()}
             named.append((label, verdict.kind, numbers))
+            forms[label] = {label, *verdict.form}
     twins = {
         name: set(alias.effects)
         for alias in exact_aliases(simulator)
@@ -165,9 +169,14 @@ def ask(case: Case, minutes: float) -> Answer:
     }
     alike = [twins.get(name, {name}) for name in case.hidden]
     first = [label for label, _, _ in named][: len(alike)]
-    found = all(any(label in group for label in first) for group in alike)
+    strictly = all(any(label in group for label in first) for group in alike)
+    found = all(any(forms[label] & group for label in first) for group in alike)
     right = found if alike else not named
     known = set().union(*alike) if alike else set()
-    wrong = tuple(label for label, kind, _ in named if kind == "confirmed" and label not in known)
+    wrong = tuple(
+        label for label, kind, _ in named if kind == "confirmed" and not forms[label] & known
+    )
     remainder = any(verdict.kind == "unexplained" for verdict in result.verdicts)
-    return Answer(case, sizes, tuple(named), right, wrong, remainder, processor)
+    return Answer(
+        case, sizes, tuple(named), right, right and not strictly, wrong, remainder, processor
+    )
