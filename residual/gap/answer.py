@@ -90,7 +90,7 @@ def confirm(
             alone = imitated(search, key)
             made = [dataclasses.replace(c, rivals=(*c.rivals, *alone)) for c in made]
         blocks = len(search.fitter.blocks)
-        lost = [claim for claim in made if not nameable(search, claim, blocks)]
+        lost = [claim for claim in made if not nameable(search, claim, blocks, found.adequate)]
         if not lost:
             made = allow_for_parameters(search, key, made, found.adequate, parameter_tolerance)
             # Now that intervals allow for the parameters, too.
@@ -138,7 +138,9 @@ def told(
     measured = [simulator.physical_channels[c] for c in fitter.samples.measured]
     blind: tuple[Blind, ...] = ()
     if found.adequate:
-        blind = hidden(search.signatures(key), search.candidates, key, found.needed)
+        known = {name for claim in answer.claims for name in claim.stand_ins}
+        unseen = hidden(search.signatures(key), search.candidates, key, found.needed)
+        blind = tuple(one for one in unseen if one.effect not in known)
     where = fitter.where(search.nominal, found.floor)
     return GapResult(
         verdicts=tuple(verdicts(answer, table, sets, tolerance, blind)),

@@ -67,6 +67,11 @@ class Claim:
     brief: bool = False
 
     @property
+    def stand_ins(self) -> tuple[str, ...]:
+        """Effects that could be meant in its place."""
+        return (*self.twins, *self.form, *self.alike, *self.rivals)
+
+    @property
     def sure(self) -> bool:
         """Whether nothing speaks against it."""
         against = (self.bounded, self.calibration, self.brief, self.rivals, self.alike)

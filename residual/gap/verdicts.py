@@ -11,13 +11,14 @@ from residual.gap.fitting import Left
 from residual.gap.result import Blind, Doubt, Gap, Kind, Number, Span, Verdict
 from residual.gap.search import Key, Search
 
-#: Families that an effect may be mistaken for and still be worth a name.
-MOST_FAMILIES = 3
+#: Families of which an effect may be one and still be worth a name: while a remainder is left, and
+#: where only noise is, since any of them then makes a simulator as good as the data can tell.
+MOST_FAMILIES, OF_NOISE = 3, 5
 
 
-def nameable(search: Search, claim: Claim, blocks: int) -> bool:
+def nameable(search: Search, claim: Claim, blocks: int, adequate: bool) -> bool:
     """Whether an effect has few enough rivals, a size, and data enough, to be named at all."""
-    few = len(families(search, claim)) <= MOST_FAMILIES
+    few = len(families(search, claim)) <= (OF_NOISE if adequate else MOST_FAMILIES)
     return few and blocks >= TOO_FEW and not may_vanish(search, claim)
 
 

@@ -114,23 +114,25 @@ def test_few_blocks_confirm_families_for_the_time_being_and_fewer_than_four_noth
         verdict = effect_verdict(toy, claim(1), blocks)
         assert (verdict.kind, verdict.provisional) == ("confirmed", provisional)
         assert verdict.family == ("dissipation" if provisional else "")
-        assert nameable(toy, claim(1), blocks)
+        assert nameable(toy, claim(1), blocks, False)
     assert effect_verdict(toy, claim(1), 3).kind == "ambiguous"
-    assert not nameable(toy, claim(1), 3)
+    assert not nameable(toy, claim(1), 3, True)
 
 
 @pytest.mark.parametrize(("low", "named"), [(0.001, True), (-0.001, False)])
 def test_what_may_have_no_size_has_no_name(low, named):
     toy = Toy({(0,): 0.3})
     small = claim(numbers={"change": Number(0.01, low, 0.02, "kg")})
-    assert nameable(toy, small, 20) is named
+    assert nameable(toy, small, 20, False) is named
 
 
 def test_what_could_be_too_many_others_has_no_name():
     toy = Toy({(0,): 0.3})
     some = ("constant_load@pivot", "viscous_friction@pivot", "coulomb_friction@pivot")
-    assert nameable(toy, claim(rivals=some), 20)  # two forms of dissipation count once
-    assert not nameable(toy, claim(rivals=(*some, "actuator_gain@voltage")), 20)
+    assert nameable(toy, claim(rivals=some), 20, False)  # two forms of dissipation count once
+    many = claim(rivals=(*some, "actuator_gain@voltage"))
+    assert not nameable(toy, many, 20, False)
+    assert nameable(toy, many, 20, True)  # where only noise is left, each is as good
 
 
 def test_minor_effects_carry_their_share_and_no_number():
