@@ -18,7 +18,8 @@ MOST_FAMILIES, OF_NOISE = 3, 5
 
 def nameable(search: Search, claim: Claim, blocks: int, adequate: bool) -> bool:
     """Whether an effect has few enough rivals, a size, and data enough, to be named at all."""
-    few = len(families(search, claim)) <= (OF_NOISE if adequate else MOST_FAMILIES)
+    most = OF_NOISE if adequate and claim.needed else MOST_FAMILIES
+    few = len(families(search, claim)) <= most
     return few and blocks >= TOO_FEW and not may_vanish(search, claim)
 
 
