@@ -85,7 +85,7 @@ def allow_for_parameters(
         told.append(claim)
     half = 1.96 * deviations(beside.fit, search.fitter.blocks)
     final = []
-    for claim in widened(search, key, told, beside.fit):
+    for claim in widened(search, key, told, beside.fit, adequate):
         own = np.flatnonzero(beside.fit.model.owner == key.index(claim.number))
         sizes = own[search.candidates[claim.number].linear]
         lost = bool(sizes.size) and not (np.abs(beside.fit.theta) > half)[sizes].any()

@@ -22,7 +22,9 @@ Array = NDArray[np.float64]
 BEYOND = 3.0
 
 
-def widened(search: Search, key: Key, claims: Sequence[Claim], beside: Fit) -> list[Claim]:
+def widened(
+    search: Search, key: Key, claims: Sequence[Claim], beside: Fit, adequate: bool
+) -> list[Claim]:
     """The claims with intervals that hold with and without companions that are not certain.
 
     They hold, too, for the numbers that forecast best. Of a model that is right, those are the
@@ -33,11 +35,17 @@ def widened(search: Search, key: Key, claims: Sequence[Claim], beside: Fit) -> l
         key: The chosen set.
         claims: Of its members.
         beside: The set fitted with all parameters free within their tolerance.
+        adequate: Whether only noise is left. Data that leave a remainder are not believed what
+            they say of parameters, so all may be off by their tolerance then.
     """
     # What parameters may stand in for stays: they are free in the fit beside.
     sure = {c.number for c in claims if dataclasses.replace(c, calibration=False).sure}
-    half = 1.96 * deviations(beside, search.fitter.blocks)
-    freed = np.stack([beside.theta - half, beside.theta + half], axis=1)
+    if adequate:
+        middle, half = beside.theta, 1.96 * deviations(beside, search.fitter.blocks)
+    else:
+        middle, own = search.own(key), 1.96 * deviations(search.tried[key], search.fitter.blocks)
+        half = np.hypot(own[: len(middle)], by_parameters(beside, len(middle)))
+    freed = np.stack([middle - half, middle + half], axis=1)
     forecast_best = functools.cache(lambda smaller: best_forecasts(search, smaller))
     told = []
     for claim in claims:
@@ -81,6 +89,22 @@ def _widened(
             if_exact=(number.low, number.high),
         )
     return dataclasses.replace(claim, numbers=numbers)
+
+
+def by_parameters(fit: Fit, count: int) -> Array:
+    """How far the first numbers of a fit lie off if its last ones do by their tolerance, (count,).
+
+    Errors of the parameters are taken to be independent.
+    """
+    rows = np.sqrt(fit.weights)[:, None, None] * fit.by_knob
+    own, others = rows[..., :count], rows[..., count:]
+    scale = np.sqrt(np.maximum((own**2).sum(axis=(0, 1)), 1e-300))
+    own = own / scale
+    matrix = np.einsum("wri,wrj->ij", own, own)
+    right = np.einsum("wri,wrj->ij", own, others)
+    most = np.array([max(knob.high, -knob.low) for knob in fit.model.knobs[count:]])
+    shifts = np.linalg.pinv(matrix, rcond=1e-12) @ right * most / scale[:, None]
+    return np.sqrt((shifts**2).sum(axis=1))
 
 
 def best_forecasts(search: Search, key: Key) -> Array:
