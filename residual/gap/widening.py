@@ -38,10 +38,11 @@ def widened(
         adequate: Whether only noise is left. Data that leave a remainder are not believed what
             they say of parameters, so all may be off by their tolerance then.
     """
-    # What parameters may stand in for stays: they are free in the fit beside.
-    sure = {c.number for c in claims if dataclasses.replace(c, calibration=False).sure}
+    sure = {claim.number for claim in claims if claim.sure}
     if adequate:
         middle, half = beside.theta, 1.96 * deviations(beside, search.fitter.blocks)
+        # What parameters may stand in for stays: they are free in the fit beside.
+        sure = {c.number for c in claims if dataclasses.replace(c, calibration=False).sure}
     else:
         middle, own = search.own(key), 1.96 * deviations(search.tried[key], search.fitter.blocks)
         half = np.hypot(own[: len(middle)], by_parameters(beside, len(middle)))
