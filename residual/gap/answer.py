@@ -90,7 +90,7 @@ def confirm(
             alone = imitated(search, key)
             made = [dataclasses.replace(c, rivals=(*c.rivals, *alone)) for c in made]
         blocks = len(search.fitter.blocks)
-        lost = [claim for claim in made if not nameable(search, claim, blocks, found.adequate)]
+        lost = [claim for claim in made if not nameable(search, claim, blocks)]
         if not lost:
             made = allow_for_parameters(search, key, made, found.adequate, parameter_tolerance)
             # Now that intervals allow for the parameters, too.

@@ -81,6 +81,7 @@ def explain(
     tell: Callable[[str], None],
     until: float,
     beside: Sequence[Candidate] = (),
+    earlier: Search | None = None,
 ) -> Explanation:
     """Search, weigh the channels by what is left, search again, until nothing changes.
 
@@ -94,6 +95,8 @@ def explain(
         tell: Progress.
         until: When to stop searching, on the clock of ``time.process_time``.
         beside: Free beside every set, see ``Search``.
+        earlier: A search without these; its best sets are tried, too, so that none of them loses
+            for not being asked.
     """
     seeds: Proposals = {}
     key: Key = ()
@@ -102,17 +105,39 @@ def explain(
         if len(search.currency.groups) > 1 and not simulator.has_contacts:
             alone = noise_floor(fitter, search.nominal, floor.sigma)
             search.currency = search.currency.only_where_wrong(alone)
+        if earlier is not None and not seeds:
+            search.add(carried(earlier, search))
         run(search, seeds, functools.partial(_quiet, search, floor))
         key = choose(search).key
         fresh, floor = weigh(fitter, search.tried[key])
         ratio = fresh.sigma / fitter.sigma
         if search.late or ((ratio > 1 / WORTH).all() and (ratio < WORTH).all()):
             break
-        best = sorted(search.usable(), key=search.error)[:SEEDS]
-        near = [k for k in best if search.error(k) <= HOPEFUL * search.error(best[0])]
-        seeds = {k: search.own(k) for k in {*near, key} if k}
+        seeds = {k: search.own(k) for k in {*near_best(search), key} if k}
         fitter = fresh
     return settle(search, floor)
+
+
+def near_best(search: Search) -> list[Key]:
+    """The sets worth trying again, best first."""
+    best = sorted(search.usable(), key=search.error)[:SEEDS]
+    return [key for key in best if search.error(key) <= HOPEFUL * search.error(best[0])]
+
+
+def carried(earlier: Search, search: Search) -> Proposals:
+    """The best sets of an earlier search, as sets of another one's candidates."""
+    places = {candidate.effect: i for i, candidate in enumerate(search.candidates)}
+    found: Proposals = {}
+    for key in near_best(earlier):
+        effects = [earlier.candidates[i].effect for i in key]
+        if not key or not all(effect in places for effect in effects):
+            continue
+        numbers = [places[effect] for effect in effects]
+        model, theta = earlier.tried[key].model, earlier.own(key)
+        own = {n: theta[model.owner[: len(theta)] == at] for at, n in enumerate(numbers)}
+        fresh = tuple(sorted(own))
+        found[fresh] = np.concatenate([own[n] for n in fresh])
+    return found
 
 
 def settle(search: Search, floor: Noise) -> Explanation:

@@ -27,6 +27,7 @@ from residual.gap.numerics import (
 )
 from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import GapResult
+from residual.gap.search import Search
 from residual.gap.tolerance import KNOWN
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
@@ -110,7 +111,10 @@ def find_gap(
     kept = representatives(simulator, offered, groups)
 
     def explained(
-        simulator: HostSimulator, ready: Prepared, beside: Sequence[Candidate] = ()
+        simulator: HostSimulator,
+        ready: Prepared,
+        beside: Sequence[Candidate] = (),
+        earlier: Search | None = None,
     ) -> Explanation:
         free = {candidate.label for candidate in beside}
         pool = ready.pool(candidates(simulator, kept, ready.fitter.samples))
@@ -121,7 +125,7 @@ def find_gap(
         )
         return explain(
             simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, tell, until,
-            beside,
+            beside, earlier,
         )  # fmt: skip
 
     with workers(n_jobs):
@@ -152,7 +156,7 @@ def find_gap(
             )
         elif beside:
             tell("once more with parameters free within their tolerance")
-            again = explained(found.search.simulator, prepared, beside)
+            again = explained(found.search.simulator, prepared, beside, found.search)
             second = confirm(again, groups, asked, parameter_tolerance)
             if better(second, answer):
                 answer = second

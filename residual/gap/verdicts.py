@@ -11,15 +11,14 @@ from residual.gap.fitting import Left
 from residual.gap.result import Blind, Doubt, Gap, Kind, Number, Span, Verdict
 from residual.gap.search import Key, Search
 
-#: Families of which an effect may be one and still be worth a name: while a remainder is left, and
-#: where only noise is, since any of them then makes a simulator as good as the data can tell.
-MOST_FAMILIES, OF_NOISE = 3, 5
+#: Families of which an effect may be one and still be worth a name, and one that forecasts do not
+#: clearly need: any of them makes a better simulator, and which it is may be asked of better data.
+MOST_FAMILIES, UNNEEDED = 5, 3
 
 
-def nameable(search: Search, claim: Claim, blocks: int, adequate: bool) -> bool:
+def nameable(search: Search, claim: Claim, blocks: int) -> bool:
     """Whether an effect has few enough rivals, a size, and data enough, to be named at all."""
-    most = OF_NOISE if adequate and claim.needed else MOST_FAMILIES
-    few = len(families(search, claim)) <= most
+    few = len(families(search, claim)) <= (MOST_FAMILIES if claim.needed else UNNEEDED)
     return few and blocks >= TOO_FEW and not may_vanish(search, claim)
 
 
