@@ -130,7 +130,7 @@ def test_what_could_be_too_many_others_has_no_name():
     toy = Toy({(0,): 0.3})
     some = ("constant_load@pivot", "viscous_friction@pivot", "coulomb_friction@pivot")
     assert nameable(toy, claim(rivals=some), 20)  # two forms of dissipation count once
-    many = (*some, "actuator_gain@voltage", "delay@voltage", "mass")
+    many = (*some, "actuator_gain@voltage", "delay@voltage", "sensor_offset@angle")
     assert not nameable(toy, claim(rivals=many), 20)
     # What forecasts do not clearly need has to be one of fewer.
     assert nameable(toy, claim(rivals=many[:4]), 20)
