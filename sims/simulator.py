@@ -80,6 +80,8 @@ class Parameter:
     ``value`` may be an array with one entry per row of a batch. ``scale`` is a typical size, for
     a parameter whose value is zero; otherwise the value tells. ``family`` is that of the effects
     which a change of it resembles, ``"dissipation"`` for a damping (``sims.effects.Effect``).
+    ``bold`` is a change, as a share of the value, that a search tries in full, for a parameter of
+    which small changes may do nothing: friction that holds as it is.
     """
 
     value: float | Array
@@ -89,6 +91,7 @@ class Parameter:
     high: float = math.inf
     scale: float = 1.0
     family: str = ""
+    bold: float | None = None
 
 
 class Simulator(abc.ABC):

@@ -83,7 +83,7 @@ def grow(search: Search, key: Key) -> list[Key]:
     places = search.currency.groups
     total = search.effort.grown if key else search.effort.singles
     wanted = max(2, -(-total // len(places)))
-    found: list[Key] = []
+    found = [] if key else boldly(search)
     for group in places:
         good = 0
         for gain in _by_gain(search, around, group)[: 3 * wanted]:
@@ -103,8 +103,7 @@ def grow(search: Search, key: Key) -> list[Key]:
             if good >= wanted:
                 break
     if not key:
-        found += boldly(search)
-        for pair in pair_gains(around, search.effort.pairs):
+        for pair in [] if search.late else pair_gains(around, search.effort.pairs):
             numbers = [around.variants[v].candidate for v in pair.variants]
             fresh, theta = search.merged(key, zip(numbers, pair.values, strict=True))
             search.add({fresh: theta})

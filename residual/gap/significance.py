@@ -10,6 +10,9 @@ import numpy as np
 
 from residual.gap.search import Key, Search
 
+#: Forecast error with an effect over that without, below which it forecasts better.
+BETTER = 0.95
+
 
 def size(search: Search) -> int:
     """Number of residuals."""
@@ -39,6 +42,12 @@ def significant(search: Search, needed: float) -> Key:
             - np.log(size(search)) * (search.numbers(key) - search.numbers(k) - 1)
             for k in smaller if k in search.tried
         }  # fmt: skip
+        if search.simulator.has_contacts:
+            # Past an impact start states are found by luck, which lowers costs but forecasts nothing.
+            error = search.error(key)
+            falls = {
+                k: f if error < BETTER * search.error(k) else -np.inf for k, f in falls.items()
+            }
         weakest = min(falls, key=lambda k: falls[k])
         if falls[weakest] > needed:
             break

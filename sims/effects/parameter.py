@@ -46,7 +46,9 @@ class ParameterChange(Effect):
         parameter = simulator.parameters[self.parameter]
         low = parameter.low - float(np.min(parameter.value))
         high = parameter.high - float(np.max(parameter.value))
-        return {"change": dataclasses.replace(found["change"], low=low, high=high)}
+        size = float(np.max(np.abs(parameter.value)))
+        bold = None if parameter.bold is None else parameter.bold * size
+        return {"change": dataclasses.replace(found["change"], low=low, high=high, bold=bold)}
 
     def family_in(self, simulator: HostSimulator) -> str:
         """The family that the parameter was declared with."""

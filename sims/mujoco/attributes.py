@@ -18,6 +18,8 @@ from sims.simulator import Array, Parameter
 Index = tuple[int, ...]
 
 DISSIPATION = ViscousFriction.family
+#: Change of a contact's friction, as a share of it, that should make it slip where it holds.
+SLIPPING = -0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -243,7 +245,8 @@ def _of_contacts(model: Any) -> Iterator[Attribute]:
     geoms = touching_geoms(model)
     if not geoms:
         return
-    yield _group("friction of all contacts", [Slot("geom_friction", (g, 0), True) for g in geoms])
+    every = _group("friction of all contacts", [Slot("geom_friction", (g, 0), True) for g in geoms])
+    yield dataclasses.replace(every, parameter=dataclasses.replace(every.parameter, bold=SLIPPING))
     for g in geoms:
         full = f"friction of geom {elements.name_of('geom', model, g)}"
         value = float(model.geom_friction[g, 0])

@@ -16,11 +16,14 @@ Array = NDArray[np.float64]
 #: Trial strength of a smooth effect, as a share of what candidates are tried at elsewhere. A
 #: window of steps shows a hundredth of most effects, and an impact comes soon after the last.
 GENTLE = 0.3
+#: Step of a finite difference by a strength, as a share of a usual one. Narrow ones see the kinks
+#: of impacts, and steps of Gauss and Newton by such derivatives are far too short.
+WIDE = 0.5
 
 
 def chosen_changes(model: Model, theta: Array, data: WindowData, fitted: StartFit) -> Array:
     """Derivative of the whitened output by the unknowns of the model, (W, R, p)."""
-    steps = np.where(theta + 0.1 * model.step > model.high, -0.1, 0.1) * model.step
+    steps = np.where(theta + WIDE * model.step > model.high, -WIDE, WIDE) * model.step
     thetas = theta + np.diag(steps)
     jobs = [job(model, t, data, fitted.starts[None]) for t in thetas]
     measured = data.samples.measured

@@ -13,7 +13,7 @@ from residual.gap.candidates import Candidate
 from residual.gap.fitting import Fit, Fitter, Foretold, Left
 from residual.gap.impacts.columns import candidate_changes, chosen_changes
 from residual.gap.impacts.noise import with_noise
-from residual.gap.impacts.refine import Refined, refine, renew, settle
+from residual.gap.impacts.refine import Refined, grown, improved, level, refine
 from residual.gap.impacts.robust import weights
 from residual.gap.impacts.single_shooting import Job, WindowData, fit_starts, job, run, shown
 from residual.gap.impacts.windows import lay_out
@@ -31,8 +31,8 @@ Array = NDArray[np.float64]
 MATERIAL = 0.02
 #: Share of it by which a rival must be worse to be excluded.
 TIED = 0.01
-#: Full steps of the strengths; the first is by far the longest.
-STEPS = 3
+#: Steps of the strengths on whole windows.
+STEPS = 2
 #: A forecast's squared error counts up to so many times the upper quartile of the nominal one.
 LOST = 4.0
 
@@ -77,26 +77,26 @@ class ImpactFitter:
     def fit(self, model: Model, theta: Array, near: Fit | None = None) -> Fit:
         """See ``Fitter.fit``."""
         data = self.data
-        if near is not None and len(theta):
-            found = refine(model, theta, data, near.inner.fitted, 2)
-        elif len(theta):
-            theta = np.clip(theta, model.low, model.high)
-            found = renew(model, theta, data, data.guess, STEPS)
+        theta = np.clip(theta, model.low, model.high)
+        if near is not None and len(near.theta):
+            found = refine(model, theta, data, near.inner.fitted, STEPS)
         else:
-            found = settle(model, theta, data, data.guess, 2)
-            if near is not None:
-                fitted = near.inner.fitted
-                again = settle(model, theta, data, fitted.starts, 1, fitted.by_start)
-                found = found.with_better(again)
-        return self._as_fit(found)
+            # Short parts of the windows say how strong; what long ones proposed overshoots.
+            zero = [c.linear & (not c.rough and c.bold is None) for c in model.chosen]
+            theta = np.where(np.concatenate([*zero, []]) > 0, 0.0, theta)
+            found = improved(grown(model, theta, data, data.guess), data, STEPS)
+        if near is None:
+            return self._as_fit(found, found.loss)
+        found, gain = level(found, near.inner, data)
+        return self._as_fit(found, near.loss - gain)
 
-    def _as_fit(self, found: Refined) -> Fit:
+    def _as_fit(self, found: Refined, loss: Array) -> Fit:
         fitted = found.fitted
         basis, _ = np.linalg.qr(fitted.by_start)
         inner = basis.transpose(0, 2, 1)
         changes = chosen_changes(found.model, found.theta, self.data, fitted)
         return Fit(
-            found.model, found.theta, found.loss, weights(fitted.costs, self.data.freedom),
+            found.model, found.theta, loss, weights(fitted.costs, self.data.freedom),
             fitted.residual - (basis @ (inner @ fitted.residual[..., None]))[..., 0],
             changes - basis @ (inner @ changes), basis, True, found,
         )  # fmt: skip

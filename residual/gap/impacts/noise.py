@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.impacts.refine import grown
 from residual.gap.impacts.robust import weights
 from residual.gap.impacts.single_shooting import StartFit, WindowData, fit_starts
 from residual.gap.model import Model
@@ -16,6 +17,8 @@ Array = NDArray[np.float64]
 
 #: Noise is never less than this share of a channel's typical size, not even in a simulator's rows.
 FINEST = 1e-5
+#: Turns of start states and noise on whole windows.
+TURNS = 3
 
 
 def first_guess(samples: Samples, nodes: Array) -> Array:
@@ -59,11 +62,11 @@ def with_noise(data: WindowData, sigma: Array, scale: Array) -> WindowData:
 
 
 def quieten(
-    model: Model, theta: Array, data: WindowData, starts: Array, scale: Array, turns: int
+    model: Model, theta: Array, data: WindowData, scale: Array
 ) -> tuple[WindowData, StartFit]:
     """Start states and noise in turns."""
-    for _ in range(turns):
-        fitted = fit_starts(model, theta, data, starts, 1)
-        starts = fitted.starts
+    fitted = grown(model, theta, data, data.guess).fitted
+    for _ in range(TURNS):
         data = with_noise(data, spread(data, fitted)[0], scale)
-    return data, fitted
+        fitted = fit_starts(model, theta, data, fitted.starts, 1)
+    return with_noise(data, spread(data, fitted)[0], scale), fitted

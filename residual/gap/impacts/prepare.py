@@ -39,7 +39,7 @@ def impact_fitter(
     grouped = blocks(samples, Windows.cut(cut), drive(samples, nodes, rates), NAMED_ON)
     scale = scales(simulator)
     data = lay_out(simulator, samples, grouped.windows.pieces)
-    data, _ = quieten(model, none, data, data.guess, scale, 3)
+    data, _ = quieten(model, none, data, scale)
     ahead = max(1, round(horizon / samples.step))
     free = np.full(len(data.sigma), np.inf)
     fitter = ImpactFitter(data, grouped, ahead, scale, free)
@@ -55,7 +55,6 @@ def weigh_impacts(now: Fitter, fit: Fit) -> tuple[Fitter, Noise]:
     assert isinstance(now, ImpactFitter)
     sigma, error = spread(now.data, fit.inner.fitted)
     data = with_noise(now.data, sigma, now.scale)
-    data = dataclasses.replace(data, guess=fit.inner.fitted.starts)
     return dataclasses.replace(now, data=data), Noise(sigma, error)
 
 

@@ -66,6 +66,12 @@ class WindowData:
         part = Windows(windows.index[which], windows.inside[which], windows.run[which])
         return dataclasses.replace(self, windows=part, guess=self.guess[which])
 
+    def until(self, size: int) -> WindowData:
+        """The first so many samples of every window."""
+        windows = self.windows
+        part = Windows(windows.index[:, :size], windows.inside[:, :size], windows.run)
+        return dataclasses.replace(self, windows=part)
+
 
 @dataclasses.dataclass(frozen=True)
 class StartFit:
@@ -87,6 +93,11 @@ class StartFit:
     def costs(self) -> Array:
         """Squared residual of every window, (W,)."""
         return np.minimum((self.residual**2).sum(axis=1), 1e30)
+
+    def where(self, won: NDArray[np.bool_], other: StartFit) -> StartFit:
+        """Another fit for some of the windows, (W,)."""
+        pairs = [(getattr(self, f.name), getattr(other, f.name)) for f in dataclasses.fields(self)]
+        return StartFit(*(np.where(won.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in pairs))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -208,36 +219,42 @@ def fit_starts(
         slope: Derivative by the start states from nearby, to start with.
     """
     base = simulate(model, theta, data, starts[None])[0]
-    now = residual(data, starts, base)
-    damping = np.full(len(data), 1e-3)
-    starts = starts.copy()
     if slope is None:
         slope = by_start(model, theta, data, starts, base)
+    found = StartFit(starts, base, residual(data, starts, base), slope)
     for _ in range(turns):
-        local = slope
-        busy = np.ones(len(data), bool)
-        for _ in range(tries):
-            rows = np.flatnonzero(busy)
-            if not len(rows):
-                break
-            part = data.take(rows)
-            step = _step(local[rows], now[rows], damping[rows])
-            there = starts[rows] + step
-            output = simulate(model, theta, part, there[None])[0]
-            trial = residual(part, there, output)
-            old, new = (now[rows] ** 2).sum(1), (trial**2).sum(1)
-            # Broyden's correction of the derivative along the step that was made.
-            surprise = now[rows] - trial - (local[rows] @ step[..., None])[..., 0]
-            size = np.maximum((step**2 / data.moves**2).sum(1), 1e-12)
-            local = local.copy()
-            local[rows] += surprise[:, :, None] * (step / data.moves**2 / size[:, None])[:, None]
-            good = new < old
-            damping[rows] = np.where(good, 0.3 * damping[rows], 10 * damping[rows])
-            won = rows[good]
-            starts[won], now[won], base[won] = there[good], trial[good], output[good]
-            busy[rows] = ~good | (old - new > 0.02 * old + 0.1)
-        slope = by_start(model, theta, data, starts, base)
-    return StartFit(starts, base, now, slope)
+        found = descend(model, theta, data, found, tries)
+        slope = by_start(model, theta, data, found.starts, found.shown)
+        found = dataclasses.replace(found, by_start=slope)
+    return found
+
+
+def descend(model: Model, theta: Array, data: WindowData, found: StartFit, tries: int) -> StartFit:
+    """Some steps of every window by the derivative it has, corrected as they go."""
+    starts, base, now = found.starts.copy(), found.shown.copy(), found.residual.copy()
+    local, damping = found.by_start, np.full(len(data), 1e-3)
+    busy = np.ones(len(data), bool)
+    for _ in range(tries):
+        rows = np.flatnonzero(busy)
+        if not len(rows):
+            break
+        part = data.take(rows)
+        step = _step(local[rows], now[rows], damping[rows])
+        there = starts[rows] + step
+        output = simulate(model, theta, part, there[None])[0]
+        trial = residual(part, there, output)
+        old, new = (now[rows] ** 2).sum(1), (trial**2).sum(1)
+        # Broyden's correction of the derivative along the step that was made.
+        surprise = now[rows] - trial - (local[rows] @ step[..., None])[..., 0]
+        size = np.maximum((step**2 / data.moves**2).sum(1), 1e-12)
+        local = local.copy()
+        local[rows] += surprise[:, :, None] * (step / data.moves**2 / size[:, None])[:, None]
+        good = new < old
+        damping[rows] = np.where(good, 0.3 * damping[rows], 10 * damping[rows])
+        won = rows[good]
+        starts[won], now[won], base[won] = there[good], trial[good], output[good]
+        busy[rows] = ~good | (old - new > 0.02 * old + 0.1)
+    return StartFit(starts, base, now, found.by_start)
 
 
 def _step(slope: Array, now: Array, damping: Array) -> Array:

@@ -17,14 +17,17 @@ Array = NDArray[np.float64]
 
 #: Least intervals in a window: shorter ones say little where rates were not measured.
 STEPS = 5
+#: Length of a window as a part of the horizon.
+PART = 0.3
 
 
 def steps_for(samples: Samples, horizon: float) -> int:
-    """Intervals in a window: half a horizon, of which forecasts go on from its end.
+    """Intervals in a window: a part of the horizon, of which forecasts go on from its end.
 
-    In longer ones most windows hold an impact on which simulators differ.
+    In longer ones most windows hold an impact on which simulators differ, and past it start states
+    make up for what is missing.
     """
-    return max(STEPS, round(0.5 * horizon / samples.step))
+    return max(STEPS, round(PART * horizon / samples.step))
 
 
 def pieces(samples: Samples, steps: int) -> list[tuple[int, int, int]]:
