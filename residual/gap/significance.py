@@ -43,10 +43,10 @@ def significant(search: Search, needed: float) -> Key:
             for k in smaller if k in search.tried
         }  # fmt: skip
         if search.simulator.has_contacts:
-            # Past an impact start states are found by luck, which lowers costs but forecasts nothing.
-            error = search.error(key)
+            # Luck in finding start states past an impact lowers costs but foretells nothing.
             falls = {
-                k: f if error < BETTER * search.error(k) else -np.inf for k, f in falls.items()
+                k: fall if search.error(key) < BETTER * search.error(k) else -np.inf
+                for k, fall in falls.items()
             }
         weakest = min(falls, key=lambda k: falls[k])
         if falls[weakest] > needed:
