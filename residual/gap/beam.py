@@ -83,7 +83,8 @@ def grow(search: Search, key: Key) -> list[Key]:
     places = search.currency.groups
     total = search.effort.grown if key else search.effort.singles
     wanted = max(2, -(-total // len(places)))
-    found = [] if key else boldly(search)
+    # Of the simulator's own parameters there are few, so they come before time may be over.
+    found = [] if key else boldly(search, parameters=True)
     for group in places:
         good = 0
         for gain in _by_gain(search, around, group)[: 3 * wanted]:
@@ -103,6 +104,7 @@ def grow(search: Search, key: Key) -> list[Key]:
             if good >= wanted:
                 break
     if not key:
+        found += boldly(search, parameters=False)
         for pair in [] if search.late else pair_gains(around, search.effort.pairs):
             numbers = [around.variants[v].candidate for v in pair.variants]
             fresh, theta = search.merged(key, zip(numbers, pair.values, strict=True))
@@ -112,12 +114,19 @@ def grow(search: Search, key: Key) -> list[Key]:
     return list(dict.fromkeys(found))
 
 
-def boldly(search: Search) -> list[Key]:
-    """Fit effects of which small trials tell little alone, such as friction that holds a joint."""
+def boldly(search: Search, parameters: bool) -> list[Key]:
+    """Fit effects of which small trials tell little alone, such as friction that holds a joint.
+
+    Args:
+        search: What is tried goes there.
+        parameters: Whether changes of parameters, or all other effects.
+    """
     found: list[Key] = []
     for number, candidate in enumerate(search.candidates):
         fresh = (number,)
         if candidate.bold is None or search.late or not search.fits_in(fresh):
+            continue
+        if (candidate.effect.enters == "parameter") != parameters:
             continue
         search.add({fresh: candidate.bold})
         if fresh in search.tried and search.sound(fresh):

@@ -26,8 +26,8 @@ SAMPLES, STRIDE = 8, 10
 def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> float:
     """A third of the usual period of the motion, or less if the records are short, in s.
 
-    Two thirds of a system that strikes the ground: its forecasts begin where a window of half
-    their length ends, and over shorter ones a small force moves nothing.
+    Two thirds of a system that strikes the ground: its forecasts begin where a shorter window
+    ends, and over less a small force moves nothing.
 
     The period is that of a sine with the same spread and the same spread of its rate, the middle
     one over channels. At least the records have to hold ``WINDOWS`` windows of ``SAMPLES`` samples.

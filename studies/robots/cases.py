@@ -93,7 +93,7 @@ def cases(robot: str, kind: str, seeds: range) -> Iterator[Case]:
 def strengths(case: Case) -> dict[str, float]:
     """Sizes that make every hidden effect alone deviate by about ``SIZE`` times the noise.
 
-    Where there are impacts, ``SHARE`` of its usual size instead.
+    Where there are impacts, ``SHARE`` of its usual size instead, half of the ground's friction.
     """
     simulator = nominal(case.robot)
     logs = measure(case.robot, {}, seed=case.seed, runs=2, seconds=3.0)
@@ -109,7 +109,9 @@ def strengths(case: Case) -> dict[str, float]:
         rng = np.random.default_rng([zlib.crc32(name.encode()), case.seed])
         sign = 1.0 if quantity.low >= 0 else float(rng.choice([-1.0, 1.0]))
         if simulator.has_contacts:
-            found[name] = float(max(sign * SHARE * quantity.scale, 0.95 * quantity.low))
+            # Soles that hold do not show a little less friction.
+            size = sign * SHARE * quantity.scale if quantity.bold is None else quantity.bold
+            found[name] = float(max(size, 0.95 * quantity.low))
             continue
         low, high = 1e-4, 30.0
         for _ in range(12):
