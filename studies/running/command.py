@@ -50,6 +50,10 @@ class Parser(jsonargparse.ArgumentParser):
             f"{_DEBUG}, or {_DEBUG_VARIABLE}=1, shows where errors arise. {_TRUST} PACKAGE: files "
             "of simulators, such as corrected.yaml, may name classes of that package."
         )
+        if Path(sys.argv[0]).stem == "simgap" and "prog" in options:
+            # The command simgap calls itself what the user typed.
+            name = options["prog"].removeprefix("python -m studies.").replace("_", "-")
+            options["prog"] = f"simgap {name}"
         options.setdefault("formatter_class", HelpFormatter)
         options.setdefault("epilog", says)
         super().__init__(*given, **options)
