@@ -104,7 +104,8 @@ def grow(search: Search, key: Key) -> list[Key]:
             if good >= wanted:
                 break
     if not key:
-        found += boldly(search, parameters=False)
+        # The joints of what walks and hops move, so that the screen sees what rubs there.
+        found += [] if search.simulator.has_contacts else boldly(search, parameters=False)
         for pair in [] if search.late else pair_gains(around, search.effort.pairs):
             numbers = [around.variants[v].candidate for v in pair.variants]
             fresh, theta = search.merged(key, zip(numbers, pair.values, strict=True))

@@ -203,7 +203,8 @@ class Search:
         found = self.fitter.fit(self.model(key), theta, self.tried[near])
         if nested:
             floor = self.tried[near].merit
-            if found.merit > floor:
+            # What strikes the ground is fitted from nothing as long as nothing is there.
+            if found.merit > floor and (near or not self.simulator.has_contacts):
                 start = self._from_nested(key, near, theta)
                 again = self.fitter.fit(self.model(key), start, self.tried[near])
                 found = again if again.merit < found.merit else found
