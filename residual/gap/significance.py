@@ -34,6 +34,11 @@ def significant(search: Search, needed: float) -> Key:
         needed: See ``threshold``.
     """
     key = min(search.usable(), key=lambda k: score(search, k))
+    if search.simulator.has_contacts:
+        # Costs hang on luck in finding start states, so forecasts decide among those as good.
+        most = score(search, key) + search.fitter.tie(search.tried[()])
+        alike = [k for k in search.usable() if score(search, k) <= most]
+        key = min((k for k in alike if search.numbers(k) <= search.numbers(key)), key=search.error)
     while key:
         search.add_without_each(key)
         smaller = [tuple(i for i in key if i != gone) for gone in key]
@@ -43,7 +48,7 @@ def significant(search: Search, needed: float) -> Key:
             for k in smaller if k in search.tried
         }  # fmt: skip
         if search.simulator.has_contacts:
-            # Luck in finding start states past an impact lowers costs but foretells nothing.
+            # That luck foretells nothing.
             falls = {
                 k: fall if search.error(key) < BETTER * search.error(k) else -np.inf
                 for k, fall in falls.items()

@@ -37,7 +37,7 @@ class Refined:
     Attributes:
         model: Simulator with the effects.
         theta: Their numbers, (p,).
-        fitted: The windows inner from their best start states.
+        fitted: The windows, fitted by their best start states.
         loss: Robust loss of every window, (W,).
     """
 

@@ -75,7 +75,7 @@ class WindowData:
 
 @dataclasses.dataclass(frozen=True)
 class StartFit:
-    """Windows inner from their best start states.
+    """Windows fitted by their best start states.
 
     Attributes:
         starts: Physical start states, (W, n_p).
