@@ -29,16 +29,24 @@ def score(search: Search, key: Key) -> float:
 def significant(search: Search, needed: float) -> Key:
     """The set of least score, of which every effect lowers the cost by what chance does not.
 
+    Costs of what strikes the ground hang on luck in finding start states, so there the best
+    forecasts decide among such sets that fit as well.
+
     Args:
         search: Fitted sets, residuals in units of the noise.
         needed: See ``threshold``.
     """
-    key = min(search.usable(), key=lambda k: score(search, k))
-    if search.simulator.has_contacts:
-        # Costs hang on luck in finding start states, so forecasts decide among those as good.
-        most = score(search, key) + search.fitter.tie(search.tried[()])
-        alike = [k for k in search.usable() if score(search, k) <= most]
-        key = min((k for k in alike if search.numbers(k) <= search.numbers(key)), key=search.error)
+    key = pruned(search, min(search.usable(), key=lambda k: score(search, k)), needed)
+    if not key or not search.simulator.has_contacts:
+        return key
+    most = score(search, key) + search.fitter.tie(search.tried[()])
+    alike = [k for k in search.usable() if score(search, k) <= most]
+    other = min((k for k in alike if search.numbers(k) <= search.numbers(key)), key=search.error)
+    return other if pruned(search, other, needed) == other else key
+
+
+def pruned(search: Search, key: Key, needed: float) -> Key:
+    """What is left of a set when all has gone that chance could do."""
     while key:
         search.add_without_each(key)
         smaller = [tuple(i for i in key if i != gone) for gone in key]
@@ -48,7 +56,7 @@ def significant(search: Search, needed: float) -> Key:
             for k in smaller if k in search.tried
         }  # fmt: skip
         if search.simulator.has_contacts:
-            # That luck foretells nothing.
+            # Luck foretells nothing.
             falls = {
                 k: fall if search.error(key) < BETTER * search.error(k) else -np.inf
                 for k, fall in falls.items()
