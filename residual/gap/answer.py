@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from residual.gap.aliases import hidden
+from residual.gap.choice import helps
 from residual.gap.confirmation import Claim, claims, share
 from residual.gap.explain import FOOTNOTE, Explanation
 from residual.gap.forecasts import gap, held_out, main_channel, noise_floor, rollouts
@@ -189,12 +190,26 @@ def verdicts(
         made.append(no_gap_verdict("no gap above noise"))
     elif not left.adequate and (left.ratio > FOOTNOTE or not made):
         made.append(remainder_verdict(left, table, answer.leads))
-    for number, with_it in found.choice.minor.items():
-        if number not in answer.key:
-            made.append(minor_verdict(search, number, share(search, with_it, number)))
+    for number, taken in minor(answer).items():
+        made.append(minor_verdict(search, number, taken))
     if blind:
         made.append(blind_verdict(blind))
     return made
+
+
+def minor(answer: Answer) -> dict[int, tuple[float, float, float]]:
+    """Candidates that help the chosen set by too little, and the share that they would add.
+
+    What helped only in another set's company is none: it is part of another explanation.
+    """
+    search, key = answer.found.search, answer.key
+    shares = {}
+    for number in answer.found.choice.minor:
+        larger = tuple(sorted({*key, number}))
+        tried = larger != key and larger in search.validated and search.sound(larger)
+        if tried and helps(search, key, larger):
+            shares[number] = share(search, larger, number)
+    return shares
 
 
 def evidence(answer: Answer) -> tuple[Rival, ...]:

@@ -36,12 +36,12 @@ class Choice:
     Attributes:
         key: The set.
         reasons: Why each of the other sets was not chosen, in words.
-        minor: Effects that help a little, by a set with them: candidate number -> set.
+        minor: Candidates that larger sets held, which forecast better by too little.
     """
 
     key: Key
     reasons: dict[Key, str]
-    minor: dict[int, Key]
+    minor: tuple[int, ...] = ()
 
 
 def choose(search: Search, enough: Callable[[Key], bool] = lambda _: False) -> Choice:
@@ -55,20 +55,19 @@ def choose(search: Search, enough: Callable[[Key], bool] = lambda _: False) -> C
     best = min(open_, key=search.error)
     fewest = min(search.numbers(key) for key in open_ if as_good(search, key, best))
     key = _better_fit(search, [key for key in open_ if search.numbers(key) <= fewest])
-    minor: dict[int, Key] = {}
+    minor: list[int] = []
     while key:
         smaller = _smaller(search, key, open_)
         short = next((k for k in smaller if enough(k) or not material(search, k, key)), None)
         if short is None:
             break
-        for number in set(key) - set(short):
-            if _helps(search, short, key):
-                minor.setdefault(number, key)
+        if helps(search, short, key):
+            minor += sorted(set(key) - set(short))
         key = short
-    if key and not _helps(search, (), key):
+    if key and not helps(search, (), key):
         key = ()
-    minor = {number: found for number, found in minor.items() if number not in key}
-    return Choice(key, reasons(search, key), minor)
+    kept = tuple(number for number in dict.fromkeys(minor) if number not in key)
+    return Choice(key, reasons(search, key), kept)
 
 
 def _better_fit(search: Search, keys: list[Key]) -> Key:
@@ -116,7 +115,7 @@ def takes_off(currency: Currency, worse: Array, better: Array) -> bool:
     return bool(over_all or ((gained > AT_ONE * before) & (gained > TRIFLE)).any())
 
 
-def _helps(search: Search, smaller: Key, larger: Key) -> bool:
+def helps(search: Search, smaller: Key, larger: Key) -> bool:
     """Whether a set forecasts better than a smaller one beyond a standard error."""
     squares = search.validated
     gained, error = search.currency.difference(squares[smaller].squares, squares[larger].squares)

@@ -157,7 +157,7 @@ def settle(search: Search, floor: Noise) -> Explanation:
         if quiet:
             needed = fitter.needed(search.signatures(()), search.tried[()])
             key = significant(search, needed)
-            choice = Choice(key, reasons(search, key), {})
+            choice = Choice(key, reasons(search, key))
         else:
             needed = np.inf
             choice = choose(search, enough)

@@ -24,7 +24,7 @@ from sims.host import HostSimulator
 from sims.simulator import Array, wrap
 
 #: Rows that must follow each other before anything is looked for, and the longest piece.
-SHORTEST, LONGEST = 12, 50
+SHORTEST, LONGEST = 8, 50
 #: Control periods that forecasts last.
 HORIZON = 9
 

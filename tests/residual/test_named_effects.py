@@ -43,6 +43,14 @@ def test_forty_exact_rows_name_the_mass_and_predict_everywhere(model, probe):
     np.testing.assert_allclose(model.predict(*probe), wanted, atol=1e-4)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_half_a_second_of_exact_rows_is_enough_for_the_mass(seed):
+    model = DifferenceModel(NamedEffects(), Pendulum()).fit(rows(Pendulum.true(), 10, seed))
+    (effect,) = model.fitted().effects_
+    assert effect.name == "mass"
+    assert effect.change == pytest.approx(0.035, rel=0.02)
+
+
 def test_corrected_it_steps_once_as_simulator_and_difference_do(model, probe):
     direct = CorrectedSimulator(model.simulator, model)
     added = CorrectedSimulator(Pendulum(), model)
