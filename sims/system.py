@@ -78,6 +78,7 @@ class System:
         groups: State channels by the name under which their errors are averaged; by default each
             by itself, or many by their kind.
         shown: State channels drawn over time; by default the first three.
+        path: Two state channels, along and up, of a place whose path is drawn.
         target: A return that counts as success, if there is one.
         best: Computes the best return that is possible, if it can be known.
         elsewhere: Draws states (n, T + 1, n_s) and actions (n, T, n_a) of rollouts of the true
@@ -101,6 +102,7 @@ class System:
     measures: Callable[[Array, Array], Mapping[str, float]] | None = None
     groups: Mapping[str, tuple[str, ...]] | None = None
     shown: tuple[str, ...] | None = None
+    path: tuple[str, str] | None = None
     target: float | None = None
     best: Callable[[], float] | None = None
     elsewhere: Callable[[np.random.Generator], tuple[Array, Array]] | None = None
@@ -117,7 +119,8 @@ class System:
         if isinstance(self.true, Simulator):
             check_same_channels(self.nominal, self.true, f"system {self.name}: the true system")
         names = [channel.name for channel in self.nominal.state_channels]
-        named = [*(self.shown or ()), *(n for part in (self.groups or {}).values() for n in part)]
+        named = [*(self.shown or ()), *(self.path or ())]
+        named += [name for part in (self.groups or {}).values() for name in part]
         if unknown := [name for name in named if name not in names]:
             raise ValueError(
                 f"system {self.name}: no state channel {', '.join(unknown)}, only "
@@ -207,6 +210,7 @@ class System:
             "actions": [{"name": c.name, "unit": c.unit} for c in self.nominal.action_channels],
             "groups": {name: list(part) for name, part in self.channel_groups().items()},
             "shown": list(self.shown or [channel.name for channel in channels[:3]]),
+            "path": list(self.path or []),
             "target": self.target,
             "published": dict(self.published),
             "starts": self.evaluation.true_episodes,

@@ -115,6 +115,33 @@ def episodes_figure(
 
 
 @styled()
+def path_figure(
+    about: Mapping[str, Any], episodes: Mapping[str, Mapping[str, np.ndarray]]
+) -> Drawn:
+    """The way of the place that the system shows, of one whole episode of each policy.
+
+    Args:
+        about: The system.
+        episodes: ``states`` by name of the policy.
+    """
+    names = [channel["name"] for channel in about["states"]]
+    columns = [names.index(name) for name in about["path"]]
+    labels = [f"{names[c]} ({about['states'][c]['unit']})" for c in columns]
+    figure, axes = new_figure(len(episodes), 1, height=0.8 + 1.3 * len(episodes), share_x=True)
+    data = []
+    for axis, colour, (name, episode) in zip(
+        axes[:, 0], PALETTE * len(episodes), episodes.items(), strict=False
+    ):
+        along, up = (episode["states"][:, column] for column in columns)
+        axis.plot(along, up, color=colour, linewidth=1.2)
+        axis.set(title=name, ylabel=labels[1])
+        axis.sharey(axes[0, 0])
+        data.append(pd.DataFrame({"policy": name, about["path"][0]: along, about["path"][1]: up}))
+    axes[-1, 0].set_xlabel(labels[0])
+    return figure, pd.concat(data, ignore_index=True)
+
+
+@styled()
 def updates_figure(rows: pd.DataFrame) -> Drawn:
     """Return per update by estimator, and of the control; ``rows`` hold every policy once."""
     figure, axes = new_figure(height=3.8)

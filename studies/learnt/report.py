@@ -15,6 +15,7 @@ from studies.learnt.figures import (
     budgets_figure,
     curves_figure,
     episodes_figure,
+    path_figure,
     updates_figure,
 )
 from studies.learnt.samples_needed import samples_section
@@ -93,6 +94,12 @@ def write_report(
             "State and action over time for each policy on the true system.",
             f"The first {SECONDS:g} s on the true system; a line ends where its episode ends.",
         ))  # fmt: skip
+        if about.get("path"):
+            drawings.append((
+                "path", path_figure(about, drawn), "Paths on the true system",
+                f"{about['path'][1]} against {about['path'][0]} for each policy.",
+                "One whole episode of each policy.",
+            ))  # fmt: skip
     learnt = rows[rows["name"] == "difference"]
     if learnt["samples_per_update"].nunique() > 1:
         drawings.append((

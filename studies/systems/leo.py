@@ -78,6 +78,7 @@ SYSTEM = System(
     measures=walk_measures,
     groups=GROUPS,
     shown=BASE,
+    path=("x", "z"),
     target=2300.0,  # the paper's fixed return (Table IV)
     elsewhere=random_poses,
     published={  # paper, tables III and IV
