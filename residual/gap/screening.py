@@ -51,17 +51,11 @@ class Signatures:
         variants: One or more for each candidate.
         matrix: Columns, start states and chosen effects projected out, (rows, c).
         residual: The residual, projected likewise, (rows,).
-        chosen: Derivative by the unknowns of the chosen effects, start states projected out.
-        plain: ``matrix`` before the chosen effects were projected out.
-        plain_residual: ``residual`` likewise.
     """
 
     variants: tuple[Variant, ...]
     matrix: Array
     residual: Array
-    chosen: Array
-    plain: Array
-    plain_residual: Array
 
     @property
     def strengths(self) -> Array:
@@ -93,16 +87,12 @@ def signatures(fit: Fit, variants: Sequence[Variant], columns: Array) -> Signatu
         columns: shape (W, R, c).
     """
     columns = columns - fit.basis @ (fit.basis.transpose(0, 2, 1) @ columns)
-    plain = flatten(columns, fit.weights)
     chosen = flatten(fit.by_knob, fit.weights)
     residual = flatten(fit.projected, fit.weights)
     return Signatures(
         tuple(variants),
-        project_out(chosen, plain),
+        project_out(chosen, flatten(columns, fit.weights)),
         project_out(chosen, residual[:, None])[:, 0],
-        chosen,
-        plain,
-        residual,
     )
 
 

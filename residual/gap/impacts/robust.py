@@ -26,19 +26,3 @@ def losses(costs: Array, freedom: Array) -> Array:
 def weights(costs: Array, freedom: Array) -> Array:
     """What a unit of squared residual counts in every window."""
     return (TAILS + freedom) / (TAILS + np.maximum(costs, 0.0))
-
-
-def trimmed_drop(before: Array, after: Array, trim: float = 0.1) -> float:
-    """Share by which the loss falls, the windows that gain and lose most left out.
-
-    A few windows that happen to find a better start state, or an impact that moves into another
-    step, then make no effect.
-
-    Args:
-        before, after: Loss of every window, (W,).
-        trim: Share left out at each end.
-    """
-    change = np.sort(before - after)
-    cut = int(trim * len(change))
-    kept = change[cut : len(change) - cut]
-    return float(kept.mean() / before.mean()) if before.mean() > 0 else 0.0

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from residual.gap import find_gap
 from residual.gap.impacts.quadratic import Quadratic, minimise
-from residual.gap.impacts.robust import losses, trimmed_drop
+from residual.gap.impacts.robust import losses
 from residual.trajectories import Trajectory
 from sims.effects.parameter import ParameterChange
 from sims.leo import Leo, Walking
@@ -96,11 +96,3 @@ def test_the_robust_loss_of_a_set_is_its_least():
     held = Quadratic(model.a, model.b, model.c, model.freedom, np.array([-np.inf, 0.0, 0.0]))
     _, (bounded,) = minimise(held, [(0, 1)], turns=40)
     assert bounded[1] == 0.0
-
-
-def test_a_few_windows_make_no_effect():
-    before = np.full(50, 10.0)
-    after = before.copy()
-    after[:4] = 0.0
-    assert trimmed_drop(before, after) == 0.0
-    assert trimmed_drop(before, 0.9 * before) == pytest.approx(0.1)
