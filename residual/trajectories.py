@@ -22,7 +22,8 @@ class Transitions:
     Attributes:
         states: s, shape (n, n_s), in the units of the simulator's state channels.
         actions: a, shape (n, n_a).
-        next_states: s', shape (n, n_s); angles continue those of ``states`` unwrapped.
+        next_states: s', shape (n, n_s); angles continue those of ``states`` unwrapped. A channel
+            without a sensor is NaN throughout, in both.
         episodes: Which episode each row belongs to, shape (n,), integers.
     """
 
@@ -76,13 +77,16 @@ class Transitions:
                     f"{path}: {name} holds {array.dtype} of shape {array.shape}, expected "
                     f"{'integers' if ndim == 1 else 'numbers'} in {ndim} dimensions"
                 )
-            if not np.isfinite(array).all():
-                raise FileError(f"{path}: {name} holds values that are not finite")
         if len({len(array) for array in arrays.values()}) > 1 or (
             arrays["states"].shape != arrays["next_states"].shape
         ):
             shapes = ", ".join(f"{name} {arrays[name].shape}" for name in names)
             raise FileError(f"{path}: shapes that do not fit together: {shapes}")
+        unmeasured = np.isnan([arrays["states"], arrays["next_states"]]).all(axis=(0, 1))
+        for name, array in arrays.items():
+            seen = array[:, ~unmeasured] if name in ("states", "next_states") else array
+            if not np.isfinite(seen).all():
+                raise FileError(f"{path}: {name} holds values that are not finite")
         return cls(**arrays)
 
 

@@ -13,8 +13,9 @@ import sys
 import sysconfig
 import tempfile
 import traceback
+import typing
 from argparse import RawDescriptionHelpFormatter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -32,7 +33,6 @@ _CLASSES = (*_SIMULATORS, "--estimator")
 # What a check of a disk writes before the work: less would fit on a disk that is full.
 _PROBE = bytes(2**16)
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-_GROUPED = re.compile(r"--\w+(\.\w+)+")
 _IMPORT_PATH = re.compile(r"\w+(\.\w+)+")
 _HOME = Path(__file__).parents[2]
 _LIBRARIES = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "purelib", "platlib")]
@@ -61,8 +61,10 @@ class Parser(jsonargparse.ArgumentParser):
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, *rest: Any, **options: Any
     ) -> Any:
-        """As usual; a model file may stand for a simulator, and several numbers for a list."""
-        given = _with_lists(list(sys.argv[1:] if args is None else args))
+        """As usual; a model file may stand for a simulator, and words in a row for a list."""
+        kinds = {o: getattr(a, "_typehint", None) for a in self._actions for o in a.option_strings}
+        lists = {name for name, kind in kinds.items() if typing.get_origin(kind) in (list, tuple)}
+        given = _with_lists(list(sys.argv[1:] if args is None else args), lists)
         try:
             for i, text in enumerate(given):
                 name, equals, value = text.partition("=")
@@ -118,16 +120,16 @@ class Parser(jsonargparse.ArgumentParser):
         raise SystemExit(2)
 
 
-def _with_lists(arguments: Sequence[str]) -> list[str]:
-    """The arguments, several numbers after a setting of a group, ``--a.b 1 2``, as one list."""
+def _with_lists(arguments: Sequence[str], lists: Container[str]) -> list[str]:
+    """The arguments, what follows an option that takes a list, ``--a.b 1 2``, as one list."""
     found: list[str] = []
     after = ""
     for text in arguments:
-        if after and _NUMBER.fullmatch(text):
-            found[-1] = f"[{found[-1].strip('[]')}, {text}]"
-            continue
-        after = found[-1] if found and _NUMBER.fullmatch(text) else ""
-        after = after if _GROUPED.fullmatch(after) else ""
+        if text.startswith("-") and not _NUMBER.fullmatch(text):
+            after = text if text in lists else ""
+        elif after and not text.startswith("["):
+            begun = [] if found[-1] == after else [found.pop().strip("[]")]
+            text = f"[{', '.join([*begun, text])}]"
         found.append(text)
     return found
 

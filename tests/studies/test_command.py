@@ -71,10 +71,13 @@ def ended(capsys, fault, arguments=(), **options):
     return stopped.value.code, capsys.readouterr().err
 
 
-def test_several_numbers_after_a_setting_of_a_group_are_a_list():
+@pytest.mark.parametrize("rate", [["rate"], ["[rate]"]])
+def test_words_in_a_row_after_an_option_that_takes_a_list(rate):
     parser = build_parser(STUDY)
-    written = ["--measure.noise", "0.01", "0.2", "--ddpg.hidden", "64", "64", "--seed", "3"]
-    plain = ["--measure.noise=[0.01, 0.2]", "--ddpg.hidden=[64, 64]", "--seed=3"]
+    written = ["--measure.noise", "0.01", "0.2", "--ddpg.hidden", "64", "64", "--seed", "3",
+               "--measure.unmeasured", *rate]  # fmt: skip
+    plain = ["--measure.noise=[0.01, 0.2]", "--ddpg.hidden=[64, 64]", "--seed=3",
+             "--measure.unmeasured=[rate]"]  # fmt: skip
     parsed, same = (parser.parse_args(arguments) for arguments in (written, plain))
     assert list(parsed.measure.noise) == [0.01, 0.2]
     assert parsed.as_dict() == same.as_dict()
