@@ -135,8 +135,12 @@ class System:
         """The task on a simulator."""
         return SimulatorEnv(simulator, task or self.task)
 
-    def true_environment(self) -> gymnasium.Env[Any, Any]:
+    def true_environment(self, believed: Simulator | None = None) -> gymnasium.Env[Any, Any]:
         """The task on the true system.
+
+        Args:
+            believed: The simulator that makes a state of what sensors show; by default the one at
+                hand, which also stands in for one with hidden memory.
 
         Raises:
             ValueError: The environment does not fit the nominal simulator.
@@ -149,7 +153,11 @@ class System:
             env: gymnasium.Env[Any, Any] = SimulatorEnv(true, self.task)
         else:
             env = SampledEnv(true, self.nominal, self.task, self.state_of)
-        return MeasuredEnv(env, self.nominal, self.measurement) if self.measurement else env
+        if not self.measurement:
+            return env
+        memory = believed and any(c.kind == "memory" for c in believed.state_channels)
+        known = self.nominal if believed is None or memory else believed
+        return MeasuredEnv(env, known, self.measurement)
 
     @property
     def can_learn_on_truth(self) -> bool:

@@ -42,12 +42,12 @@ def run_loop(do: Steps, budget: Budget, corrected: Simulator | None = None) -> L
         corrected: The simulator with what it lacked: a policy is trained on it as well, from the
             idealised one, without a true sample.
     """
-    learnt, samples = Learnt.of(do.system), []
+    learnt, samples, model = Learnt.of(do.system), [], None
     policy = idealised = do.train("idealised", budget.idealised_steps)
     learnt.add_policy("idealised", idealised)
     start = begin = WarmStart.begin(idealised, do.replay)
     for update in range(1, budget.iterations + 1):
-        samples.append(do.collect(policy, budget.true_samples, update))
+        samples.append(do.collect(policy, budget.true_samples, update, model))
         model = do.fit(samples)
         policy = do.train("difference", budget.difference_steps, start, on=model, update=update)
         accuracy = do.measure(model, policy, update)

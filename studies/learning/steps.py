@@ -77,20 +77,32 @@ class Steps:
     smoothing: bool = True
     described: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
-    def collect(self, policy: Training, samples: int, update: int) -> Samples:
-        """True transitions under a policy with exploration noise."""
+    def collect(
+        self, policy: Training, samples: int, update: int, known: Model | None = None
+    ) -> Samples:
+        """True transitions under a policy with exploration noise.
+
+        Args:
+            policy: The last one.
+            samples: So many.
+            update: Which update they are for.
+            known: What was learnt of the difference, for the state that the policy sees.
+        """
 
         def compute() -> Samples:
             seed = stream(self.seed, "collect", update)
             noise = exploration(self.system, self.algorithm, seed)
-            env = self.system.true_environment()
+            env = self.system.true_environment(self._corrected(known) if known else None)
             with self.progress.task(f"collect {samples} true samples", samples) as tell:
                 runs = collect(policy.policy, env, samples, seed, noise)
                 tell(samples, "")
             return Samples(transitions(self.system, runs))
 
-        settings = {"policy": policy.key, "samples": samples, "update": update}
-        return self._kept("collect", settings, compute, Samples.load)
+        settings: dict[str, Any] = {"policy": policy.key, "samples": samples, "update": update}
+        if known:
+            settings |= {"known": known.key, **self._estimator}
+        code = (self.estimator,) if known else ()
+        return self._kept("collect", settings, compute, Samples.load, *code)
 
     def fit(self, samples: Sequence[Samples]) -> Model:
         """The difference model on all transitions so far."""
@@ -185,7 +197,7 @@ class Steps:
         simulator, task, difference = self.system.nominal, self.system.task, None
         if isinstance(on, Model):
             difference = on.difference
-            simulator = CorrectedSimulator(simulator, difference)
+            simulator = self._corrected(on)
             if self.uncertainty_penalty:
                 task = PenalisedTask.around(task, difference, on.data, self.uncertainty_penalty)
         elif on is not None:
@@ -223,6 +235,7 @@ class Steps:
                 report,
                 on_true,
                 RANDOM_STEPS if start is None else 0,
+                self._corrected(on) if isinstance(on, Model) else simulator,
             )
         held = simulator.held if isinstance(simulator, CorrectedSimulator) else 0
         taken = None
@@ -233,8 +246,8 @@ class Steps:
     def _measure(self, model: Model, policy: Training, update: int) -> Measured:
         system, protocol = self.system, self.system.evaluation
         seed = stream(self.seed, "measure", update)
-        corrected = CorrectedSimulator(system.nominal, model.difference)
-        env = system.true_environment()
+        corrected = self._corrected(model)
+        env = system.true_environment(corrected)
         steps = max(1, round(protocol.visited_seconds / corrected.dt))
         runs = [rollout(policy.policy, env, seed, max_steps=steps)]
         runs += [
@@ -254,6 +267,9 @@ class Steps:
             draw = system.elsewhere or (lambda rng: uniform_rollouts(system.true, rng))  # type: ignore[arg-type]
             found["uniform"] = accuracy_along(corrected, *draw(rng), stride=stride)
         return Measured(jsonable(found))
+
+    def _corrected(self, model: Model) -> CorrectedSimulator:
+        return CorrectedSimulator(self.system.nominal, model.difference)
 
     @cached_property
     def _estimator(self) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from policy.noise import OrnsteinUhlenbeck
 from policy.selection import Point, learn_and_select
 from residual.trajectories import Transitions
 from simgap_npz import read_npz, write_npz
-from sims.simulator import Array
+from sims.simulator import Array, Simulator
 from sims.system import System
 from studies.learning.streams import stream
 from studies.learning.warm_start import Simulated
@@ -96,6 +96,7 @@ def train(
     tell: Callable[[Point], None],
     on_true: bool = False,
     random_steps: int = 0,
+    believed: Simulator | None = None,
 ) -> Training:
     """Learn, and keep the policy that is best in the environment learnt in.
 
@@ -109,6 +110,7 @@ def train(
         tell: Told every test.
         on_true: Whether the environment is the true system: then the test is the measure itself.
         random_steps: The first so many actions are random.
+        believed: Makes a state of what the true system's sensors show, see ``System``.
     """
     protocol, updates, begin = system.evaluation, learner.updates, time.perf_counter()
     selection = learn_and_select(
@@ -136,15 +138,15 @@ def train(
         ),
         "seconds": seconds,
     }
-    tests, episode = test_on_truth(system, learner.policy, seed("test"))
+    tests, episode = test_on_truth(system, learner.policy, seed("test"), believed)
     return Training(learner, selection.curve, summary | tests, episode)
 
 
 def test_on_truth(
-    system: System, policy: Policy, seed: int
+    system: System, policy: Policy, seed: int, believed: Simulator | None = None
 ) -> tuple[dict[str, Any], dict[str, Array]]:
     """Rollouts on the true system: mean return and measures, and the first rollout."""
-    env = system.true_environment()
+    env = system.true_environment(believed)
     runs = [rollout(policy, env, seed + k) for k in range(system.evaluation.true_episodes)]
     result: dict[str, Any] = {"return_true": float(np.mean([run.total for run in runs]))}
     if system.measures:
