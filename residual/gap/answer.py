@@ -9,7 +9,7 @@ import numpy as np
 
 from residual.gap.aliases import hidden
 from residual.gap.choice import helps
-from residual.gap.confirmation import Claim, claims, share
+from residual.gap.confirmation import Claim, claims, in_plain_form, share
 from residual.gap.explain import FOOTNOTE, Explanation
 from residual.gap.forecasts import gap, held_out, main_channel, noise_floor, rollouts
 from residual.gap.imitation import imitated
@@ -96,6 +96,11 @@ def confirm(
             made = allow_for_parameters(search, key, made, found.adequate, parameter_tolerance)
             # Now that intervals allow for the parameters, too.
             lost = [c for c in made if not c.needed and may_vanish(search, c)]
+            plainer = None if lost or found.adequate else in_plain_form(search, key, made)
+            if plainer:
+                key = plainer
+                search.add_exchanged(key, 3)
+                continue
         if not lost:
             return Answer(found, key, tuple(made), leads)
         # The one that matters least goes first: what is left may have fewer rivals.

@@ -154,13 +154,21 @@ def _range(samples: Samples, column: int) -> tuple[float, float]:
 def _within_reach(
     effect: Effect, known: dict[str, Quantity], simulator: HostSimulator, samples: Samples
 ) -> dict[str, Quantity]:
-    """Sizes of a joint's effect for the positions that were measured.
+    """Numbers of an effect for the positions that were measured, and for how long.
+
+    No command is later than the longest record lasts.
 
     An angle that counts turns goes far beyond its channel's scale, where a cubic spring of usual
     size would be a wall, and trial steps of that size would tell nothing. A place, such as where a
     spring rests, is looked for near the channel's zero and no farther beyond what was measured
     than that is wide: a spring that rests farther away is a constant load with another name.
     """
+    if effect.enters == "actuator":
+        longest = max(float(run.durations.sum()) for run in samples.recorded)
+        return {
+            name: dataclasses.replace(q, high=min(q.high, longest)) if q.unit == "s" else q
+            for name, q in known.items()
+        }
     joint = next((j for j in simulator.joints if j.name == effect.where), None)
     if effect.enters != "joint" or joint is None:
         return known

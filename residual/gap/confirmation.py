@@ -174,6 +174,33 @@ def excluded(
     return behind > error and _ratio(search, its.half, own.half, group) > 1.0 and ratio > 1.05
 
 
+def in_plain_form(search: Search, key: Key, claims: Sequence[Claim]) -> Key | None:
+    """The set with a plainer form of an effect whose own numbers these data do not tell, if any.
+
+    A law of which a strength may be zero, or a number lies at its bound, is no better than one of
+    its family with fewer numbers that does as well.
+    """
+    for claim in claims:
+        own = search.candidates[claim.number]
+        strengths = {knob.field for knob in own.knobs if knob.strength}
+        told = not any(
+            n.at_bound or (field in strengths and n.low <= 0 <= n.high)
+            for field, n in claim.numbers.items()
+        )
+        rest = set(key) - {claim.number}
+        forms = [
+            rival
+            for rival in search.usable()
+            if len(rival) == len(key)
+            and rest < set(rival)
+            and search.numbers(rival) < search.numbers(key)
+            and {search.candidates[i].label for i in set(rival) - rest} & set(claim.form)
+        ]
+        if forms and not told:
+            return min(forms, key=lambda rival: (search.numbers(rival), search.error(rival)))
+    return None
+
+
 def _by_numerics(search: Search, key: Key, rival: Key, behind: float) -> bool:
     """Whether a rival is behind at the usual step alone."""
     own = at_half_step(search, key).merit - search.tried[key].merit

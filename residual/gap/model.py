@@ -58,6 +58,10 @@ class Model:
     def __len__(self) -> int:
         return len(self.knobs)
 
+    def leap(self, theta: Array) -> Array:
+        """How far each unknown may go at once, (p,): further, no slope is believed."""
+        return 10 * self.step + np.abs(theta)
+
     def bind(self, theta: Array, each: int = 1) -> HostSimulator:
         """The simulator with its own effects and these.
 

@@ -265,7 +265,7 @@ def _step(
         return np.zeros(0)
     rows = by_knob * np.sqrt(weight)[:, None, None]
     aims = projected * np.sqrt(weight)[:, None]
-    limit = 10 * model.step + np.abs(theta)
+    limit = model.leap(theta)
     weight_of_known = model.known**-2
     return bounded_step(
         np.einsum("wri,wrj->ij", rows, rows) + np.diag(weight_of_known),

@@ -160,7 +160,11 @@ def _changes(verdict: Verdict) -> str:
 
 
 def _named(field: str, number: Number) -> str:
-    return f"{field.replace('_', ' ')} {number_text(number)}"
+    return f"{_spelt(field)} {number_text(number)}"
+
+
+def _spelt(field: str) -> str:
+    return field.replace("_", " ")
 
 
 def shape(verdict: Verdict) -> str:
@@ -181,7 +185,11 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.kind not in ("confirmed", "ambiguous"):
         return []
     found = [f"without it, {percent(verdict.share.value)} of the gap would be back"]
-    found += [if_exact(number) for number in verdict.parameters.values() if much_surer(number)]
+    surer = {field: n for field, n in verdict.parameters.items() if much_surer(n)}
+    if surer:
+        single = len(verdict.parameters) == 1
+        spans = [("" if single else f"{_spelt(f)} ") + span(n) for f, n in surer.items()]
+        found.append(f"{', '.join(spans)} if all else in the simulator is exact")
     doubts = [DOUBTS[doubt] for doubt in verdict.doubts if doubt != "rivals"]
     own = label_of(verdict)
     if own in rivals(verdict):
@@ -208,13 +216,13 @@ def much_surer(number: Number) -> bool:
     return high - low < MUCH * (number.high - number.low)
 
 
-def if_exact(number: Number) -> str:
-    """How well a number is known if all else in the simulator is exact."""
+def span(number: Number) -> str:
+    """Between what a number is if all else in the simulator is exact."""
     assert number.if_exact is not None
     low, high = number.if_exact
     half = 0.5 * (high - low)
-    span = f"{rounded(low, half)} to {rounded(high, half)}{unit_text(number.unit)}"
-    return f"{span} if all else in the simulator is exact".replace("-", "\u2212")
+    text = f"{rounded(low, half)} to {rounded(high, half)}{unit_text(number.unit)}"
+    return text.replace("-", "\u2212")
 
 
 def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
