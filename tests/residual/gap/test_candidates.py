@@ -6,7 +6,7 @@ import pytest
 from residual.gap.candidates import candidates
 from residual.gap.samples import Samples
 from residual.trajectories import Trajectory
-from sims.effects import CubicSpring, LinearSpring, Saturation, SensorScale
+from sims.effects import ActuatorLag, CubicSpring, Delay, LinearSpring, Saturation, SensorScale
 from sims.pendulum_equation import PendulumEquation
 
 
@@ -16,6 +16,7 @@ def pool(low, high, volts=3.0):
     run = Trajectory("run", 0.05 * np.arange(51.0), states, volts * np.cos(np.arange(50))[:, None])
     effects = [
         LinearSpring("pivot"), CubicSpring("pivot"), SensorScale("angle"), Saturation("voltage"),
+        Delay("voltage"), ActuatorLag("voltage"),
     ]  # fmt: skip
     return {c.name: c for c in candidates(PendulumEquation(), effects, Samples.join([run], 5))}
 
@@ -42,3 +43,10 @@ def test_a_saturation_is_looked_for_where_inputs_reach():
     for volts in (0.5, 3.0, 20.0):
         (level,) = pool(-1.0, 1.0, volts)["saturation"].knobs
         assert level.high == pytest.approx(volts)
+
+
+@pytest.mark.parametrize("name", ["delay", "actuator_lag"])
+def test_no_command_is_later_than_the_record_lasts(name):
+    # A delay of a million samples would need a million places of memory.
+    (knob,) = pool(-1.0, 1.0)[name].knobs
+    assert knob.high == pytest.approx(2.5)

@@ -7,7 +7,14 @@ import pytest
 from toy import Toy
 
 from residual.gap.candidates import candidates
-from residual.gap.confirmation import Claim, near, needed, steady, survives
+from residual.gap.confirmation import (
+    Claim,
+    in_plain_form,
+    near,
+    needed,
+    steady,
+    survives,
+)
 from residual.gap.intervals import at_bound, bounded
 from residual.gap.model import Model
 from residual.gap.result import Number
@@ -44,6 +51,23 @@ def test_forms_of_one_family_are_apart_if_the_same_wins_at_half_the_horizon_too(
     assert other == (("coulomb_friction@pivot",), (), ())
     few = near(Toy(errors, blocks=7), (1,), 1, adequate=False)
     assert few == (("coulomb_friction@pivot",), (), ())
+
+
+@pytest.mark.parametrize(
+    ("number", "key"),
+    [
+        (Number(0.1, 0.0, 0.2, "N m"), (2,)),
+        (Number(0.1, 0.1, 0.2, "N m", at_bound=True), (2,)),
+        (Number(0.1, 0.05, 0.15, "N m"), None),
+    ],
+    ids=["may be zero", "at a bound", "told"],
+)
+def test_a_plainer_form_stands_where_a_laws_own_numbers_are_not_told(number, key):
+    toy = Toy({(1,): 0.3, (2,): 0.32})
+    toy.numbers = lambda key: 3 if key == (1,) else len(key)
+    law = claim(1, numbers={"change": number}, form=("coulomb_friction@pivot",))
+    assert in_plain_form(toy, (1,), [law]) == key
+    assert in_plain_form(toy, (1,), [dataclasses.replace(law, form=())]) is None
 
 
 def test_a_set_that_did_not_converge_is_no_rival():
