@@ -229,6 +229,8 @@ def state_difference(channels: tuple[Channel, ...], a: ArrayLike, b: ArrayLike) 
 
 
 def random_values(channel: Channel, n: int, rng: np.random.Generator) -> Array:
-    """Random values of a channel, (n,): an angle anywhere, others within scale and bounds."""
+    """Random values of a channel, (n,): an angle anywhere, others within bounds, no farther from
+    what is nearest to zero there than its scale."""
     size = np.pi if channel.angle else channel.scale
-    return rng.uniform(max(channel.low, -size), min(channel.high, size), n)
+    middle = min(max(0.0, channel.low), channel.high)
+    return rng.uniform(max(channel.low, middle - size), min(channel.high, middle + size), n)

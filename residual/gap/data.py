@@ -112,15 +112,16 @@ def _refusals(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> l
 def _without_faults(
     simulator: HostSimulator, trajectories: Sequence[Trajectory]
 ) -> list[Trajectory]:
-    """The runs with faulty samples, and channels that never change, as NaN."""
+    """The runs with faulty samples, and channels that tell nothing, as NaN."""
     states = [np.array(run.states, float) for run in trajectories]
     names = [channel.name for channel in simulator.physical_channels]
-    still_ones = {finding.where for finding in still(simulator, trajectories)}
-    changed = bool(still_ones)
+    useless = {finding.where for finding in still(simulator, trajectories)}
+    useless |= {one.where for one in sums(simulator, trajectories) if one.kind == "derived"}
+    changed = bool(useless)
     for channel, masks in faulty(simulator, trajectories):
         column = names.index(channel.name)
         for own, *marks in zip(states, *masks.values(), strict=True):
-            gone = np.any(marks, axis=0) | (channel.name in still_ones)
+            gone = np.any(marks, axis=0) | (channel.name in useless)
             own[gone, column] = np.nan
             changed = changed or bool(gone.any())
     if not changed:

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.logs.checks import Finding
+from residual.logs.derived import differenced, summed_up
 from residual.logs.faults import (
     clipped_samples,
     dropped_samples,
     frozen_samples,
     rounding,
-    summed_up,
     wild_samples,
 )
 from residual.trajectories import Trajectory
@@ -147,7 +147,7 @@ def rounded(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
 
 
 def sums(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
-    """Channels that are the running sum of another one, and were not declared so."""
+    """Channels that were computed from another one: its running sum, or its rate."""
     durations = [run.durations for run in trajectories]
     states = measured(simulator, trajectories)
     inputs = [
@@ -160,7 +160,13 @@ def sums(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[F
             summable = other.unit == f"{channel.unit}/s" and other is not channel
             if not summable or channel.integrates == other.name:
                 continue
-            if summed_up(values, rates, durations):
+            if other.rate_of == channel.name and differenced(values, rates, durations):
+                says = (
+                    f"was computed from differences of {channel.name}, and is no measurement of "
+                    "its own; it is taken as not measured"
+                )
+                found.append(Finding("derived", other.name, says, {}, "warning"))
+            elif summed_up(values, rates, durations):
                 says = (
                     f"is the running sum of {other.name}, noise included, and no measurement of "
                     f"its own: its error grows with time. Declare it by integrates={other.name!r} "

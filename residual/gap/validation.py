@@ -55,14 +55,16 @@ def without_folds(fit: Fit, blocks: Blocks) -> Array:
     found = np.repeat(theta[None], blocks.folds, axis=0)
     if not len(theta) or blocks.folds < 2:
         return found
-    # A number that moves nothing where it stands stays there, and none leaps.
-    alive = np.diag(matrices.sum(axis=0)) * model.step**2 > IDLE
-    low = np.where(alive, np.maximum(model.low - theta, -model.leap(theta)), 0.0)
-    high = np.where(alive, np.minimum(model.high - theta, model.leap(theta)), 0.0)
+    low = np.maximum(model.low - theta, -model.leap(theta))
+    high = np.minimum(model.high - theta, model.leap(theta))
     for fold in range(blocks.folds):
         rest = blocks.fold_of_window != fold
         matrix, right = matrices[rest].sum(axis=0), rights[rest].sum(axis=0)
-        found[fold] += bounded_step(matrix, right, low, high)
+        # A number of which the other folds tell nothing stays where all of them put it.
+        told = np.diag(matrix) * model.step**2 > IDLE
+        found[fold] += bounded_step(
+            matrix, right, np.where(told, low, 0.0), np.where(told, high, 0.0)
+        )
     return found
 
 

@@ -162,50 +162,8 @@ def rounding(runs: Sequence[Array]) -> float:
     """
     values = np.concatenate([np.ravel(v) for v in runs] or [np.zeros(0)])
     values = values[np.isfinite(values)]
-    step = _grain(runs)
+    step = grain(runs)
     return step if values.size and step > _COARSE * float(np.ptp(values)) else 0.0
-
-
-def summed_up(
-    positions: Sequence[Array], rates: Sequence[Array], durations: Sequence[Array]
-) -> bool:
-    """Whether a channel is nothing but the running sum of another one, noise and all.
-
-    The change of an independent sensor does not contain the noise of the rate; that of a sum
-    contains it to the digit, so it cannot be told from the rate by any of the usual rules.
-
-    Args:
-        positions: What may be a sum, shape (n,) for each run.
-        rates: What may have been summed up, shape (n,).
-        durations: From each sample to the next in s, shape (n - 1,).
-
-    Returns:
-        True if it is; False also where the rate has too little noise to tell.
-    """
-    moved = np.concatenate([np.diff(x) for x in positions])
-    bends = np.concatenate([np.diff(v, 3) for v in rates])
-    speeds = np.concatenate(list(rates))
-    bends, speeds = bends[np.isfinite(bends)], speeds[np.isfinite(speeds)]
-    if bends.size < 20:
-        return False
-    # Third differences of white noise have 20 times its variance.
-    noise = float(np.median(np.abs(bends))) / (0.6745 * np.sqrt(20))
-    if noise < 1e-3 * float(np.std(speeds)):
-        return False
-    rules = (
-        np.concatenate([v[:-1] * h for v, h in zip(rates, durations, strict=True)]),
-        np.concatenate([v[1:] * h for v, h in zip(rates, durations, strict=True)]),
-        np.concatenate([0.5 * (v[:-1] + v[1:]) * h for v, h in zip(rates, durations, strict=True)]),
-    )
-    step = float(np.median(np.concatenate(list(durations))))
-    lost = []
-    for rule in rules:
-        off = np.abs(moved - rule)
-        off = off[np.isfinite(off)]
-        lost.append(float(np.median(off)) / 0.6745 if off.size > 20 else np.inf)
-    # Digits that were not printed are lost; fast motion looks like noise, up to some ten times it.
-    printed = 0.6 * _grain(positions)
-    return min(lost) < max(0.01 * noise * step, min(printed, 0.1 * noise * step))
 
 
 def _usual_change(runs: Sequence[Array]) -> float:
@@ -226,7 +184,7 @@ def _stretches(mask: Mask) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def _grain(runs: Sequence[Array]) -> float:
+def grain(runs: Sequence[Array]) -> float:
     """What all values are multiples of, but for a constant; 0 if there is no such number."""
     values = np.concatenate([np.ravel(v) for v in runs] or [np.zeros(0)])
     values = np.unique(values[np.isfinite(values)])
