@@ -55,7 +55,7 @@ def gap(
     Args:
         search: With the chosen set and its parts.
         key: The chosen set.
-        order: Its members, the one that takes off most first.
+        order: Its members, the one that matters most first.
         floor: See ``noise_floor``.
         ratios: Residual over noise in windows, before and after.
     """
@@ -73,13 +73,23 @@ def gap(
     if search.beside:
         squares = search.validated[()].squares[:, main]
         steps.append(Step("parameters within their tolerance", span(squares)))
-    for count in range(1, len(order) + 1):
-        part = tuple(sorted(order[:count]))
+    part: Key = ()
+    rest = list(order)
+    while rest:
+        larger = {n: tuple(sorted((*part, n))) for n in rest}
+        fitted = [n for n in rest if larger[n] in search.validated]
+
+        def left(number: int, larger: dict[int, Key] = larger) -> float:
+            return float(np.nanmean(search.validated[larger[number]].squares[:, main]))
+
+        number = min(fitted, key=left) if fitted else rest[0]
+        rest.remove(number)
+        part = larger[number]
         if part not in search.validated:
-            partial, theta = search.merged(key, (), drop=tuple(set(key) - set(part)))
+            partial, theta = search.merged(key, (), drop=tuple(rest))
             search.fit(partial, theta)
-        label = search.candidates[order[count - 1]].label
-        steps.append(Step(label, span(search.validated[part].squares[:, main])))
+        squares = search.validated[part].squares[:, main]
+        steps.append(Step(search.candidates[number].label, span(squares)))
     blocks: Blocks = search.fitter.blocks
     rows = blocks.windows.inside.sum(axis=1)
     share = search.currency.share(before.squares, after.squares, np.random.default_rng(0))

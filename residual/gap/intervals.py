@@ -45,7 +45,8 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
     rows, residual = fit.by_knob * root[..., None], fit.projected * root
     scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
     unit = rows / scale
-    known = np.array([knob.known for knob in fit.model.knobs]) * scale
+    # Of a number that moves nothing, no more is known than what is known for certain.
+    known = np.maximum(np.array([knob.known for knob in fit.model.knobs]) * scale, 1e-6)
     matrix = np.einsum("wri,wrj->ij", unit, unit) + np.diag(known**-2)
     inverse = np.linalg.pinv(matrix, rcond=1e-12)
     used = int((np.abs(residual) > 0).sum())

@@ -14,6 +14,8 @@ from residual.gap.search import Key, Search
 #: Families of which an effect may be one and still be worth a name, and one that forecasts do not
 #: clearly need: any of them makes a better simulator, and which it is may be asked of better data.
 MOST_FAMILIES, UNNEEDED = 5, 3
+#: Part of what a parameter may change by that is a change.
+MOVED = 1e-3
 
 
 def nameable(search: Search, claim: Claim, blocks: int) -> bool:
@@ -135,6 +137,7 @@ def calibrated_verdict(search: Search, key: Key) -> Verdict:
     taken = search.currency.share(
         search.before.squares, search.validated[()].squares, np.random.default_rng(0)
     )
+    moved = {name: n for name, n in moved.items() if abs(n.value) > MOVED * (n.high - n.low)}
     changes = ", ".join(f"{name} {n.value:+.3g} {n.unit}" for name, n in moved.items())
     return Verdict(
         "calibrated", "", "", moved, (), "",

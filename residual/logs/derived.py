@@ -89,7 +89,8 @@ def differenced(
     matrix, aim = matrix[known], aim[known]
     weights = np.linalg.lstsq(matrix, aim, rcond=None)[0]
     left = float(np.median(np.abs(aim - matrix @ weights))) / 0.6745
-    if left >= max(0.01 * noise, min(0.6 * grain(rates), 0.1 * noise)):
+    printed = 0.6 * max(grain(rates), _last_digit(rates))
+    if left >= max(0.01 * noise, min(printed, 0.1 * noise)):
         return False
     if not summed_up(positions, rates, durations):
         return True
@@ -111,3 +112,14 @@ def _noise(rates: Sequence[Array]) -> float:
     # Third differences of white noise have 20 times its variance.
     noise = float(np.median(np.abs(bends))) / (0.6745 * np.sqrt(20))
     return noise if noise >= 1e-3 * float(np.std(speeds)) else 0.0
+
+
+def _last_digit(runs: Sequence[Array]) -> float:
+    """The decimal place to which values were printed; 0 if there are too many."""
+    values = np.concatenate(list(runs))
+    values = values[np.isfinite(values)]
+    for place in range(10):
+        digits = values * 10.0**place
+        if (np.abs(digits - np.round(digits)) < 1e-6 * np.maximum(1.0, np.abs(digits))).all():
+            return 10.0**-place
+    return 0.0

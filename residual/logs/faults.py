@@ -23,6 +23,8 @@ _RARE = 0.01
 _STILL = 10
 # Samples in a row at the end of a sensor's range.
 _CLIPPED = 4
+# Part of the samples that are one step on, where the sensor's steps made the samples.
+_STEPPED = 0.9
 # Share of the range of values above which a step of rounding is worth a word.
 _COARSE = 3e-4
 # Zeros in a row that are a drop-out rather than a time at which nothing happened.
@@ -158,11 +160,16 @@ def rounding(runs: Sequence[Array]) -> float:
     """The step to which values were rounded, if it is coarse.
 
     Returns:
-        The step, or 0 if there is none, or one too fine to matter.
+        The step, or 0 if there is none, or one too fine to matter, and where every sample is one
+        step on: such samples were taken when the sensor stepped.
     """
     values = np.concatenate([np.ravel(v) for v in runs] or [np.zeros(0)])
     values = values[np.isfinite(values)]
     step = grain(runs)
+    moves = np.abs(np.concatenate([np.diff(v) for v in runs] or [np.zeros(0)]))
+    moves = moves[np.isfinite(moves)]
+    if step and moves.size and np.mean(np.abs(moves - step) < 0.02 * step) > _STEPPED:
+        return 0.0
     return step if values.size and step > _COARSE * float(np.ptp(values)) else 0.0
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from residual.gap import GapResult
-from residual.gap.confirmation import FEW
-from residual.gap.result import Doubt, Number, Verdict
+from residual.gap.confirmation import FEW, TOO_FEW
+from residual.gap.result import Doubt, Gap, Number, Verdict
 from studies.gap.words import (
     KINDS,
     ahead,
@@ -227,6 +227,13 @@ def span(number: Number) -> str:
 
 def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
     found = [f"{result.gap.windows_after:.3g} times the noise is left"]
+    gap = result.gap
+    if gap.blocks < TOO_FEW and not result.effects:
+        more = quantity_text((TOO_FEW - gap.blocks) * gap.horizon_s, "s")
+        found.append(
+            f"nothing is named from {gap.blocks} {_blocks(gap)} of data, {TOO_FEW} are needed: "
+            f"log some {more} more, or set a shorter --horizon"
+        )
     if verdict.follows:
         found.append(f"it looks like a force that follows {verdict.follows}")
     if verdict.alternatives:
@@ -241,11 +248,14 @@ def provisional(result: GapResult) -> str:
     """Why an answer is provisional, and what would do."""
     gap = result.gap
     more = quantity_text((FEW - gap.blocks) * gap.horizon_s, "s")
-    blocks = "block" if gap.blocks == 1 else "blocks"
     return (
-        f"provisional: there are {gap.blocks} {blocks} of data to confirm it, {FEW} would do "
-        f"(some {more} more)"
+        f"provisional: there are {gap.blocks} {_blocks(gap)} of data to confirm it, {FEW} would "
+        f"do (some {more} more)"
     )
+
+
+def _blocks(gap: Gap) -> str:
+    return "block" if gap.blocks == 1 else "blocks"
 
 
 def is_footnote(verdict: Verdict) -> bool:

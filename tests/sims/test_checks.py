@@ -123,6 +123,15 @@ def test_a_system_without_inputs_can_be_checked():
     assert "effect quadratic_drag@height" in {finding.check for finding in findings}
 
 
+@pytest.mark.parametrize(("low", "high"), [(1000.0, 2000.0), (-20.0, -4.0), (5.0, np.inf)])
+def test_an_input_need_not_reach_zero(low, high):
+    class Throttled(Good):
+        action_channels = (Channel("pulse", "us", "input", scale=3.0, low=low, high=high),)
+
+    findings = check_simulator(Throttled())
+    assert all(finding.ok for finding in findings), "\n".join(map(str, findings))
+
+
 def test_rows_can_be_given():
     findings = check_simulator(Good(), states=[[7.0]], actions=[[0.5]])
     assert all(finding.ok for finding in findings)

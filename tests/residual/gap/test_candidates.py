@@ -49,4 +49,4 @@ def test_a_saturation_is_looked_for_where_inputs_reach():
 def test_no_command_is_later_than_the_record_lasts(name):
     # A delay of a million samples would need a million places of memory.
     (knob,) = pool(-1.0, 1.0)[name].knobs
-    assert knob.high == pytest.approx(2.5)
+    assert knob.high == pytest.approx(2.5, abs=0.06)

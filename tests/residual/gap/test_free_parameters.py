@@ -20,7 +20,8 @@ def test_parameters_within_their_tolerance_may_be_all_there_is():
     (verdict,) = found.verdicts
     assert verdict.kind == "calibrated"
     parameters = PendulumEquation().parameters
-    assert set(verdict.parameters) == set(parameters)
+    # What hardly moves is not told: the motor's damping is too small for 3 % of it to matter.
+    assert set(verdict.parameters) == set(parameters) - {"damping"}
     for name, change in verdict.parameters.items():
         size = 0.03 * parameters[name].value
         assert -size <= change.low <= change.value <= change.high <= size
