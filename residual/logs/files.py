@@ -21,7 +21,7 @@ _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "blank": " "}
 
 
 def read_table(
-    path: Path, delimiter: str = "auto", header: bool = True, comment: str = ""
+    path: Path, delimiter: str = "auto", header: bool = True, comment: str = "", skip: int = 0
 ) -> Table:
     """Read a file by its extension: text (CSV and the like), Parquet, or NPZ.
 
@@ -31,6 +31,7 @@ def read_table(
             number of blanks), or ``"auto"``.
         header: Whether the first row of text that is no comment names the columns.
         comment: Lines of text that begin with it are left out.
+        skip: So many lines at the top of a text are left out.
 
     Raises:
         LogError: The file cannot be read, or does not look like a table.
@@ -53,15 +54,17 @@ def read_table(
     if not data:
         raise LogError("the file is empty, expected a table with one row per sample", path)
     if suffix in TEXT:
-        return _read_text(path, data, delimiter, header, comment)
+        return _read_text(path, data, delimiter, header, comment, skip)
     return _read_arrays(path, data, suffix)
 
 
-def _read_text(path: Path, data: bytes, delimiter: str, header: bool, comment: str) -> Table:
+def _read_text(
+    path: Path, data: bytes, delimiter: str, header: bool, comment: str, skip: int
+) -> Table:
     lines = [
         (number, line)
         for number, line in enumerate(_decoded(path, data).splitlines(), start=1)
-        if line.strip() and not (comment and line.lstrip().startswith(comment))
+        if number > skip and line.strip() and not (comment and line.lstrip().startswith(comment))
     ]
     if not lines:
         raise LogError("no row holds data, expected a table with one row per sample", path)
@@ -87,7 +90,8 @@ def _read_text(path: Path, data: bytes, delimiter: str, header: bool, comment: s
         if len(fields) != len(names):
             raise LogError(
                 f"{len(fields)} fields, expected {len(names)} as in row {first}; correct or "
-                "delete the row, or set delimiter",
+                "delete the row, set delimiter, or set columns.skip to the number of lines that "
+                "stand above the table",
                 path,
                 number,
             )

@@ -53,6 +53,7 @@ class LogFormat:
         delimiter: Of a text file: a character or ``comma``, ``semicolon``, ``tab``, ``blank``;
             ``auto`` looks at the first row.
         comment: Lines of a text file that begin with it are left out.
+        skip: So many lines at the top of a text file are left out.
         decimal: Decimal sign of a text file.
         gap: A trajectory is cut where samples are further apart than this many median periods.
         minimum_samples: A trajectory with fewer is an error; a piece with fewer is left out.
@@ -71,6 +72,7 @@ class LogFormat:
     header: bool = True
     delimiter: str = "auto"
     comment: str = "#"
+    skip: int = 0
     decimal: str = "."
     gap: float = 5.0
     minimum_samples: int = 5
@@ -114,6 +116,8 @@ def check_layout(columns: LogFormat, states: Sequence[Channel], actions: Sequenc
             "header: false leaves columns without names: give time, states and actions by "
             "position (1 is the first)"
         )
+    if columns.skip < 0:
+        raise ValueError(f"skip is {columns.skip}, expected the number of lines above the table")
     if columns.decimal not in (".", ",") or not columns.gap > 1 or columns.minimum_samples < 3:
         raise LogError(
             f"decimal {columns.decimal!r}, gap {columns.gap!r}, minimum_samples "

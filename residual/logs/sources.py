@@ -74,7 +74,8 @@ def open_log(
         if hdf5.EPISODE in table.columns:
             columns = _episodes(columns, hdf5.EPISODE)
         return _with_time(table, columns)
-    return read_table(path, columns.delimiter, columns.header, columns.comment), columns
+    text = (columns.delimiter, columns.header, columns.comment, columns.skip)
+    return read_table(path, *text), columns
 
 
 def signals_of(source: str | Path) -> tuple[dict[str, Signal], dict[str, str]]:

@@ -170,6 +170,8 @@ def test_text_files_of_many_makes(tmp_path):
     check("\ufeff" + "\r".join(",".join(map(str, row)) for row in [names, *rows]))
     check("\n\n".join('"' + '","'.join(map(str, row)) + '"' for row in [names, *rows]))
     check("\n".join(";".join(map(str, r)).replace(".", ",") for r in [names, *rows]), decimal=",")
+    preamble = "Motor 1; serial, number, 7\nat noon\n\n"
+    check(preamble + "\n".join(",".join(map(str, row)) for row in [names, *rows]), skip=3)
     check("# made by us\n" + "\n".join(",".join(map(str, row)) + "," for row in [names, *rows]))
     check(
         "% x v\n" + "\n".join("  " + "   ".join(map(str, row)) for row in rows),
