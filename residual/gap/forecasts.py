@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 #: Forecasts drawn for pictures.
 PICTURES = 6
+#: Squared error of a block over that of noise alone, up to which it is as good as can be.
+AS_GOOD_AS_NOISE = 2.0
 
 
 def span(squares: Array, draws: int = 400) -> Span:
@@ -98,7 +100,13 @@ def gap(
         by_channel[name].before, by_channel[name].after, by_channel[name].noise_floor,
         tuple(steps), by_channel, *ratios,
         Span(*share) if key or search.beside else Span(0.0, 0.0, 0.0), len(blocks), blocks.folds,
+        no_better(before.squares[:, main], after.squares[:, main], floor[:, main]),
     )  # fmt: skip
+
+
+def no_better(before: Array, after: Array, floor: Array) -> int:
+    """Blocks in which something is left to be had and nothing gained, of squared errors (B,)."""
+    return int(((after >= before) & (after > AS_GOOD_AS_NOISE * floor)).sum())
 
 
 def main_channel(
@@ -150,9 +158,11 @@ def held_out(gap: Gap, fitter: Fitter, before: Fit, after: Fit, floor: Array) ->
         )
         for i, c in enumerate(fitter.samples.measured)
     }
-    main = by_channel.get(gap.channel) or next(iter(by_channel.values()))
+    name = gap.channel if gap.channel in by_channel else next(iter(by_channel))
+    main, place = by_channel[name], list(by_channel).index(name)
     steps = (Step("", main.before), Step("all that was found", main.after))
     return dataclasses.replace(
         gap, before=main.before, after=main.after, noise_floor=main.noise_floor, steps=steps,
         by_channel=by_channel, blocks=len(fitter.blocks), folds=1,
+        no_better=no_better(squares[0][:, place], squares[1][:, place], floor[:, place]),
     )  # fmt: skip

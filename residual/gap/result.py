@@ -128,6 +128,7 @@ class Gap:
             the noise.
         share: Part of the nominal simulator's squared error that has a name.
         blocks, folds: Blocks of data, and groups of them that were left out in turn.
+        no_better: Blocks in which the corrected simulator forecasts no better than the nominal one.
     """
 
     channel: str
@@ -143,6 +144,7 @@ class Gap:
     share: Span
     blocks: int
     folds: int
+    no_better: int = 0
 
 
 @dataclasses.dataclass(frozen=True)

@@ -45,7 +45,10 @@ def summary(result: GapResult, tolerance: float | None = None) -> str:
     gap = result.gap
     unit = f" in {gap.unit}" if gap.unit else ""
     lines += [f"{ahead(gap)}{unit}, {CROSS_VALIDATED} (95 % interval)", *bars(gap)]
-    lines.append(f"  {gap.blocks} blocks of data, {gap.folds} groups of them left out in turn")
+    blocks = f"{gap.blocks} blocks of data, {gap.folds} groups of them left out in turn"
+    if result.effects and gap.no_better:
+        blocks += f"; in {gap.no_better} of them the corrected simulator forecasts no better"
+    lines += wrapped(blocks, "  ")
     if result.held_out:
         lines += ["", *held_out(result.held_out)]
     if result.quality:

@@ -1,5 +1,8 @@
 """What is said of effects that exactly dependent sets could imitate."""
 
+import numpy as np
+
+from residual.gap.forecasts import no_better
 from residual.gap.verdicts import dependent
 from sims.effects.library import near_combinations
 from sims.pendulum_equation import PendulumEquation
@@ -31,3 +34,9 @@ def test_an_effect_that_a_pair_imitates_is_known_from_the_equations():
     near = near_combinations(PendulumEquation(), ["inertia", "resistance"])
     assert "mass" in near
     assert "linear_spring@pivot" not in near
+
+
+def test_blocks_in_which_nothing_was_gained_are_counted():
+    before, floor = np.array([4.0, 4.0, 4.0, 1.2]), np.ones(4)
+    # Better, worse, as bad as before, and worse within what noise alone does.
+    assert no_better(before, np.array([1.0, 5.0, 4.0, 1.5]), floor) == 2
