@@ -63,6 +63,12 @@ def spread(result: GapResult) -> list[Rollout]:
 def bars(result: GapResult, folder: Path) -> Figure:
     """The gap, shrinking."""
     gap = result.gap
+    in_vain = (
+        f" **In {gap.no_better} of the blocks** the corrected simulator forecasts no better than "
+        "the nominal one."
+        if result.effects and gap.no_better
+        else ""
+    )
     return Figure(
         shrinking(result, folder / "gap.png"),
         f"The error falls from {gap.before.value:.3g} to {gap.after.value:.3g} {gap.unit}; noise "
@@ -70,7 +76,7 @@ def bars(result: GapResult, folder: Path) -> Figure:
         f"Root mean square error of {gap.channel} over {seconds_text(gap.horizon_s)}, in "
         f"{CROSS_VALIDATED}: {gap.blocks} blocks of the records, dealt over {gap.folds} groups "
         "that are left out in turn; 95 % interval over blocks. **Noise floor**: what the corrected "
-        "simulator would reach on its own data plus noise.",
+        f"simulator would reach on its own data plus noise.{in_vain}",
         heading="The gap, step by step",
     )
 
