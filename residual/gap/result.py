@@ -18,8 +18,12 @@ Kind = Literal[
 ]
 #: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
 #: between folds or with the numerics, lies at its bound, parameters within their tolerance do as
-#: well, it is a time shorter than half a sample, or an effect of another kind does as well.
-Doubt = Literal["not_needed", "unsteady", "numerics", "at_bound", "calibration", "clock", "rivals"]
+#: well, it is a time shorter than half a sample, its interval holds zero, or an effect of another
+#: kind does as well.
+Doubt = Literal[
+    "not_needed", "unsteady", "numerics", "at_bound", "calibration", "clock", "may_be_zero",
+    "rivals",
+]  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)

@@ -60,7 +60,9 @@ def effect_verdict(
         together: Sets of effects that make the same motion in one exact proportion.
     """
     effect = search.candidates[claim.number].effect
-    kind: Kind = "confirmed" if claim.sure and blocks >= TOO_FEW else "ambiguous"
+    vanishes = may_vanish(search, claim)
+    sure = claim.sure and blocks >= TOO_FEW and not vanishes
+    kind: Kind = "confirmed" if sure else "ambiguous"
     family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""
     numbers = ", ".join(
         f"{name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}"
@@ -100,15 +102,17 @@ def effect_verdict(
         says.append("its size changes with the integration step or the input's hold")
     if claim.bounded:
         says.append("its size is at its bound")
+    if vanishes:
+        says.append("its size may be zero")
     return Verdict(
         kind, effect.name, effect.where, claim.numbers,
         tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
         "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
-        doubts(claim), shape=whole,
+        doubts(claim, vanishes), shape=whole,
     )  # fmt: skip
 
 
-def doubts(claim: Claim) -> tuple[Doubt, ...]:
+def doubts(claim: Claim, vanishes: bool) -> tuple[Doubt, ...]:
     """Why an effect is not certain."""
     why: dict[Doubt, bool] = {
         "not_needed": not claim.needed,
@@ -117,6 +121,7 @@ def doubts(claim: Claim) -> tuple[Doubt, ...]:
         "at_bound": claim.bounded,
         "calibration": claim.calibration,
         "clock": claim.brief,
+        "may_be_zero": vanishes,
         "rivals": bool(claim.rivals or claim.alike),
     }
     return tuple(doubt for doubt, there in why.items() if there)

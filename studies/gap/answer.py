@@ -35,6 +35,7 @@ DOUBTS: dict[Doubt, str] = {
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
+    "may_be_zero": "its interval holds zero",
     "calibration": "parameters that are a few percent off would do nearly as well",
     "rivals": "an effect of another kind does nearly as well",
 }

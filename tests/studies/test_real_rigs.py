@@ -152,16 +152,7 @@ def test_the_judge_finds_the_errors_that_the_keys_state(folder, nominal, repaire
 
 
 @needs_data
-@pytest.mark.parametrize(
-    "folder",
-    [
-        "airtrack",
-        pytest.param(
-            "heater", marks=pytest.mark.xfail(reason="1.55 times the error of the key's repair")
-        ),
-        "phone-drop",
-    ],
-)
+@pytest.mark.parametrize("folder", ["airtrack", "heater", "phone-drop"])
 def test_find_gap_names_what_the_key_names(folder, tmp_path):
     found = ask(BY_NAME[folder], DATA, tmp_path)
     assert found.named.enough

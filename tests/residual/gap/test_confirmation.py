@@ -165,3 +165,12 @@ def test_minor_effects_carry_their_share_and_no_number():
     verdict = minor_verdict(Toy({(0,): 0.3}), 3, (0.02, 0.01, 0.03))
     assert (verdict.kind, verdict.effect, verdict.parameters) == ("minor", "constant_load", {})
     assert (verdict.share.low, verdict.share.value, verdict.share.high) == (0.01, 0.02, 0.03)
+
+
+@pytest.mark.parametrize(("low", "kind"), [(0.004, "confirmed"), (-0.001, "ambiguous")])
+def test_what_may_be_zero_is_not_confirmed(low, kind):
+    toy = Toy({(0,): 0.3})
+    toy.family = lambda number: ""
+    verdict = effect_verdict(toy, claim(numbers={"change": Number(0.01, low, 0.02, "kg")}), 20)
+    assert verdict.kind == kind
+    assert ("may_be_zero" in verdict.doubts) is (kind == "ambiguous")
