@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 #: Samples that a comparison needs.
 _FEW = 20
+#: Samples of a run that are looked at.
+_ENOUGH = 100_000
 #: Distance from whole steps of a position's grid, in steps, that is none (0.25 is chance).
 _WHOLE = 0.05
 
@@ -75,7 +77,8 @@ def differenced(
     if not noise:
         return False
     rows, aims = [], []
-    for x, v, h in zip(positions, rates, durations, strict=True):
+    for whole in zip(positions, rates, durations, strict=True):
+        x, v, h = whole[0][:_ENOUGH], whole[1][:_ENOUGH], whole[2][: _ENOUGH - 1]
         if len(x) > 4:
             d = np.diff(x) / h
             rows.append(np.stack([d[:-3], d[1:-2], d[2:-1], d[3:], v[1:-3]], axis=1))
