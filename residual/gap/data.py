@@ -7,7 +7,7 @@ everything else is said, and left as it is.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import numpy as np
 
@@ -63,7 +63,8 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
     for finding in found:
         if finding.severity == "refuse":
             raise ValueError(f"{finding.where}: {finding.says}" if finding.where else finding.says)
-    runs = _without_faults(simulator, trajectories)
+    useless = {finding.where for finding in found if finding.kind in ("still", "derived")}
+    runs = _without_faults(simulator, trajectories, useless)
     runs, scaled = kinematics(simulator, runs)
     return Examined(tuple(runs), (*found, *scaled))
 
@@ -110,14 +111,12 @@ def _refusals(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> l
 
 
 def _without_faults(
-    simulator: HostSimulator, trajectories: Sequence[Trajectory]
+    simulator: HostSimulator, trajectories: Sequence[Trajectory], useless: Container[str]
 ) -> list[Trajectory]:
     """The runs with faulty samples, and channels that tell nothing, as NaN."""
     states = [np.array(run.states, float) for run in trajectories]
     names = [channel.name for channel in simulator.physical_channels]
-    useless = {finding.where for finding in still(simulator, trajectories)}
-    useless |= {one.where for one in sums(simulator, trajectories) if one.kind == "derived"}
-    changed = bool(useless)
+    changed = False
     for channel, masks in faulty(simulator, trajectories):
         column = names.index(channel.name)
         for own, *marks in zip(states, *masks.values(), strict=True):

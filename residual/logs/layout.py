@@ -117,7 +117,7 @@ def check_layout(columns: LogFormat, states: Sequence[Channel], actions: Sequenc
             "position (1 is the first)"
         )
     if columns.skip < 0:
-        raise ValueError(f"skip is {columns.skip}, expected the number of lines above the table")
+        raise LogError(f"skip is {columns.skip}, expected the number of lines above the table")
     if columns.decimal not in (".", ",") or not columns.gap > 1 or columns.minimum_samples < 3:
         raise LogError(
             f"decimal {columns.decimal!r}, gap {columns.gap!r}, minimum_samples "

@@ -235,6 +235,7 @@ class Steps:
                 report,
                 on_true,
                 RANDOM_STEPS if start is None else 0,
+                # One of its own: what the filter steps is not what was trained on and held.
                 self._corrected(on) if isinstance(on, Model) else simulator,
             )
         held = simulator.held if isinstance(simulator, CorrectedSimulator) else 0
