@@ -26,6 +26,10 @@ from residual.gap.windows import Windows, carry
 
 Array = NDArray[np.float64]
 
+#: How far nodes, in their scale, and unknowns, as a share, may be from where derivatives by the
+#: state were taken.
+NEAR = 0.03
+
 
 @dataclasses.dataclass(frozen=True)
 class ShootingFit:
@@ -38,7 +42,8 @@ class ShootingFit:
         merit: Sum of the costs, those above ``cap`` counted as cap (1 + log(cost / cap)).
         cap: See ``merit``.
         residual: Whitened residual, (W, L, m), zero where nothing was measured.
-            by_knob: Its derivative by the unknowns, start states projected out, (W, L m, p).
+        basis: Orthonormal basis of what start states can imitate, (W, L m, f).
+        by_knob: Its derivative by the unknowns, start states projected out, (W, L m, p).
         projected: The residual with start states projected out, (W, L m).
         slope: Derivatives at the nodes.
         converged: Whether the last iteration no longer lowered the merit.
@@ -102,9 +107,15 @@ def fit(
     moves = np.zeros((*windows.index.shape, nodes.shape[1]))
     step_theta = np.zeros_like(theta)
     damping, failed = 1e-6, np.zeros(count, int)
+    known: tuple[Array, Array, Array] | None = None
     for turn in range(iterations + 1):
         width = model.step * max(widths * shrink**turn, 0.005)
-        now, tangent = problem.at(nodes, theta, width, by_state if turn == 0 else None, turn)
+        if turn and known is not None and not problem.near(nodes, theta, *known[:2]):
+            known = None
+        given = known[2] if known else by_state if turn == 0 else None
+        now, tangent = problem.at(nodes, theta, width, given)
+        if given is None:
+            known = (nodes, theta, now.slope.by_state)
         if best is None:
             better, finished = np.ones(count, bool), False
             best = now
@@ -178,8 +189,14 @@ class _Problem:
         if len(self.memory):
             self.used = np.union1d(self.used, self.before)
 
+    def near(self, nodes: Array, theta: Array, others: Array, before: Array) -> bool:
+        """Whether derivatives by the state at other nodes and unknowns serve here, too."""
+        moved = np.abs(nodes - others)[self.used] / self.scale
+        grown = np.abs(theta - before) / np.maximum(np.abs(before), self.model.step)
+        return bool((moved < NEAR).all() and (grown < NEAR).all())
+
     def at(
-        self, nodes: Array, theta: Array, width: Array, by_state: Array | None, turn: int
+        self, nodes: Array, theta: Array, width: Array, by_state: Array | None
     ) -> tuple[ShootingFit, _Tangent]:
         """Costs and their linearisation at nodes and unknowns."""
         model, samples, windows, sigma = self.model, self.samples, self.windows, self.sigma
