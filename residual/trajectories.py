@@ -100,12 +100,24 @@ class Trajectory:
         states: Measured state channels, shape (T + 1, n_s); angles unwrapped; a channel
             that was not measured is NaN throughout, a missing sample is NaN in its row.
         actions: Action from sample k to sample k + 1, shape (T, n_a).
+
+    Raises:
+        ValueError: The arrays do not belong together.
     """
 
     name: str
     times: Array
     states: Array
     actions: Array
+
+    def __post_init__(self) -> None:
+        samples = len(self.times)
+        if len(self.states) != samples or len(self.actions) != samples - 1:
+            raise ValueError(
+                f"{self.name} has {samples} times, {len(self.states)} states and "
+                f"{len(self.actions)} actions; expected as many states as times and one action "
+                "less, each held from one sample to the next"
+            )
 
     @property
     def durations(self) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from residual.gap.aliases import hidden
 from residual.gap.choice import helps
 from residual.gap.confirmation import Claim, claims, in_plain_form, share
+from residual.gap.exchange import add_exchanged
 from residual.gap.explain import FOOTNOTE, Explanation
 from residual.gap.forecasts import gap, held_out, main_channel, noise_floor, rollouts
 from residual.gap.imitation import imitated
@@ -99,7 +100,7 @@ def confirm(
             plainer = None if lost or found.adequate else in_plain_form(search, key, made)
             if plainer:
                 key = plainer
-                search.add_exchanged(key, 3)
+                add_exchanged(search, key, 3)
                 continue
         if not lost:
             return Answer(found, key, tuple(made), leads)
@@ -108,7 +109,7 @@ def confirm(
         leads = (search.candidates[gone].label, *leads)
         key, theta = search.merged(key, (), drop=(gone,))
         search.add({key: theta})
-        search.add_exchanged(key, 3)
+        add_exchanged(search, key, 3)
 
 
 def summed_up(answer: Answer) -> Gap:

@@ -7,11 +7,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.exchange import spelt_out
 from residual.gap.screening import Gain, Signatures, gains, pair_gains
 from residual.gap.search import Key, Proposals, Search
 from residual.gap.significance import score
 
 Array = NDArray[np.float64]
+
+#: Part of a law's gain from which on its special case is tried in its place.
+HARDLY = 0.9
 
 
 def run(
@@ -87,20 +91,18 @@ def grow(search: Search, key: Key) -> list[Key]:
     found = [] if key else boldly(search, parameters=True)
     for group in places:
         good = 0
-        for gain in _by_gain(search, around, group)[: 3 * wanted]:
+        for gain in plainer(search, around, _by_gain(search, around, group), 3 * wanted):
             if search.late:
                 break
             number = around.variants[gain.variants[0]].candidate
             fresh, theta = search.merged(key, [(number, gain.values[0])])
             if number in key or gain.value <= 0 or not search.fits_in(fresh):
                 continue
-            if fresh not in found and search.spelt_out(number, [i for k in found for i in k]):
+            if fresh not in found and spelt_out(search, number, [i for k in found for i in k]):
                 continue
-            if fresh not in found:
-                search.add({fresh: theta})
-                if fresh in search.tried and search.sound(fresh):
-                    found.append(fresh)
-            good += fresh in found
+            made = [] if fresh in found else sound(search, fresh, theta)
+            good += fresh in found or bool(made)
+            found += made
             if good >= wanted:
                 break
     if not key:
@@ -109,10 +111,14 @@ def grow(search: Search, key: Key) -> list[Key]:
         for pair in [] if search.late else pair_gains(around, search.effort.pairs):
             numbers = [around.variants[v].candidate for v in pair.variants]
             fresh, theta = search.merged(key, zip(numbers, pair.values, strict=True))
-            search.add({fresh: theta})
-            if fresh in search.tried and search.sound(fresh):
-                found.append(fresh)
+            found += sound(search, fresh, theta)
     return list(dict.fromkeys(found))
+
+
+def sound(search: Search, key: Key, theta: Array) -> list[Key]:
+    """The set, fitted if it was not, or those that stand for it; none if nothing may be right."""
+    made = search.add({key: theta})
+    return [k for k in {key: 0, **dict.fromkeys(made)} if search.sound(k)]
 
 
 def boldly(search: Search, parameters: bool) -> list[Key]:
@@ -123,15 +129,13 @@ def boldly(search: Search, parameters: bool) -> list[Key]:
         parameters: Whether changes of parameters, or all other effects.
     """
     found: list[Key] = []
-    for number, candidate in enumerate(search.candidates):
+    for number, candidate in enumerate(list(search.candidates)):
         fresh = (number,)
         if candidate.bold is None or search.late or not search.fits_in(fresh):
             continue
         if (candidate.effect.enters == "parameter") != parameters:
             continue
-        search.add({fresh: candidate.bold})
-        if fresh in search.tried and search.sound(fresh):
-            found.append(fresh)
+        found += sound(search, fresh, candidate.bold)
     return found
 
 
@@ -156,8 +160,22 @@ def together(search: Search, key: Key, grown: list[Key]) -> list[Key]:
     fresh, theta = search.merged(key, additions.items())
     if len(additions) < 2 or not search.fits_in(fresh):
         return []
-    search.add({fresh: theta})
-    return [fresh] if fresh in search.tried and search.sound(fresh) else []
+    return sound(search, fresh, theta)
+
+
+def plainer(search: Search, around: Signatures, ranked: list[Gain], most: int) -> list[Gain]:
+    """The first gains, laws that gain hardly more than a special case of theirs replaced by it.
+
+    In the linear picture a law gains no less than its special cases, however little its further
+    numbers tell; as one of their family it has its turn when what is chosen meets its rivals.
+    """
+    owner = [around.variants[gain.variants[0]].candidate for gain in ranked]
+    found: list[Gain] = []
+    for gain, law in zip(ranked[:most], owner[:most], strict=True):
+        cases = [g for g, own in zip(ranked, owner, strict=True) if search.contains(law, own)]
+        instead = next((g for g in cases if g.value > HARDLY * gain.value), gain)
+        found += [instead] if instead not in found else []
+    return found
 
 
 def _by_gain(search: Search, around: Signatures, group: tuple[int, ...]) -> list[Gain]:

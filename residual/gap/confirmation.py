@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.choice import AT_ONE
+from residual.gap.exchange import exchanged
 from residual.gap.intervals import at_bound, bounded, deviations
 from residual.gap.numerics import at_half_step
-from residual.gap.result import Number
+from residual.gap.result import Meant, Number
 from residual.gap.search import Key, Search
 from residual.gap.significance import score
 
@@ -50,6 +51,8 @@ class Claim:
         share: Part of the nominal squared error that it takes off, with a 95 % interval.
         calibration: Whether parameters of the simulator, all within their tolerance, do as well.
         brief: Whether it is a time too short for the log's own clock.
+        meant: Numbers of its twins in its place.
+        beside: Its own numbers beside twins of the others, where they differ.
     """
 
     number: int
@@ -65,6 +68,8 @@ class Claim:
     share: tuple[float, float, float]
     calibration: bool = False
     brief: bool = False
+    meant: tuple[Meant, ...] = ()
+    beside: tuple[Meant, ...] = ()
 
     @property
     def stand_ins(self) -> tuple[str, ...]:
@@ -127,24 +132,18 @@ def near(
     search: Search, key: Key, number: int, adequate: bool
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Effects that do nearly as well in place of a chosen one, see ``Claim``."""
-    rest = set(key) - {number}
+    rest = tuple(i for i in key if i != number)
     form: list[str] = []
     same: list[str] = []
     others: list[str] = []
-    for rival in search.usable():
-        fresh = set(rival) - rest
-        if len(rival) != len(key) or not rest < set(rival) or fresh == {number}:
-            continue
-        (other,) = fresh
-        if search.contains(other, number):
-            continue  # the same law with more freedom
+    for other, rival in exchanged(search, key, number):
         family = search.family(number)
         alike = bool(family) and search.family(other) == family
         label = search.candidates[other].label
         out = excluded(search, key, rival, number, adequate, alike)
         if alike and not out:
             form.append(label)
-        elif not adequate and search.same_motion(tuple(sorted(rest)), number, other):
+        elif not adequate and search.same_motion(rest, number, other):
             same.append(label)
         elif not out:
             others.append(label)
@@ -187,14 +186,11 @@ def in_plain_form(search: Search, key: Key, claims: Sequence[Claim]) -> Key | No
             n.at_bound or (field in strengths and n.low <= 0 <= n.high)
             for field, n in claim.numbers.items()
         )
-        rest = set(key) - {claim.number}
         forms = [
             rival
-            for rival in search.usable()
-            if len(rival) == len(key)
-            and rest < set(rival)
-            and search.numbers(rival) < search.numbers(key)
-            and {search.candidates[i].label for i in set(rival) - rest} & set(claim.form)
+            for other, rival in exchanged(search, key, claim.number)
+            if search.numbers(rival) < search.numbers(key)
+            and search.candidates[other].label in claim.form
         ]
         if forms and not told:
             return min(forms, key=lambda rival: (search.numbers(rival), search.error(rival)))

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from residual.gap.beam import run
 from residual.gap.candidates import Candidate
 from residual.gap.choice import Choice, choose, reasons
+from residual.gap.exchange import add_exchanged
 from residual.gap.fitting import Fit, Fitter, Left
 from residual.gap.forecasts import noise_floor
 from residual.gap.noise import Noise
-from residual.gap.search import Effort, Key, Proposals, Search
+from residual.gap.search import Effort, Key, Proposals, Search, Twins
 from residual.gap.significance import score, significant
 from sims.host import HostSimulator
 
@@ -82,6 +83,7 @@ def explain(
     until: float,
     beside: Sequence[Candidate] = (),
     earlier: Search | None = None,
+    twins: Twins | None = None,
 ) -> Explanation:
     """Search, weigh the channels by what is left, search again, until nothing changes.
 
@@ -97,11 +99,12 @@ def explain(
         beside: Free beside every set, see ``Search``.
         earlier: A search without these; its best sets are tried, too, so that none of them loses
             for not being asked.
+        twins: Exact twins of what may be missing, by label.
     """
     seeds: Proposals = {}
     key: Key = ()
     for _ in range(ROUNDS):
-        search = Search(simulator, pool, fitter, effort, tell, until, beside)
+        search = Search(simulator, pool, fitter, effort, tell, until, beside, twins)
         if len(search.currency.groups) > 1 and not simulator.has_contacts:
             alone = noise_floor(fitter, search.nominal, floor.sigma)
             search.currency = search.currency.only_where_wrong(alone)
@@ -114,7 +117,7 @@ def explain(
         if search.late or ((ratio > 1 / WORTH).all() and (ratio < WORTH).all()):
             break
         seeds = {k: search.own(k) for k in {*near_best(search), key} if k}
-        fitter = fresh
+        fitter, pool = fresh, search.candidates  # with the twins that were tried
     return settle(search, floor)
 
 
@@ -163,7 +166,8 @@ def settle(search: Search, floor: Noise) -> Explanation:
             choice = choose(search, enough)
             key = choice.key
         before = len(search.tried)
-        search.add_exchanged(key, LEAST if search.late else max(LEAST, RIVALS // max(len(key), 1)))
+        most = LEAST if search.late else max(LEAST, RIVALS // max(len(key), 1))
+        add_exchanged(search, key, most)
         if len(search.tried) == before or search.late:
             break
         if not quiet and choose(search, enough).key == key:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -29,6 +30,7 @@ from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import GapResult
 from residual.gap.search import Search
 from residual.gap.tolerance import KNOWN
+from residual.gap.twins import exact_twins, with_twins
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
 from sims.contract import refuse_unsound
@@ -109,6 +111,7 @@ def find_gap(
         tell(says)
     groups, sets = aliases(simulator, offered)
     kept = representatives(simulator, offered, groups)
+    named = {str(effect): effect for effect in offered}
 
     def explained(
         simulator: HostSimulator,
@@ -118,14 +121,19 @@ def find_gap(
     ) -> Explanation:
         free = {candidate.label for candidate in beside}
         pool = ready.pool(candidates(simulator, kept, ready.fitter.samples))
+        # With the twins that an earlier search has tried.
+        known = {candidate.effect for candidate in pool}
+        pool += [c for c in (earlier.candidates if earlier else ()) if c.effect not in known]
         pool = [candidate for candidate in pool if candidate.label not in free]
+        others = {label: effect for label, effect in named.items() if label not in free}
+        twins = exact_twins(simulator, pool, ready.fitter.samples, groups, others)
         tell(
             f"{len(ready.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s, "
             f"{len(pool)} candidate effects"
         )
         return explain(
             simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, tell, until,
-            beside, earlier,
+            beside, earlier, twins,
         )  # fmt: skip
 
     with workers(n_jobs):
@@ -160,6 +168,9 @@ def find_gap(
             second = confirm(again, groups, asked, parameter_tolerance)
             if better(second, answer):
                 answer = second
+        answer = dataclasses.replace(
+            answer, claims=with_twins(answer.found.search, answer.key, answer.claims)
+        )
         clock.lap("confirm")
         table = summed_up(answer)
         apart = None

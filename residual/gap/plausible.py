@@ -12,39 +12,67 @@ from numpy.typing import NDArray
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from sims.effects.parameter import ParameterChange
+from sims.host import HostSimulator
+from sims.simulator import random_values
 
 Array = NDArray[np.float64]
 
 #: Largest factor between a parameter and its nominal value, either way.
 FACTOR = 10.0
+#: Part of the motion that hangs on a parameter, below which that hardly matters as it is.
+MINOR = 0.1
 #: Least part of the input's variation that its way to the actuator leaves.
 THROUGH = 0.1
 
 
-def absurd(model: Model, theta: Array, samples: Samples) -> str:
-    """Why a set of effects cannot be right, or an empty string.
+def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
+    """Which of a set of effects cannot be right, and why; an empty string if each can.
 
     Args:
         model: Simulator with the effects.
         theta: Their numbers, (p,).
         samples: The measured table.
+
+    Returns:
+        Its position among the model's effects, their number if it is none of them, and why.
     """
-    host = model.bind(theta)
-    for effect in host.effects[len(model.simulator.effects) :]:
+    host, given = model.bind(theta), model.simulator.with_effects(())
+    for number, effect in enumerate(host.effects[len(model.simulator.effects) :]):
         if not isinstance(effect, ParameterChange):
             continue
         nominal = float(np.mean(host.parameters[effect.parameter].value))
         if nominal == 0:
             continue
         ratio = (nominal + float(effect.change)) / nominal
-        if not 1 / FACTOR <= ratio <= FACTOR:
-            return f"{effect.parameter} would be {ratio:.3g} times its nominal value"
-    given = model.simulator.with_effects(())
+        small = ratio > FACTOR and _minor(given, effect.parameter, ratio)
+        if not 1 / FACTOR <= ratio <= FACTOR and not small:
+            return number, f"{effect.parameter} would be {ratio:.3g} times its nominal value"
     before = Model(given).inputs(samples, np.zeros((1, 0)))[0]
     after = model.inputs(samples, theta[None])[0]
     for j, channel in enumerate(host.action_channels):
         usual = float(before[..., j, 0].std())
         left = float(after[..., j, 0].std())
         if usual > 0 and not THROUGH <= left / usual <= 1 / THROUGH:
-            return f"{channel.name} would have {left / usual:.2g} of its strength"
-    return ""
+            where = [effect.effect.where for effect in model.chosen]
+            number = where.index(channel.name) if channel.name in where else len(where)
+            return number, f"{channel.name} would have {left / usual:.2g} of its strength"
+    return len(model.chosen), ""
+
+
+def _minor(simulator: HostSimulator, parameter: str, ratio: float) -> bool:
+    """Whether a parameter hardly matters, and does not take over if it is so much larger.
+
+    A rotor that weighs a fiftieth of the arm may well weigh twenty times as much.
+    """
+    rng = np.random.default_rng(0)
+    states = simulator.smooth_states(96, rng)
+    inputs = [random_values(channel, 96, rng) for channel in simulator.action_channels]
+    commands = simulator.drive(np.reshape(inputs, (len(inputs), 96)).T, np.ones(96), 2, hold="zero")
+    durations = np.full(96, 0.1 * simulator.dt)
+    value = float(np.mean(simulator.parameters[parameter].value))
+    hosts = [simulator.with_parameters(**{parameter: scale * value}) for scale in (1.0, 1.001)]
+    moves = [host.integrate(states, commands, durations) - states for host in hosts]
+    whole = np.linalg.norm(moves[0], axis=0)
+    part = np.linalg.norm(moves[1] - moves[0], axis=0) / 0.001
+    matters = float(np.max(part[whole > 0] / whole[whole > 0], initial=0.0))
+    return matters < MINOR and matters * ratio < 1.0

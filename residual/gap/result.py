@@ -43,6 +43,14 @@ class Number:
 
 
 @dataclasses.dataclass(frozen=True)
+class Meant:
+    """Numbers, each with its unit, if a twin is meant: ``effect`` (``name@where``)."""
+
+    effect: str
+    numbers: Mapping[str, tuple[float, str]]
+
+
+@dataclasses.dataclass(frozen=True)
 class Span:
     """A value with a 95 % interval."""
 
@@ -72,6 +80,9 @@ class Verdict:
             of a remainder, the part that is left.
         provisional: True if too few blocks of data had to confirm it.
         same_motion: Those of ``alternatives`` that no motion can tell from it.
+        meant: What some of those would be in its place.
+        beside: What this one would be if a twin of another named effect is meant, where that
+            makes a difference; the intervals hold it.
         together: Sets of effects that make the same motion in one exact proportion.
         form: Those of ``alternatives`` that belong to its family and do nearly as well.
         doubts: Why it is not certain.
@@ -94,6 +105,8 @@ class Verdict:
     doubts: tuple[Doubt, ...] = ()
     follows: str = ""
     shape: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    meant: tuple[Meant, ...] = ()
+    beside: tuple[Meant, ...] = ()
 
     def __repr__(self) -> str:
         return f"Verdict({self.kind}: {self.says})"[:180]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,24 +19,18 @@ from residual.gap.currency import Currency, groups
 from residual.gap.fitting import Fit, Fitter
 from residual.gap.model import Model
 from residual.gap.plausible import absurd
-from residual.gap.screening import Signatures, gains, signatures, trials
+from residual.gap.screening import Signatures, signatures, trials
 from residual.gap.validation import Validated, validate
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 Key = tuple[int, ...]
 Proposals = dict[Key, Array]
+Twins = Mapping[str, Sequence[Candidate]]
 
 
 #: Cosine of what two effects do, start states allowed for, beyond which it is one motion.
 SAME_MOTION = 0.995
-
-
-#: Part of the best gain by the linear screen below which no rival is worth a fit.
-HOPELESS = 0.5
-
-#: Spellings of one effect, as cogging has one for every order, that are tried for one place.
-SPELLINGS = 2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,6 +58,7 @@ class Search:
     """Rival sets of effects fitted to the windows of one fitter.
 
     Attributes:
+        twins: Exact twins of candidates by label, that are tried where those would be absurd.
         beside: Candidates that are free beside every set, the empty one included, and that no set
             is charged for: parameters within their tolerance.
         nominal: The simulator as it was given; ``before``: its forecasts.
@@ -84,8 +79,10 @@ class Search:
         tell: Callable[[str], None] = lambda _: None,
         until: float = np.inf,
         beside: Sequence[Candidate] = (),
+        twins: Twins | None = None,
     ) -> None:
         self.simulator, self.candidates, self.fitter = simulator, list(candidates), fitter
+        self.twins = twins or {}
         self.effort, self.tell, self.until = effort or Effort(), tell, until
         self.beside = tuple(beside)
         self.nominal = fitter.fit(Model(simulator), np.zeros(0))
@@ -178,17 +175,17 @@ class Search:
     # -- fitting --------------------------------------------------------------------------
 
     def add(self, proposals: Proposals) -> list[Key]:
-        """Fit and validate sets that were not tried yet."""
-        fresh = []
+        """Fit and validate sets that were not tried yet; returns them, and with them those in
+        which a twin stands for what would be absurd."""
+        before = len(self.tried)
         for key, theta in proposals.items():
             if key in self.tried:
                 continue
             name = " + ".join(self.labels(key))
             self.tell(f"  trying {name}")
             self.fit(key, theta)
-            fresh.append(key)
             self.tell(f"  {name}: {100 * self.error(key):.3g} % of the error")
-        return fresh
+        return list(self.tried)[before:]
 
     def fit(self, key: Key, theta: Array) -> None:
         """Fit a set from start values, and from its nested sets if it ends worse than one.
@@ -212,9 +209,22 @@ class Search:
                 self.unfit.add(key)
         self.tried[key] = found
         self.validated[key] = validate(self.fitter, found)
-        reason = absurd(found.model, found.theta, self.fitter.samples)
+        number, reason = absurd(found.model, found.theta, self.fitter.samples)
         if reason:
             self.refused[key] = reason
+            if number < len(key):
+                self._with_twins(key, key[number])
+
+    def _with_twins(self, key: Key, gone: int) -> None:
+        """Fit a set with each exact twin of a member in its place."""
+        for twin in self.twins_of(gone):
+            known = [candidate.effect for candidate in self.candidates]
+            if twin.effect not in known:
+                self.candidates.append(twin)
+                known.append(twin.effect)
+            start = 0.01 * twin.trials[0].values[0]
+            fresh, theta = self.merged(key, [(known.index(twin.effect), start)], drop=(gone,))
+            self.add({fresh: theta})
 
     def _from_nested(self, key: Key, nested: Key, theta: Array) -> Array:
         """Numbers of a nested set, what it lacks hardly there."""
@@ -231,45 +241,9 @@ class Search:
                     start[j] = np.clip(0.01 * model.knobs[j].step, model.low[j], model.high[j])
         return start
 
-    def add_without_each(self, key: Key) -> None:
-        """Fit what is left of a set without each of its members."""
-        for gone in key:
-            smaller, theta = self.merged(key, (), drop=(gone,))
-            self.add({smaller: theta})
-
-    def add_exchanged(self, key: Key, most: int) -> None:
-        """Fit sets in which one member of a set has been exchanged for what may do its work.
-
-        These are the effects that gain most where the member is missing, and its whole family.
-
-        Args:
-            key: A fitted set.
-            most: Effects that are tried in place of each member, beside its family.
-        """
-        self.add_without_each(key)
-        for gone in key:
-            rest = tuple(i for i in key if i != gone)
-            if rest not in self.tried:
-                continue
-            around, family = self.signatures(rest), self.family(gone)
-            taken: list[int] = []
-            ranked = gains(around)
-            for gain in ranked:
-                number = around.variants[gain.variants[0]].candidate
-                near = len(taken) < most or (family and self.family(number) == family)
-                hopeless = gain.value < HOPELESS * ranked[0].value
-                if number not in taken and self.spelt_out(number, taken):
-                    continue
-                if number in key or number in taken or hopeless or not near:
-                    continue
-                taken.append(number)
-                fresh, theta = self.merged(rest, [(number, gain.values[0])])
-                self.add({fresh: theta})
-
-    def spelt_out(self, number: int, taken: Sequence[int]) -> bool:
-        """Whether enough spellings of a candidate's effect are taken, so that others get a turn."""
-        label = self.candidates[number].label
-        return sum(self.candidates[other].label == label for other in set(taken)) >= SPELLINGS
+    def twins_of(self, number: int) -> list[Candidate]:
+        """Candidates that move exactly as one does, but for those that stand in the pool."""
+        return list(self.twins.get(self.candidates[number].label, ()))
 
     def contains(self, one: int, other: int) -> bool:
         """Whether an effect is a special case of another at the same place."""

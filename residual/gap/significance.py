@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from residual.gap.exchange import add_without_each
 from residual.gap.search import Key, Search
 
 #: Forecast error with an effect over that without, below which it forecasts better.
@@ -48,7 +49,7 @@ def significant(search: Search, needed: float) -> Key:
 def pruned(search: Search, key: Key, needed: float) -> Key:
     """What is left of a set when all has gone that chance could do."""
     while key:
-        search.add_without_each(key)
+        add_without_each(search, key)
         smaller = [tuple(i for i in key if i != gone) for gone in key]
         falls = {
             k: search.tried[k].merit - search.tried[key].merit

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from residual.gap.bounded import bounded_step
 from residual.gap.candidates import Candidate, candidates
 from residual.gap.confirmation import CLEARLY, Claim, tie, where_it_matters
+from residual.gap.exchange import add_without_each, exchanged
 from residual.gap.fitting import Fit
 from residual.gap.intervals import deviations
 from residual.gap.model import Model
@@ -54,7 +55,7 @@ def allow_for_parameters(
     parameters = allowed(search, tolerance) if claims else []
     if not parameters:
         return list(claims)
-    search.add_without_each(key)
+    add_without_each(search, key)
     beside = calibrated(search, key, parameters)
     left = float((beside.fit.projected**2).sum())
 
@@ -128,23 +129,17 @@ def excluded_rivals(search: Search, key: Key, claim: Claim) -> list[tuple[int, K
     Returns:
         At most ``RIVALS`` of those that take a part of the error off: candidate and its set.
     """
-    rest = set(key) - {claim.number}
+    rest = tuple(i for i in key if i != claim.number)
     group = where_it_matters(search, key, claim.number)
     family = search.family(claim.number)
     found = []
-    for rival in search.usable():
-        fresh = set(rival) - rest
-        if len(rival) != len(key) or not rest < set(rival) or fresh == {claim.number}:
-            continue
-        (other,) = fresh
+    for other, rival in exchanged(search, key, claim.number):
         same = family and search.family(other) == family
-        if same or search.contains(other, claim.number) or search.candidates[other].label in (
-            *claim.twins, *claim.form,
-        ):  # fmt: skip
+        if same or search.candidates[other].label in (*claim.twins, *claim.form):
             continue
         error = search.currency.by_group(search.validated[rival].squares)[group]
         found.append((float(error), other, rival))
-    without = search.currency.by_group(search.validated[tuple(sorted(rest))].squares)[group]
+    without = search.currency.by_group(search.validated[rest].squares)[group]
     return [(other, rival) for error, other, rival in sorted(found)[:RIVALS] if error < without]
 
 

@@ -108,7 +108,7 @@ def effect_verdict(
         kind, effect.name, effect.where, claim.numbers,
         tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
         "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
-        doubts(claim, vanishes), shape=whole,
+        doubts(claim, vanishes), shape=whole, meant=claim.meant, beside=claim.beside,
     )  # fmt: skip
 
 

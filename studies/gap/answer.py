@@ -1,4 +1,4 @@
-"""The answer in sentences: what the gap is, each verdict, and why it is no more certain."""
+"""Each verdict in sentences, and why it is no more certain."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 from residual.gap import GapResult
 from residual.gap.confirmation import FEW, TOO_FEW
-from residual.gap.result import Doubt, Gap, Number, Verdict
+from residual.gap.result import Doubt, Gap, Meant, Number, Verdict
 from studies.gap.words import (
     KINDS,
     ahead,
+    capitalized,
     effect_name,
     known_effects,
     label_of,
@@ -26,8 +27,6 @@ from studies.gap.words import (
 FOOTNOTE = 0.02
 #: Part of an interval below which one with an exact simulator is worth a line.
 MUCH = 0.7
-#: Rivals that are listed in the first sentence.
-FEW_RIVALS = 2
 
 DOUBTS: dict[Doubt, str] = {
     "not_needed": "forecasts are not clearly worse without it",
@@ -39,78 +38,6 @@ DOUBTS: dict[Doubt, str] = {
     "calibration": "parameters that are a few percent off would do nearly as well",
     "rivals": "an effect of another kind does nearly as well",
 }
-
-
-def lead(result: GapResult, tolerance: float | None = None) -> str:
-    """The first sentence: the share of the gap that has a name.
-
-    Args:
-        result: What was found.
-        tolerance: Forecast error that does not matter.
-    """
-    gap = result.gap
-    before = quantity_text(gap.before.value, gap.unit)
-    if tolerance is not None and gap.before.value <= tolerance:
-        allowed = quantity_text(tolerance, gap.unit)
-        smaller = " What is named below is smaller than that." if result.effects else ""
-        return f"Nothing that matters: the {ahead(gap)} is {before}, allowed is {allowed}.{smaller}"
-    kinds = {verdict.kind for verdict in result.verdicts}
-    if kinds & {"confirmed", "ambiguous", "calibrated"}:
-        return f"{_first(percent(gap.share.value))} of the gap is {_what(result)}."
-    if "unexplained" in kinds:
-        return f"The gap has no name: the {ahead(gap)} is {before}."
-    floor = quantity_text(gap.noise_floor.value, gap.unit)
-    return f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
-
-
-def _what(result: GapResult) -> str:
-    """What the gap is made of, certain names first."""
-    certain = [v for v in result.verdicts if v.kind == "confirmed"]
-    others = [v for v in result.verdicts if v.kind == "ambiguous"]
-    words = _by_place([_briefly(verdict, result) for verdict in certain])
-    if any(verdict.kind == "calibrated" for verdict in result.verdicts):
-        words.append("parameters that are off within their tolerance")
-    sure = listed(words)
-    if not others:
-        return sure
-    if len(others) == 1:
-        doubtful = _with_rivals(others[0], result)
-    else:
-        doubtful = "perhaps " + listed(_by_place([_briefly(v, result) for v in others]))
-    return f"{sure} and {doubtful}" if sure else doubtful
-
-
-def _briefly(verdict: Verdict, result: GapResult) -> str:
-    """The family if the form is undecided, else the effect."""
-    if not verdict.family:
-        return effect_name(_short(verdict, result))
-    _, at, place = effect_name(_short(verdict, result)).partition(" at ")
-    return f"{verdict.family}{at}{place}"
-
-
-def _with_rivals(verdict: Verdict, result: GapResult) -> str:
-    name = _briefly(verdict, result)
-    others = [label for label in rivals(verdict) if label != label_of(verdict)]
-    if not others:
-        return f"perhaps {name}"
-    if len(others) <= FEW_RIVALS:
-        return f"{name} or {names_of(others)}"
-    return f"{name} or one of {len(others)} others"
-
-
-def _by_place(names: Sequence[str]) -> list[str]:
-    """``friction at a`` and ``friction at b`` as ``friction at a and b``."""
-    places: dict[str, list[str]] = {}
-    for name in names:
-        what, _, place = name.partition(" at ")
-        places.setdefault(what, []).append(place)
-    return [f"{what} at {listed(found)}" if all(found) else what for what, found in places.items()]
-
-
-def _short(verdict: Verdict, result: GapResult) -> str:
-    """Name and place; of a system with a single joint the place goes without saying."""
-    joints = [joint.name for joint in result.corrected.joints]
-    return verdict.effect if joints == [verdict.where] else label_of(verdict)
 
 
 def rivals(verdict: Verdict) -> tuple[str, ...]:
@@ -125,12 +52,12 @@ def headline(verdict: Verdict, result: GapResult) -> str:
     if verdict.kind == "no_gap":
         return f"The {ahead(gap)} is {quantity_text(gap.before.value, gap.unit)}."
     if verdict.kind == "unexplained":
-        return f"{_first(percent(verdict.share.value))} of the gap has no name."
+        return f"{capitalized(percent(verdict.share.value))} of the gap has no name."
     if verdict.kind == "needs_data":
-        return _first(names_of(verdict.alternatives, "and")) + "."
+        return capitalized(names_of(verdict.alternatives, "and")) + "."
     if verdict.kind == "calibrated":
         return f"Parameters moved within their tolerance: {_changes(verdict)}."
-    name = _first(effect_name(label_of(verdict)))
+    name = capitalized(effect_name(label_of(verdict)))
     if verdict.kind == "minor":
         return f"{name}: {percent(verdict.share.value)} of the gap, not added."
     parameter = result.corrected.parameters.get(verdict.where)
@@ -144,7 +71,7 @@ def headline(verdict: Verdict, result: GapResult) -> str:
         )
     numbers = ", ".join(_named(field, number) for field, number in verdict.parameters.items())
     if verdict.family:
-        return f"{_first(verdict.family)}, form undecided: as {_lower(name)}, {numbers}."
+        return f"{capitalized(verdict.family)}, form undecided: as {_lower(name)}, {numbers}."
     return f"{name}{shape(verdict)}: {numbers}."
 
 
@@ -203,10 +130,35 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.form:
         found.append(f"of the same family, {names_of(verdict.form)} would do as well")
     if verdict.same_motion:
-        found.append(f"no motion can tell it from {names_of(verdict.same_motion)}")
+        found.append(f"no motion can tell it from {_twins(verdict)}")
+    for other in verdict.beside:
+        twin = next(v for v in result.verdicts if other.effect in v.same_motion)
+        meant, named = effect_name(other.effect), effect_name(label_of(twin))
+        found.append(f"{_values(other)} if {meant} is meant, not {named}")
     if verdict.provisional:
         found.append(provisional(result))
     return found
+
+
+def _twins(verdict: Verdict) -> str:
+    """Its exact twins, with the numbers that are known of them."""
+    known = {other.effect: other for other in verdict.meant}
+    names = [
+        effect_name(label) + (f" ({_values(known[label])})" if label in known else "")
+        for label in verdict.same_motion
+    ]
+    return listed(names, "or")
+
+
+def _values(meant: Meant) -> str:
+    """Numbers without an interval, named where there are several."""
+    texts = {
+        field: f"{value:.3g}{unit_text(unit)}".replace("-", "\u2212")
+        for field, (value, unit) in meant.numbers.items()
+    }
+    if len(texts) == 1:
+        return texts.popitem()[1]
+    return ", ".join(f"{_spelt(field)} {text}" for field, text in texts.items())
 
 
 def much_surer(number: Number) -> bool:
@@ -288,10 +240,6 @@ def experiment(label: str, others: Sequence[str], result: GapResult, same: bool)
 def kind_text(verdict: Verdict) -> str:
     """The kind in words, provisional ones marked."""
     return KINDS[verdict.kind] + (", provisional" if verdict.provisional else "")
-
-
-def _first(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _lower(text: str) -> str:

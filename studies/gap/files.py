@@ -18,7 +18,7 @@ from residual.logs import Finding
 from simgap_files import atomic_write_text, write_sealed
 from sims.loading import corrected_settings
 from sims.model_files import relative
-from studies.gap.answer import lead
+from studies.gap.lead import lead
 from studies.gap.report import write_report
 from studies.running.versions import versions
 

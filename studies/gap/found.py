@@ -64,7 +64,7 @@ class FoundGap(gap.GapResult):
     def _repr_html_(self) -> str:
         from html import escape
 
-        from studies.gap.answer import lead
+        from studies.gap.lead import lead
 
         table = self.to_dataframe().to_html(index=False, float_format="{:.4g}".format, na_rep="")
         return f"<p>{escape(lead(self))}</p>{table}"

@@ -9,7 +9,8 @@ from pathlib import Path
 from residual.gap import GapResult
 from residual.gap.result import Gap
 from residual.logs import Finding
-from studies.gap.answer import headline, is_footnote, kind_text, lead, notes
+from studies.gap.answer import headline, is_footnote, kind_text, notes
+from studies.gap.lead import lead
 from studies.gap.words import CROSS_VALIDATED, ahead, gap_rows, span_text, unit_text
 
 #: Width of the text, and of the column of kinds.

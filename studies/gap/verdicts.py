@@ -11,11 +11,11 @@ from studies.gap.answer import (
     headline,
     is_footnote,
     kind_text,
-    lead,
     notes,
     rivals,
     sentence,
 )
+from studies.gap.lead import lead
 from studies.gap.words import effect_name, label_of, names_of, set_name
 from studies.reporting import Prose, Section, Table, Verdict
 from studies.reporting.sections import Cell

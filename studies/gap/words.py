@@ -50,6 +50,11 @@ def listed(words: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
+def capitalized(text: str) -> str:
+    """A text as the beginning of a sentence, the rest of it as it is."""
+    return text[:1].upper() + text[1:]
+
+
 def names_of(labels: Sequence[str], last: str = "or") -> str:
     """Effects in words: ``a, b or c``."""
     return listed([effect_name(label) for label in labels], last)

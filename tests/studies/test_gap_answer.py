@@ -8,7 +8,8 @@ import pytest
 from residual.gap.result import ChannelGap, Gap, GapResult, Number, Span, Step, Verdict, Where
 from sims.effects import CoulombFriction, ParameterChange
 from sims.pendulum_equation import PendulumEquation
-from studies.gap.answer import headline, lead, notes
+from studies.gap.answer import headline, notes
+from studies.gap.lead import lead
 from studies.gap.summary import summary
 from studies.gap.verdicts import banners
 from studies.reporting import Prose

@@ -18,7 +18,7 @@ def said(effect, **values):
     states = np.array([np.pi, 0.0]) + rng.standard_normal((201, 2))
     samples = Samples.join([Trajectory("run", 0.05 * np.arange(201.0), states, volts)], 4)
     model = Model(PendulumEquation(), candidates(PendulumEquation(), [effect], samples))
-    return absurd(model, np.array([values[knob.field] for knob in model.knobs]), samples)
+    return absurd(model, np.array([values[knob.field] for knob in model.knobs]), samples)[1]
 
 
 @pytest.mark.parametrize(

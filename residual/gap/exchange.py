@@ -1,0 +1,72 @@
+"""Sets with one member missing, or exchanged for what may do its work."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from residual.gap.screening import gains
+from residual.gap.search import Key, Search
+
+#: Part of the best gain by the linear screen below which no rival is worth a fit.
+HOPELESS = 0.5
+#: Spellings of one effect, as cogging has one for every order, that are tried for one place.
+SPELLINGS = 2
+
+
+def add_without_each(search: Search, key: Key) -> None:
+    """Fit what is left of a set without each of its members."""
+    for gone in key:
+        smaller, theta = search.merged(key, (), drop=(gone,))
+        search.add({smaller: theta})
+
+
+def add_exchanged(search: Search, key: Key, most: int) -> None:
+    """Fit sets in which one member of a set has been exchanged for what may do its work.
+
+    These are the effects that gain most where the member is missing, and its whole family.
+
+    Args:
+        search: What is tried goes there.
+        key: A fitted set.
+        most: Effects that are tried in place of each member, beside its family.
+    """
+    add_without_each(search, key)
+    for gone in key:
+        rest = tuple(i for i in key if i != gone)
+        if rest not in search.tried:
+            continue
+        around, family = search.signatures(rest), search.family(gone)
+        taken: list[int] = []
+        ranked = gains(around)
+        for gain in ranked:
+            number = around.variants[gain.variants[0]].candidate
+            near = len(taken) < most or (family and search.family(number) == family)
+            hopeless = gain.value < HOPELESS * ranked[0].value
+            if number not in taken and spelt_out(search, number, taken):
+                continue
+            if number in key or number in taken or hopeless or not near:
+                continue
+            taken.append(number)
+            fresh, theta = search.merged(rest, [(number, gain.values[0])])
+            search.add({fresh: theta})
+
+
+def spelt_out(search: Search, number: int, taken: Sequence[int]) -> bool:
+    """Whether enough spellings of a candidate's effect are taken, so that others get a turn."""
+    label = search.candidates[number].label
+    return sum(search.candidates[other].label == label for other in set(taken)) >= SPELLINGS
+
+
+def exchanged(search: Search, key: Key, number: int) -> list[tuple[int, Key]]:
+    """What was fitted in place of a member, and the set with it.
+
+    Laws of which the member is a special case are left out: they are it, with more freedom.
+    """
+    rest = set(key) - {number}
+    found = []
+    for rival in search.usable():
+        if len(rival) == len(key) and rest < set(rival) and number not in rival:
+            (other,) = set(rival) - rest
+            if not search.contains(other, number):
+                found.append((other, rival))
+    return found

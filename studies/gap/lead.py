@@ -1,0 +1,94 @@
+"""The first sentence of an answer: how much of the gap has a name, and which."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from residual.gap import GapResult
+from residual.gap.result import Verdict
+from studies.gap.answer import rivals
+from studies.gap.words import (
+    ahead,
+    capitalized,
+    effect_name,
+    label_of,
+    listed,
+    names_of,
+    percent,
+    quantity_text,
+)
+
+#: Rivals that are listed.
+FEW_RIVALS = 2
+
+
+def lead(result: GapResult, tolerance: float | None = None) -> str:
+    """The first sentence: the share of the gap that has a name.
+
+    Args:
+        result: What was found.
+        tolerance: Forecast error that does not matter.
+    """
+    gap = result.gap
+    before = quantity_text(gap.before.value, gap.unit)
+    if tolerance is not None and gap.before.value <= tolerance:
+        allowed = quantity_text(tolerance, gap.unit)
+        smaller = " What is named below is smaller than that." if result.effects else ""
+        return f"Nothing that matters: the {ahead(gap)} is {before}, allowed is {allowed}.{smaller}"
+    kinds = {verdict.kind for verdict in result.verdicts}
+    if kinds & {"confirmed", "ambiguous", "calibrated"}:
+        return f"{capitalized(percent(gap.share.value))} of the gap is {_what(result)}."
+    if "unexplained" in kinds:
+        return f"The gap has no name: the {ahead(gap)} is {before}."
+    floor = quantity_text(gap.noise_floor.value, gap.unit)
+    return f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
+
+
+def _what(result: GapResult) -> str:
+    """What the gap is made of, certain names first."""
+    certain = [v for v in result.verdicts if v.kind == "confirmed"]
+    others = [v for v in result.verdicts if v.kind == "ambiguous"]
+    words = _by_place([_briefly(verdict, result) for verdict in certain])
+    if any(verdict.kind == "calibrated" for verdict in result.verdicts):
+        words.append("parameters that are off within their tolerance")
+    sure = listed(words)
+    if not others:
+        return sure
+    if len(others) == 1:
+        doubtful = _with_rivals(others[0], result)
+    else:
+        doubtful = "perhaps " + listed(_by_place([_briefly(v, result) for v in others]))
+    return f"{sure} and {doubtful}" if sure else doubtful
+
+
+def _briefly(verdict: Verdict, result: GapResult) -> str:
+    """The family if the form is undecided, else the effect."""
+    if not verdict.family:
+        return effect_name(_short(verdict, result))
+    _, at, place = effect_name(_short(verdict, result)).partition(" at ")
+    return f"{verdict.family}{at}{place}"
+
+
+def _with_rivals(verdict: Verdict, result: GapResult) -> str:
+    name = _briefly(verdict, result)
+    others = [label for label in rivals(verdict) if label != label_of(verdict)]
+    if not others:
+        return f"perhaps {name}"
+    if len(others) <= FEW_RIVALS:
+        return f"{name} or {names_of(others)}"
+    return f"{name} or one of {len(others)} others"
+
+
+def _by_place(names: Sequence[str]) -> list[str]:
+    """``friction at a`` and ``friction at b`` as ``friction at a and b``."""
+    places: dict[str, list[str]] = {}
+    for name in names:
+        what, _, place = name.partition(" at ")
+        places.setdefault(what, []).append(place)
+    return [f"{what} at {listed(found)}" if all(found) else what for what, found in places.items()]
+
+
+def _short(verdict: Verdict, result: GapResult) -> str:
+    """Name and place; of a system with a single joint the place goes without saying."""
+    joints = [joint.name for joint in result.corrected.joints]
+    return verdict.effect if joints == [verdict.where] else label_of(verdict)
