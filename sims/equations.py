@@ -128,12 +128,7 @@ class EquationOfMotion(HostSimulator):
             edge = 0.5 * np.asarray(play.width)
             state.x[i] = np.clip(state.x[i], -edge, edge)
         h = np.asarray(durations, float) / inputs.shape[1]
-        ends = substep_ends(inputs)
-        if motion.dry or motion.plays:
-            state = advance(motion, state, ends, h)
-        else:
-            for u in ends:
-                state = advance_smoothly(motion, state, u, h)
+        state = _advance(motion, state, substep_ends(inputs), h)
         after = np.empty_like(states)
         after[:, self._positions] = state.q.T
         after[:, self._rates] = state.v.T
@@ -164,11 +159,13 @@ class EquationOfMotion(HostSimulator):
 
 
 class FirstOrderSystem(HostSimulator):
-    """A system x' = f(x, u) without joints, such as a heater or a tank.
+    """A system x' = f(x, u) without joints, such as a heater, a tank or a wheel's speed.
 
     It hosts changes of parameters, actuator and sensor effects, and on each state a constant
-    load, which is a constant rate of change. A subclass gives ``state_channels`` (of kind
-    ``"other"``), ``action_channels``, ``dt``, ``parameters`` and ``derivative``.
+    load, which is a constant rate of change. A speed (a channel of kind ``"rate"``) hosts
+    friction and drag, too, which count per unit of what is moved. A subclass gives
+    ``state_channels`` (of kind ``"other"`` or ``"rate"``), ``action_channels``, ``dt``,
+    ``parameters`` and ``derivative``.
 
     Args:
         dt, substeps, effects: As for ``EquationOfMotion``.
@@ -191,7 +188,13 @@ class FirstOrderSystem(HostSimulator):
         self.substeps = cls.substeps if substeps is None else substeps
         if not hasattr(cls, "joints"):
             self.joints = tuple(
-                Joint(c.name, c.name, None, f"{c.unit}/s", c.scale / (10 * self.dt))
+                Joint(
+                    c.name,
+                    c.name,
+                    c.name if c.kind == "rate" else None,
+                    f"{c.unit}/s",
+                    c.scale / (10 * self.dt),
+                )
                 for c in self.state_channels
             )
         self.effects = ()
@@ -204,28 +207,34 @@ class FirstOrderSystem(HostSimulator):
         """Rates of change, by row: (n, n_s), (n, n_a) and parameters -> (n, n_s)."""
 
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
-        """See ``HostSimulator.integrate``."""
+        """See ``HostSimulator.integrate``: the states are rates of positions that nobody asks."""
         names = [channel.name for channel in self.physical_channels]
-        loads = [(names.index(e.joint), e) for e in self.joint_effects()]
-        p = SimpleNamespace(**self.parameter_values())
+        forces = [(names.index(e.joint), e) for e in self.joint_effects()]
+
+        def rates(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
+            return _by_joint(self.derivative(v.T, u.T, p), v.shape, "derivative") + f
+
+        motion = Motion(
+            rates,
+            lambda q, v, u, p: np.zeros_like(v),  # nothing has play, so nobody asks
+            SimpleNamespace(**self.parameter_values()),
+            smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
+            dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
+        )
         x = np.ascontiguousarray(np.asarray(states, float).T)
         inputs = np.asarray(inputs, float)
+        state = State(np.zeros_like(x), x, np.empty((0, x.shape[1])))
         h = np.asarray(durations, float) / inputs.shape[1]
+        return _advance(motion, state, substep_ends(inputs), h).v.T.copy()
 
-        def change(x: Array, u: Array) -> Array:
-            rates = _by_joint(self.derivative(x.T, u.T, p), x.shape, "derivative")
-            for j, load in loads:
-                rates[j] += load.force(x[j], np.zeros_like(x[j]))
-            return rates
 
-        for start, end in substep_ends(inputs):
-            middle = 0.5 * (start + end)
-            k1 = change(x, start)
-            k2 = change(x + 0.5 * h * k1, middle)
-            k3 = change(x + 0.5 * h * k2, middle)
-            k4 = change(x + h * k3, end)
-            x = x + h / 6 * (k1 + 2 * (k2 + k3) + k4)
-        return x.T.copy()
+def _advance(motion: Motion, state: State, ends: Array, h: Array) -> State:
+    """State after all sub-steps, see ``sims.sliding.advance``."""
+    if motion.dry or motion.plays:
+        return advance(motion, state, ends, h)
+    for u in ends:
+        state = advance_smoothly(motion, state, u, h)
+    return state
 
 
 def substep_ends(inputs: Array) -> Array:

@@ -59,7 +59,7 @@ class Joint:
         name: Its name in effects and reports.
         position: State channel of its position.
         rate: State channel of its rate; None for a state of a first-order system, where a
-            "force" is a rate of change.
+            "force" is a rate of change. Of a speed without a position it is that of ``position``.
         unit: Unit of the force, ``"N m"`` or ``"N"``.
         scale: A typical force, or None to leave it to the simulator.
         driven: False if no actuator acts on it, so that it cannot have backlash.

@@ -129,7 +129,7 @@ def boldly(search: Search, parameters: bool) -> list[Key]:
         parameters: Whether changes of parameters, or all other effects.
     """
     found: list[Key] = []
-    for number, candidate in enumerate(list(search.candidates)):
+    for number, candidate in enumerate(search.candidates[: search.screened]):
         fresh = (number,)
         if candidate.bold is None or search.late or not search.fits_in(fresh):
             continue

@@ -20,6 +20,7 @@ from residual.gap.inspection import (
     refusal,
     rounded,
     sampling,
+    speeds,
     still,
     sums,
 )
@@ -75,7 +76,7 @@ def findings(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
         return [refusal("empty", "", "there are no trajectories: give at least one measured run")]
     found = _refusals(simulator, trajectories)
     if not found:
-        checks = (sampling, bounds, still, faults, clipped, rounded, sums, nominal)
+        checks = (sampling, bounds, speeds, still, faults, clipped, rounded, sums, nominal)
         found = [one for check in checks for one in check(simulator, trajectories)]
     ranks = {"refuse": 0, "warning": 1, "note": 2}
     return sorted(found, key=lambda one: ranks[one.severity])

@@ -117,7 +117,7 @@ def explain(
         if search.late or ((ratio > 1 / WORTH).all() and (ratio < WORTH).all()):
             break
         seeds = {k: search.own(k) for k in {*near_best(search), key} if k}
-        fitter, pool = fresh, search.candidates  # with the twins that were tried
+        fitter = fresh
     return settle(search, floor)
 
 

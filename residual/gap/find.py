@@ -121,12 +121,9 @@ def find_gap(
     ) -> Explanation:
         free = {candidate.label for candidate in beside}
         pool = ready.pool(candidates(simulator, kept, ready.fitter.samples))
-        # With the twins that an earlier search has tried.
-        known = {candidate.effect for candidate in pool}
-        pool += [c for c in (earlier.candidates if earlier else ()) if c.effect not in known]
         pool = [candidate for candidate in pool if candidate.label not in free]
         others = {label: effect for label, effect in named.items() if label not in free}
-        twins = exact_twins(simulator, pool, ready.fitter.samples, groups, others)
+        twins = exact_twins(simulator, ready.fitter.samples, groups, others)
         tell(
             f"{len(ready.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s, "
             f"{len(pool)} candidate effects"

@@ -25,6 +25,10 @@ Mask = NDArray[np.bool_]
 
 # One sample in more control periods than these should be known.
 _SLOW = 4.0
+# Units of what can rub.
+_SPEEDS = {
+    "rad/s", "deg/s", "rev/s", "rpm", "rev/min", "1/min", "m/s", "cm/s", "mm/s", "km/h", "mph",
+}  # fmt: skip
 # An input is in another unit if it goes beyond its bounds by this factor, or if it mostly does so.
 _FAR_BEYOND = 3.0
 
@@ -76,6 +80,20 @@ def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list
         )
         numbers = {"samples": beyond, "most": most}
         found.append(Finding("bounds", channel.name, says, numbers, "warning", tuple(rows)))
+    return found
+
+
+def speeds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Speeds that the simulator does not declare as such, so that nothing is taken to rub."""
+    found = []
+    for channel, _ in measured(simulator, trajectories):
+        if channel.kind == "other" and channel.unit in _SPEEDS:
+            says = (
+                f'in {channel.unit} is a channel of kind "other", for which neither friction nor '
+                "drag can be missing: if it is the speed of something, declare "
+                f'Channel("{channel.name}", "{channel.unit}", "rate")'
+            )
+            found.append(Finding("undeclared", channel.name, says))
     return found
 
 

@@ -58,6 +58,7 @@ class Search:
     """Rival sets of effects fitted to the windows of one fitter.
 
     Attributes:
+        candidates: What may be missing, by number; those from ``screened`` on are twins only.
         twins: Exact twins of candidates by label, that are tried where those would be absurd.
         beside: Candidates that are free beside every set, the empty one included, and that no set
             is charged for: parameters within their tolerance.
@@ -81,8 +82,12 @@ class Search:
         beside: Sequence[Candidate] = (),
         twins: Twins | None = None,
     ) -> None:
-        self.simulator, self.candidates, self.fitter = simulator, list(candidates), fitter
+        self.simulator, self.fitter = simulator, fitter
         self.twins = twins or {}
+        self.screened = len(candidates)
+        others = {twin.effect: twin for found in self.twins.values() for twin in found}
+        known = {candidate.effect for candidate in candidates}
+        self.candidates = [*candidates, *(t for e, t in others.items() if e not in known)]
         self.effort, self.tell, self.until = effort or Effort(), tell, until
         self.beside = tuple(beside)
         self.nominal = fitter.fit(Model(simulator), np.zeros(0))
@@ -152,8 +157,9 @@ class Search:
         """What every candidate would add to a fitted set."""
         if key not in self._signatures:
             fit = self.tried[key]
-            columns = self.fitter.columns(fit, self.candidates)
-            self._signatures[key] = signatures(fit, trials(self.candidates), columns)
+            screened = self.candidates[: self.screened]
+            columns = self.fitter.columns(fit, screened)
+            self._signatures[key] = signatures(fit, trials(screened), columns)
         return self._signatures[key]
 
     def merged(
@@ -217,11 +223,8 @@ class Search:
 
     def _with_twins(self, key: Key, gone: int) -> None:
         """Fit a set with each exact twin of a member in its place."""
+        known = [candidate.effect for candidate in self.candidates]
         for twin in self.twins_of(gone):
-            known = [candidate.effect for candidate in self.candidates]
-            if twin.effect not in known:
-                self.candidates.append(twin)
-                known.append(twin.effect)
             start = 0.01 * twin.trials[0].values[0]
             fresh, theta = self.merged(key, [(known.index(twin.effect), start)], drop=(gone,))
             self.add({fresh: theta})
@@ -242,7 +245,7 @@ class Search:
         return start
 
     def twins_of(self, number: int) -> list[Candidate]:
-        """Candidates that move exactly as one does, but for those that stand in the pool."""
+        """Candidates that move exactly as one does."""
         return list(self.twins.get(self.candidates[number].label, ()))
 
     def contains(self, one: int, other: int) -> bool:

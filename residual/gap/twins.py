@@ -35,23 +35,21 @@ DIFFERS = 0.25
 
 
 def exact_twins(
-    simulator: HostSimulator, pool: Sequence[Candidate], samples: Samples,
-    groups: Mapping[str, Sequence[str]], offered: Mapping[str, Effect],
+    simulator: HostSimulator, samples: Samples, groups: Mapping[str, Sequence[str]],
+    offered: Mapping[str, Effect],
 ) -> dict[str, list[Candidate]]:  # fmt: skip
-    """Candidates that move exactly as one of a pool does, by that one's label.
+    """Candidates that move exactly as an effect does, by its label.
 
     Args:
         simulator: The nominal simulator.
-        pool: What may be missing.
         samples: The measured table.
         groups: Labels of exact twins, by label.
         offered: Effects by label.
     """
-    known = {candidate.label for candidate in pool}
     found = {}
-    for label in known:
-        others = [n for n in groups.get(label, ()) if n in offered and n not in known]
-        found[label] = candidates(simulator, [offered[n] for n in others[:MOST]], samples)
+    for label in groups:
+        others = [name for name in groups[label] if name != label and name in offered]
+        found[label] = candidates(simulator, [offered[name] for name in others[:MOST]], samples)
     return found
 
 

@@ -234,11 +234,10 @@ def _unit(dimension: Mapping[str, int], measures: Mapping[str, tuple[str, float]
     """Unit of a product of powers: ``force=1, rate=-1`` is ``"N m s/rad"``."""
     powers: dict[str, int] = {}
     for kind, power in dimension.items():
-        unit = measures[kind][0]
-        parts = [unit] if kind != "rate" else unit.split("/")
-        powers[parts[0]] = powers.get(parts[0], 0) + power
-        if len(parts) > 1:
-            powers[parts[1]] = powers.get(parts[1], 0) - power
+        first, *others = measures[kind][0].split("/")
+        powers[first] = powers.get(first, 0) + power
+        for unit in others:
+            powers[unit] = powers.get(unit, 0) - power
     above = [_power(unit, power) for unit, power in powers.items() if power > 0]
     below = [_power(unit, -power) for unit, power in powers.items() if power < 0]
     return (" ".join(above) or "1") + ("/" + " ".join(below) if below else "")

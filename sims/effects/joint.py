@@ -50,12 +50,16 @@ class JointEffect(Effect):
         if joint.rate is None and self.mechanical:
             raise ValueError(
                 f"{self.name} needs a joint with a rate; {joint.name!r} is the state of a "
-                "first-order system, which hosts a constant_load only"
+                "first-order system, which hosts a constant_load only; a speed is a channel of "
+                'kind="rate"'
             )
+        speed = joint.position == joint.rate
+        if speed and self.mechanical and not self.follows_rate:
+            raise ValueError(f"{self.name} needs a joint with a position; {joint.name!r} is a rate")
         channels = {channel.name: channel for channel in simulator.state_channels}
         found = {"force": (joint.unit, simulator.force_scale(joint))}
         for kind, name in (("position", joint.position), ("rate", joint.rate)):
-            if name is not None:
+            if name is not None and not (speed and kind == "position"):
                 found[kind] = (channels[name].unit, channels[name].scale)
         return found
 
