@@ -64,10 +64,11 @@ def _alone(search: Search, quiet: Callable[[Key], bool]) -> list[Key]:
 
 
 def _best(search: Search, keys: list[Key]) -> list[Key]:
-    """The set that forecasts best, and those that fit best."""
-    sound = [key for key in keys if search.sound(key)]
-    by_merit = sorted(sound, key=lambda k: search.tried[k].merit)[: search.effort.beam]
-    return list(dict.fromkeys([*sorted(sound, key=search.error)[:1], *by_merit]))
+    """The sets that forecast best, with and without room for more, and those that fit best."""
+    good = sorted((key for key in keys if search.sound(key)), key=search.error)
+    room = [key for key in good if search.numbers(key) < search.most_numbers]
+    by_merit = sorted(room, key=lambda k: search.tried[k].merit)[: search.effort.beam]
+    return list(dict.fromkeys([*good[:1], *by_merit, *room[:1]]))
 
 
 def _pays(search: Search, key: Key, reached: float) -> bool:

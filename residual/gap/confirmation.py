@@ -211,6 +211,12 @@ def tie(search: Search) -> float:
     return search.fitter.tie(search.tried[()])
 
 
+def ratio(search: Search, one: Key, other: Key, group: int) -> float:
+    """Forecast error of a set over that of another at a joint."""
+    squares = search.validated[one].squares, search.validated[other].squares
+    return _ratio(search, *squares, group)
+
+
 def _ratio(search: Search, one: Array, other: Array, group: int) -> float:
     errors = [search.currency.by_group(squares)[group] for squares in (one, other)]
     return float(errors[0] / max(errors[1], 1e-12))

@@ -49,19 +49,21 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
     known = np.maximum(np.array([knob.known for knob in fit.model.knobs]) * scale, 1e-6)
     matrix = np.einsum("wri,wrj->ij", unit, unit) + np.diag(known**-2)
     inverse = np.linalg.pinv(matrix, rcond=1e-12)
+    # A number that is known beforehand takes less of the data than a whole one.
+    taken = float(np.clip(1 - np.diag(inverse) * known**-2, 0.0, 1.0).sum())
     used = int((np.abs(residual) > 0).sum())
-    freedom = max(used - fit.basis.shape[2] * len(residual) - p, 1)
+    freedom = max(used - fit.basis.shape[2] * len(residual) - taken, 1)
     variance = max(1.0, float((residual**2).sum()) / freedom)
     plain = variance * np.diag(inverse)
     count = len(blocks)
-    if count <= p + 1:
+    if count <= taken + 1:
         return np.sqrt(plain) / scale
     per_window = np.einsum("wri,wr->wi", unit, residual)
     scores = np.stack([per_window[blocks.block == b].sum(axis=0) for b in range(count)])
-    sandwich = np.diag(inverse @ (scores.T @ scores) @ inverse) * count / (count - p)
-    return np.sqrt(np.maximum(plain, sandwich)) * _student(count - p) / scale
+    sandwich = np.diag(inverse @ (scores.T @ scores) @ inverse) * count / (count - taken)
+    return np.sqrt(np.maximum(plain, sandwich)) * _student(count - taken) / scale
 
 
-def _student(freedom: int) -> float:
+def _student(freedom: float) -> float:
     """Student's 95 % quantile over the normal one."""
     return float(t.ppf(0.975, freedom) / 1.96)

@@ -133,8 +133,12 @@ class Search:
         """
         if any(self.contains(one, other) for one in key for other in key):
             return False
-        windows = len(self.fitter.blocks.windows)
-        return len(key) <= self.effort.most and self.numbers(key) <= max(3, windows // 2)
+        return len(key) <= self.effort.most and self.numbers(key) <= self.most_numbers
+
+    @property
+    def most_numbers(self) -> int:
+        """How many numbers the windows are good for."""
+        return max(3, len(self.fitter.blocks.windows) // 2)
 
     def usable(self) -> list[Key]:
         """Sets that converged and may be right."""

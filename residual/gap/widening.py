@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.bounded import bounded_step
-from residual.gap.confirmation import Claim
+from residual.gap.confirmation import CLEARLY, Claim, ratio, where_it_matters
+from residual.gap.exchange import exchanged
 from residual.gap.fitting import Fit
 from residual.gap.intervals import deviations
 from residual.gap.result import Number
@@ -38,11 +39,11 @@ def widened(
         adequate: Whether only noise is left. Data that leave a remainder are not believed what
             they say of parameters, so all may be off by their tolerance then.
     """
-    sure = {claim.number for claim in claims if claim.sure}
+    sure = {claim.number for claim in claims if claim.sure or vital(search, key, claim)}
     if adequate:
         middle, half = beside.theta, 1.96 * deviations(beside, search.fitter.blocks)
         # What parameters may stand in for stays: they are free in the fit beside.
-        sure = {c.number for c in claims if dataclasses.replace(c, calibration=False).sure}
+        sure |= {c.number for c in claims if dataclasses.replace(c, calibration=False).sure}
     else:
         middle, own = search.own(key), 1.96 * deviations(search.tried[key], search.fitter.blocks)
         half = np.hypot(own[: len(middle)], by_parameters(beside, len(middle)))
@@ -55,8 +56,42 @@ def widened(
         )
         search.add({smaller: theta})
         best = forecast_best(smaller) if search.sound(smaller) else None
-        told.append(_widened(search, key, claim, freed, smaller, best))
+        claim = _widened(search, key, claim, freed, smaller, best)
+        told.append(_beside_rivals(search, key, claim, claims))
     return told
+
+
+def _beside_rivals(search: Search, key: Key, claim: Claim, claims: Sequence[Claim]) -> Claim:
+    """A claim with intervals that hold, too, with rivals in place of its companions."""
+    numbers, own = dict(claim.numbers), search.tried[key]
+    half = 1.96 * deviations(own, search.fitter.blocks)[own.model.owner == key.index(claim.number)]
+    for companion in claims:
+        if companion.number == claim.number:
+            continue
+        instead = {*companion.form, *companion.alike, *companion.rivals}
+        for other, rival in exchanged(search, key, companion.number):
+            if search.candidates[other].label not in instead:
+                continue
+            fit = search.tried[rival]
+            there = np.flatnonzero(fit.model.owner == rival.index(claim.number))
+            for j, reach in zip(there, half, strict=True):
+                knob, value = fit.model.knobs[j], float(fit.theta[j])
+                n = numbers[knob.field]
+                numbers[knob.field] = dataclasses.replace(
+                    n,
+                    low=max(min(n.low, value - reach), knob.low),
+                    high=min(max(n.high, value + reach), knob.high),
+                )
+    return dataclasses.replace(claim, numbers=numbers)
+
+
+def vital(search: Search, key: Key, claim: Claim) -> bool:
+    """Whether no set without an effect does nearly as well: it or a rival of it is there."""
+    rest = tuple(i for i in key if i != claim.number)
+    if rest not in search.validated or claim.bounded or claim.calibration:
+        return False
+    group = where_it_matters(search, key, claim.number)
+    return ratio(search, rest, key, group) > CLEARLY
 
 
 def _widened(
