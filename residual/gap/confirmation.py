@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 #: Forecast error of a rival, over that of the chosen set, that excludes it while a remainder is
 #: left: model imperfection of that size may favour either.
 CLEARLY = 1.5
+#: The same from which on it is, whatever part of the data forecasts start from.
+HOPELESS = 3.0
 #: How far a strength may lie off in a fold, or with other numerics, as a share of it.
 STEADY = 0.5
 #: Standard errors by which forecasts must be worse without the effect.
@@ -157,20 +159,25 @@ def excluded(
 
     Down to the noise, chance decides, at half the step, too, where that matters: a delay may fit
     what a lag did only because steps are coarse. While a remainder is left, a rival has to be
-    clearly worse; one that differs in form alone has to lose at the horizon and at half of it.
+    clearly worse, also from starts that are better known: errors of the start fade in a sluggish
+    model otherwise than in a late one. One that differs in form alone has to lose at the horizon
+    and at half of it.
     """
     if adequate:
         behind = score(search, rival) - score(search, key)
         return behind > tie(search) and not _by_numerics(search, key, rival, behind)
     group = where_it_matters(search, key, number)
     own, its = (search.validated[k] for k in (key, rival))
-    ratio = _ratio(search, its.squares, own.squares, group)
-    if ratio > CLEARLY:
+    worse = _ratio(search, its.squares, own.squares, group)
+    if worse > HOPELESS:
         return True
+    if worse > CLEARLY:
+        longer = [search.from_longer_leads(k) for k in (rival, key)]
+        return _ratio(search, longer[0], longer[1], group) > CLEARLY
     if not alike or len(search.fitter.blocks) < FEW:
         return False
     behind, error = search.currency.difference(its.squares, own.squares, group)
-    return behind > error and _ratio(search, its.half, own.half, group) > 1.0 and ratio > 1.05
+    return behind > error and _ratio(search, its.half, own.half, group) > 1.0 and worse > 1.05
 
 
 def in_plain_form(search: Search, key: Key, claims: Sequence[Claim]) -> Key | None:

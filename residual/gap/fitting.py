@@ -108,6 +108,9 @@ class Fitter(Protocol):
     def halved(self) -> Fitter:
         """The same with half the integration step."""
 
+    def from_longer_leads(self) -> Fitter:
+        """The same with forecasts from start states fitted to twice as much of a window."""
+
     def weighed_like(self, other: Fitter) -> Fitter:
         """The same with the weights of another."""
 

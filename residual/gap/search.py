@@ -98,6 +98,7 @@ class Search:
         self.unfit: set[Key] = set()
         self.refused: dict[Key, str] = {}
         self.halved: dict[Key, Fit] = {}
+        self._from_longer_leads: dict[Key, Array] = {}
         self._signatures: dict[Key, Signatures] = {}
         channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
         found = validate(fitter, base) if free else self.before
@@ -165,6 +166,13 @@ class Search:
             columns = self.fitter.columns(fit, screened)
             self._signatures[key] = signatures(fit, trials(screened), columns)
         return self._signatures[key]
+
+    def from_longer_leads(self, key: Key) -> Array:
+        """Mean squared errors of blocks, forecasts begun from twice as much data, (B, m)."""
+        if key not in self._from_longer_leads:
+            fitter = self.fitter.from_longer_leads()
+            self._from_longer_leads[key] = validate(fitter, self.tried[key]).squares
+        return self._from_longer_leads[key]
 
     def merged(
         self, key: Key, additions: Iterable[tuple[int, Array]], drop: Key = ()

@@ -47,6 +47,7 @@ class SmoothFitter:
         scale: Typical variation of every physical state, (n_p,).
         cap: Cost above which a window counts only by its logarithm.
         turns: Gauss-Newton iterations of a fit.
+        lead_part: Part of a window that a forecast's start state is fitted to.
     """
 
     samples: Samples
@@ -57,6 +58,7 @@ class SmoothFitter:
     scale: Array
     cap: float = np.inf
     turns: int = 8
+    lead_part: float = LEAD
 
     def with_substeps(self, count: int) -> SmoothFitter:
         """The same with so many integration steps between rows."""
@@ -65,6 +67,10 @@ class SmoothFitter:
     def halved(self) -> SmoothFitter:
         """See ``Fitter.halved``."""
         return self.with_substeps(2 * self.samples.substeps)
+
+    def from_longer_leads(self) -> SmoothFitter:
+        """See ``Fitter.from_longer_leads``."""
+        return dataclasses.replace(self, lead_part=2 * self.lead_part)
 
     def weighed_like(self, other: Fitter) -> SmoothFitter:
         """See ``Fitter.weighed_like``."""
@@ -203,7 +209,7 @@ class SmoothFitter:
         """Samples of every window that its forecast starts from, (W, L)."""
         windows = self.blocks.windows
         lengths = windows.inside.sum(axis=1)
-        count = np.maximum(np.minimum(LEAST, lengths - 1), np.round(LEAD * lengths))
+        count = np.maximum(np.minimum(LEAST, lengths - 1), np.round(self.lead_part * lengths))
         return np.arange(windows.index.shape[1]) < count[:, None]
 
     def foretell(self, model: Model, thetas: Array, which: NDArray[np.int64], fit: Fit) -> Foretold:

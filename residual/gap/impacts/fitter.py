@@ -70,6 +70,10 @@ class ImpactFitter:
         samples = dataclasses.replace(self.samples, substeps=2 * self.samples.substeps)
         return dataclasses.replace(self, data=dataclasses.replace(self.data, samples=samples))
 
+    def from_longer_leads(self) -> ImpactFitter:
+        """See ``Fitter.from_longer_leads``; here they start where a whole window ends."""
+        return self
+
     def weighed_like(self, other: Fitter) -> ImpactFitter:
         """See ``Fitter.weighed_like``."""
         return dataclasses.replace(self, data=with_noise(self.data, other.sigma, self.scale))

@@ -82,6 +82,9 @@ class Toy:
     def usable(self):
         return [k for k in self.validated if k not in self.unfit and k not in self.refused]
 
+    def from_longer_leads(self, key):
+        return self.validated[key].squares
+
     def best(self):
         return min(self.usable(), key=self.error)
 
