@@ -171,7 +171,8 @@ def run(
     tell("writing the report")
     findings = [*data.findings, *(held.findings if held else ())]
     write_gap(result, output, config, findings, time.perf_counter() - begin)
-    return result
+    grave = [line.removeprefix("data: ") for line in found_in_data(findings, "warning")]
+    return dataclasses.replace(result, quality=(*grave, *result.quality))
 
 
 def holds(simulator: HostSimulator, hold: str | Mapping[str, Hold]) -> dict[str, Hold]:

@@ -55,7 +55,8 @@ class LogFormat:
         comment: Lines of a text file that begin with it are left out.
         skip: So many lines at the top of a text file are left out.
         decimal: Decimal sign of a text file.
-        gap: A trajectory is cut where samples are further apart than this many median periods.
+        gap: A trajectory is cut where samples are further apart than this many usual periods: the
+            median step, or that of the longest tenth.
         minimum_samples: A trajectory with fewer is an error; a piece with fewer is left out.
         allow_constant_action: Accept logs in which an action never changes, such as free decays.
     """

@@ -16,6 +16,9 @@ from residual.logs.table import LogError
 
 Array = NDArray[np.float64]
 
+#: Part of the steps that are no longer than what is usual.
+ORDINARY = 0.9
+
 
 @dataclasses.dataclass(frozen=True)
 class Run:
@@ -62,7 +65,7 @@ def tidy(
 
     Args:
         runs: As recorded, times not decreasing.
-        gap: In median sample periods; a run is cut at longer steps.
+        gap: In usual sample periods; a run is cut at longer steps.
         minimum: Samples; a recorded run with fewer is an error, a piece with fewer is left out.
         findings: What is repaired is added here.
         channels: Names of the columns of ``Run.states``.
@@ -154,18 +157,18 @@ def _ordered(run: Run, minimum: int, findings: list[Finding]) -> Run:
 def _cut(run: Run, gap: float, findings: list[Finding]) -> list[Run]:
     """Pieces between gaps in time and samples without an action."""
     steps = np.diff(run.times)
-    period = float(np.median(steps))
+    # Where one step in ten is long, that is how the log was sampled, and nothing is missing.
+    period = float(max(np.median(steps), np.quantile(steps, ORDINARY)))
     wide = steps > gap * period
     if wide.any():
         longest = float(steps.max())
         first = int(run.rows[:-1][wide][0])
         says = (
             f"{int(wide.sum())} gaps of more than {gap:g} periods, the longest {longest:.4g} s, "
-            f"the first after row {first}; cut there."
+            f"the first after row {first}; cut there. Set columns.gap to go on across them."
         )
-        findings.append(
-            Finding("gap", run.name, says, {"gaps": int(wide.sum()), "longest_s": longest})
-        )
+        numbers = {"gaps": int(wide.sum()), "longest_s": longest}
+        findings.append(Finding("gap", run.name, says, numbers, "warning"))
     # What was done after such a sample is unknown, so nothing can follow from it.
     idle = np.isnan(run.actions[:-1]).any(axis=1)
     if idle.any():
