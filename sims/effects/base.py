@@ -240,7 +240,8 @@ def _unit(dimension: Mapping[str, int], measures: Mapping[str, tuple[str, float]
             powers[unit] = powers.get(unit, 0) - power
     above = [_power(unit, power) for unit, power in powers.items() if power > 0]
     below = [_power(unit, -power) for unit, power in powers.items() if power < 0]
-    return (" ".join(above) or "1") + ("/" + " ".join(below) if below else "")
+    under = f"({' '.join(below)})" if len(below) > 1 else "".join(below)
+    return (" ".join(above) or "1") + (f"/{under}" if under else "")
 
 
 def _power(unit: str, power: int) -> str:

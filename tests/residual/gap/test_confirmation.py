@@ -1,6 +1,7 @@
 """How sure a chosen effect is, and what is said of it."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,11 +16,12 @@ from residual.gap.confirmation import (
     steady,
     survives,
 )
-from residual.gap.intervals import at_bound, bounded
+from residual.gap.intervals import at_bound, bounded, deviations
 from residual.gap.model import Model
 from residual.gap.result import Number
 from residual.gap.samples import Samples
 from residual.gap.verdicts import effect_verdict, minor_verdict, nameable
+from residual.gap.widening import vital
 from residual.trajectories import Trajectory
 from sims.effects import DeadZone
 from sims.pendulum_equation import PendulumEquation
@@ -37,6 +39,42 @@ def claim(number=0, **changed):
 def test_a_rival_is_out_when_it_is_clearly_worse(times, left):
     toy = Toy({(0,): 0.3, (3,): 0.3 * times})
     assert near(toy, (0,), 0, adequate=False) == ((), (), left)
+
+
+@pytest.mark.parametrize(("times", "left"), [(1.6, ("constant_load@pivot",)), (3.5, ())])
+def test_a_rival_has_to_be_worse_from_starts_that_are_better_known_too(times, left):
+    toy = Toy({(0,): 0.3, (3,): 0.3 * times})
+    alike = toy.validated[(0,)].squares
+    toy.from_longer_leads = lambda key: alike
+    assert near(toy, (0,), 0, adequate=False) == ((), (), left)
+
+
+def test_an_effect_without_which_nothing_comes_near_is_vital():
+    toy = Toy({(0, 1): 0.2, (1,): 0.5, (0,): 0.25})
+    gain, friction = claim(0, rivals=("constant_load@pivot",)), claim(1)
+    assert vital(toy, (0, 1), gain)
+    assert not vital(toy, (0, 1), friction)
+    assert not vital(toy, (0, 1), dataclasses.replace(gain, calibration=True))
+
+
+def test_a_number_that_is_known_beforehand_costs_no_freedom():
+    rng = np.random.default_rng(0)
+    blocks, rows = 8, 20
+    by_knob, projected = rng.standard_normal((blocks, rows, 5)), rng.standard_normal((blocks, rows))
+
+    def fit(count, known):
+        knobs = [SimpleNamespace(known=k) for k in (np.inf, *known)]
+        return SimpleNamespace(
+            model=SimpleNamespace(knobs=knobs), theta=np.zeros(count), weights=np.ones(blocks),
+            by_knob=by_knob[..., :count], projected=projected, basis=np.zeros((blocks, rows, 1)),
+        )  # fmt: skip
+
+    windows = type("Few", (), {"block": np.arange(blocks), "__len__": lambda self: blocks})()
+    alone = deviations(fit(1, ()), windows)[0]
+    pinned = deviations(fit(5, [1e-6] * 4), windows)[0]
+    free = deviations(fit(5, [np.inf] * 4), windows)[0]
+    assert pinned == pytest.approx(alone, rel=1e-3)
+    assert free > 1.3 * alone
 
 
 def test_the_ratio_is_taken_at_the_joint_where_the_effect_matters():

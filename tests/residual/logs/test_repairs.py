@@ -19,6 +19,21 @@ def test_gaps_cut_a_trajectory(tmp_path):
     assert sampling.numbers["late"] == 1
 
 
+def test_frequent_short_holes_are_how_a_log_was_sampled(tmp_path):
+    columns = swing()
+    keep = np.ones(200, bool)
+    for row in range(10, 190, 12):  # every twelfth step lasts seven periods
+        keep[row : row + 6] = False
+    data = read(write(tmp_path / "log.csv", {k: v[keep] for k, v in columns.items()}))
+    assert len(data.trajectories) == 1
+    assert "gap" not in kinds(data)
+    keep[100:170] = False
+    data = read(write(tmp_path / "log.csv", {k: v[keep] for k, v in columns.items()}))
+    (gap,) = [finding for finding in data.findings if finding.kind == "gap"]
+    assert gap.numbers["gaps"] == 1
+    assert gap.severity == "warning"
+
+
 def test_repeated_times_are_dropped(csv):
     data = read(csv(lambda lines: [*lines[:10], lines[9], lines[9], *lines[10:]]))
     assert len(data.trajectories[0].times) == 200

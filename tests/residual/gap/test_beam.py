@@ -1,0 +1,32 @@
+"""What a search tries first, and what it grows."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from residual.gap.beam import _best, plainer
+from residual.gap.screening import Gain
+
+LAW, CASE, OTHER = 0, 1, 2
+
+
+@pytest.mark.parametrize(("gained", "first"), [(0.95, CASE), (0.8, LAW)])
+def test_a_special_case_that_gains_as_much_is_tried_in_place_of_its_law(gained, first):
+    around = SimpleNamespace(variants=[SimpleNamespace(candidate=n) for n in (LAW, CASE, OTHER)])
+    search = SimpleNamespace(contains=lambda one, other: (one, other) == (LAW, CASE))
+    ranked = [Gain((n,), value, (np.zeros(1),)) for n, value in ((0, 1.0), (1, gained), (2, 0.5))]
+    tried = plainer(search, around, ranked, 2)
+    assert [around.variants[gain.variants[0]].candidate for gain in tried] == (
+        [CASE] if first == CASE else [LAW, CASE]
+    )
+
+
+def test_sets_with_room_for_more_keep_their_place():
+    errors = {(0,): 0.5, (1, 2): 0.2, (2, 3): 0.3, (3,): 0.4}
+    search = SimpleNamespace(
+        sound=lambda key: True, error=errors.get, numbers=lambda key: 2 * len(key), most_numbers=4,
+        tried={key: SimpleNamespace(merit=error) for key, error in errors.items()},
+        effort=SimpleNamespace(beam=2),
+    )  # fmt: skip
+    assert _best(search, list(errors)) == [(1, 2), (3,), (0,)]
