@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.bounded import bounded_step
-from residual.gap.confirmation import CLEARLY, Claim, ratio, where_it_matters
+from residual.gap.confirmation import HOPELESS, Claim, ratio, where_it_matters
 from residual.gap.exchange import exchanged
 from residual.gap.fitting import Fit
 from residual.gap.intervals import deviations
@@ -86,12 +86,12 @@ def _beside_rivals(search: Search, key: Key, claim: Claim, claims: Sequence[Clai
 
 
 def vital(search: Search, key: Key, claim: Claim) -> bool:
-    """Whether no set without an effect does nearly as well: it or a rival of it is there."""
+    """Whether nothing comes near without an effect, so that it or a rival of it is there."""
     rest = tuple(i for i in key if i != claim.number)
     if rest not in search.validated or claim.bounded or claim.calibration:
         return False
     group = where_it_matters(search, key, claim.number)
-    return ratio(search, rest, key, group) > CLEARLY
+    return ratio(search, rest, key, group) > HOPELESS
 
 
 def _widened(

@@ -50,7 +50,7 @@ def test_a_rival_has_to_be_worse_from_starts_that_are_better_known_too(times, le
 
 
 def test_an_effect_without_which_nothing_comes_near_is_vital():
-    toy = Toy({(0, 1): 0.2, (1,): 0.5, (0,): 0.25})
+    toy = Toy({(0, 1): 0.2, (1,): 0.7, (0,): 0.5})
     gain, friction = claim(0, rivals=("constant_load@pivot",)), claim(1)
     assert vital(toy, (0, 1), gain)
     assert not vital(toy, (0, 1), friction)
