@@ -153,7 +153,9 @@ def _twins(verdict: Verdict) -> str:
 def _values(meant: Meant) -> str:
     """Numbers without an interval, named where there are several."""
     texts = {
-        field: f"{value:.3g}{unit_text(unit)}".replace("-", "\u2212")
+        field: f"{value:{'+' if field == 'change' else ''}.3g}{unit_text(unit)}".replace(
+            "-", "\u2212"
+        )
         for field, (value, unit) in meant.numbers.items()
     }
     if len(texts) == 1:

@@ -5,7 +5,17 @@ import dataclasses
 import numpy as np
 import pytest
 
-from residual.gap.result import ChannelGap, Gap, GapResult, Number, Span, Step, Verdict, Where
+from residual.gap.result import (
+    ChannelGap,
+    Gap,
+    GapResult,
+    Meant,
+    Number,
+    Span,
+    Step,
+    Verdict,
+    Where,
+)  # fmt: skip
 from sims.effects import CoulombFriction, ParameterChange
 from sims.pendulum_equation import PendulumEquation
 from studies.gap.answer import headline, notes
@@ -149,3 +159,18 @@ def test_minor_effects_are_listed_small():
 def line_of(text, kind):
     (line,) = [line for line in text.splitlines() if line.startswith(kind)]
     return line.removeprefix(kind).strip()
+
+
+def test_a_twin_is_told_with_its_size_and_what_it_does_to_the_others():
+    heavier = dataclasses.replace(
+        MASS, meant=(Meant("length", {"change": (0.0267, "m")}),)
+    )  # fmt: skip
+    said = notes(heavier, result(heavier))
+    assert "no motion can tell it from length (+0.0267 m) or gravity" in said
+    rubbing = Verdict(
+        "confirmed", "viscous_friction", "pivot",
+        {"coefficient": Number(0.016, 0.012, 0.09, "N m s/rad")}, (), "", "", Span(0.5, 0.4, 0.6),
+        beside=(Meant("length", {"coefficient": (0.0835, "N m s/rad")}),),
+    )  # fmt: skip
+    both = result(heavier, rubbing)
+    assert "0.0835 N m s/rad if length is meant, not mass" in notes(rubbing, both)
