@@ -267,4 +267,5 @@ def _joint(rate: Channel, channels: Sequence[Channel]) -> Joint:
     position = next((c for c in channels if c.name == rate.rate_of), None)
     if position is None:
         raise ValueError(f"channel {rate.name!r} needs rate_of=, the name of its position")
-    return Joint(position.name, position.name, rate.name, "N m" if position.angle else "N")
+    turns = position.angle or position.unit in ("rad", "deg", "rev")
+    return Joint(position.name, position.name, rate.name, "N m" if turns else "N")

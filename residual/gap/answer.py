@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from residual.gap.aliases import hidden
-from residual.gap.choice import helps
+from residual.gap.choice import helps, material
 from residual.gap.confirmation import Claim, claims, in_plain_form, share
 from residual.gap.exchange import add_exchanged
 from residual.gap.explain import FOOTNOTE, Explanation
@@ -18,7 +18,7 @@ from residual.gap.model import Model
 from residual.gap.numerics import other_numerics
 from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import Blind, Gap, GapResult, Rival, Verdict
-from residual.gap.search import Key
+from residual.gap.search import Key, Search
 from residual.gap.tolerance import KNOWN, allow_for_parameters
 from residual.gap.verdicts import (
     blind_verdict,
@@ -146,6 +146,8 @@ def told(
     blind: tuple[Blind, ...] = ()
     if found.adequate:
         known = {name for claim in answer.claims for name in claim.stand_ins}
+        alone = [k for k in search.validated if len(k) == 1]
+        known |= {search.labels(k)[0] for k in alone if helps_alone(search, k)}
         unseen = hidden(search.signatures(key), search.candidates, key, found.needed)
         blind = tuple(one for one in unseen if one.effect not in known)
     where = fitter.where(search.nominal, found.floor)
@@ -168,6 +170,11 @@ def told(
         adequate=found.adequate,
         seconds=seconds,
     )
+
+
+def helps_alone(search: Search, key: Key) -> bool:
+    """Whether an effect alone takes a material part of the error off: the log does show it."""
+    return search.sound(key) and material(search, (), key)
 
 
 def verdicts(

@@ -185,6 +185,10 @@ def _within_reach(
         quantity = known.get(field.name)
         if quantity is None:
             continue
+        if quantity.integer and field.metadata["dimension"] == {"turn": 1}:
+            # Of less than a whole period no law is to be seen: it could pass for any force.
+            whole = tuple(times for times in quantity.starts if times * (high - low) >= 2 * np.pi)
+            quantity = dataclasses.replace(quantity, starts=whole)
         if quantity.role == "shape" and field.metadata["dimension"] == {"position": 1}:
             quantity = dataclasses.replace(
                 quantity,
