@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.choice import AT_ONE
-from residual.gap.exchange import exchanged
+from residual.gap.exchange import exchanged, split
 from residual.gap.intervals import at_bound, bounded, deviations
 from residual.gap.numerics import at_half_step
 from residual.gap.result import Meant, Number
@@ -149,7 +149,10 @@ def near(
             same.append(label)
         elif not out:
             others.append(label)
-    return tuple(form), tuple(same), tuple(others)
+    for rival, fresh in split(search, key, number):
+        if not excluded(search, key, rival, number, adequate, alike=False):
+            others += [search.candidates[other].label for other in fresh]
+    return tuple(form), tuple(same), tuple(dict.fromkeys(others))
 
 
 def excluded(

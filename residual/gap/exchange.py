@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from residual.gap.screening import gains
+from residual.gap.screening import gains, pair_gains
 from residual.gap.search import Key, Search
 
 #: Part of the best gain by the linear screen below which no rival is worth a fit.
 HOPELESS = 0.5
 #: Spellings of one effect, as cogging has one for every order, that are tried for one place.
 SPELLINGS = 2
+#: Pairs that are tried in place of one effect with as many numbers.
+SPLITS = 2
 
 
 def add_without_each(search: Search, key: Key) -> None:
@@ -49,6 +51,18 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
             taken.append(number)
             fresh, theta = search.merged(rest, [(number, gain.values[0])])
             search.add({fresh: theta})
+        if len(search.candidates[gone].knobs) == 2:
+            _add_split(search, rest, gone)
+
+
+def _add_split(search: Search, rest: Key, gone: int) -> None:
+    """Fit sets in which two effects of one number each stand for one of two."""
+    around = search.signatures(rest)
+    larger = [n for n, one in enumerate(search.candidates) if len(one.knobs) != 1]
+    for pair in pair_gains(around, SPLITS, without=[*larger, *rest, gone]):
+        numbers = [around.variants[v].candidate for v in pair.variants]
+        fresh, theta = search.merged(rest, zip(numbers, pair.values, strict=True))
+        search.add({fresh: theta} if search.fits_in(fresh) else {})
 
 
 def spelt_out(search: Search, number: int, taken: Sequence[int]) -> bool:
@@ -70,3 +84,19 @@ def exchanged(search: Search, key: Key, number: int) -> list[tuple[int, Key]]:
             if not search.contains(other, number):
                 found.append((other, rival))
     return found
+
+
+def split(search: Search, key: Key, number: int) -> list[tuple[Key, list[int]]]:
+    """Sets with two effects in place of one that has as many numbers, and those two.
+
+    A spring with a free rest, for example, is a longer pendulum with an offset of its sensor.
+    """
+    rest = set(key) - {number}
+    return [
+        (rival, sorted(set(rival) - rest))
+        for rival in search.usable()
+        if len(rival) == len(key) + 1
+        and rest < set(rival)
+        and number not in rival
+        and search.numbers(rival) <= search.numbers(key)
+    ]
