@@ -152,7 +152,7 @@ def run(
     count = len(data.trajectories)
     tell(f"{count} {'trajectory' if count == 1 else 'trajectories'}, {rows} samples")
     for line in found_in_data([*data.findings, *(held.findings if held else ())]):
-        tell(line)
+        tell(f"data: {line}")
     for line in advice(simulator, data.trajectories):
         tell(line)
     result = find_gap(
@@ -171,7 +171,7 @@ def run(
     tell("writing the report")
     findings = [*data.findings, *(held.findings if held else ())]
     write_gap(result, output, config, findings, time.perf_counter() - begin)
-    grave = [line.removeprefix("data: ") for line in found_in_data(findings, "warning")]
+    grave = found_in_data([found for found in findings if found.severity == "warning"])
     return dataclasses.replace(result, quality=(*grave, *result.quality))
 
 

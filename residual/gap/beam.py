@@ -119,7 +119,7 @@ def grow(search: Search, key: Key) -> list[Key]:
 def sound(search: Search, key: Key, theta: Array) -> list[Key]:
     """The set, fitted if it was not, or those that stand for it; none if nothing may be right."""
     made = search.add({key: theta})
-    return [k for k in {key: 0, **dict.fromkeys(made)} if search.sound(k)]
+    return [k for k in dict.fromkeys([key, *made]) if search.sound(k)]
 
 
 def boldly(search: Search, parameters: bool) -> list[Key]:

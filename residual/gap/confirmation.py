@@ -13,7 +13,7 @@ from residual.gap.exchange import exchanged, split
 from residual.gap.intervals import at_bound, bounded, deviations
 from residual.gap.numerics import at_half_step
 from residual.gap.result import Meant, Number
-from residual.gap.search import Key, Search
+from residual.gap.search import Key, Search, all_but
 from residual.gap.significance import score
 
 Array = NDArray[np.float64]
@@ -134,7 +134,7 @@ def near(
     search: Search, key: Key, number: int, adequate: bool
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Effects that do nearly as well in place of a chosen one, see ``Claim``."""
-    rest = tuple(i for i in key if i != number)
+    rest = all_but(key, number)
     form: list[str] = []
     same: list[str] = []
     others: list[str] = []
@@ -234,7 +234,7 @@ def _ratio(search: Search, one: Array, other: Array, group: int) -> float:
 
 def where_it_matters(search: Search, key: Key, number: int) -> int:
     """The joint at which forecasts suffer most without an effect."""
-    rest = tuple(i for i in key if i != number)
+    rest = all_but(key, number)
     base = rest if rest in search.validated else ()
     before = search.currency.by_group(search.validated[base].squares)
     after = search.currency.by_group(search.validated[key].squares)
@@ -243,7 +243,7 @@ def where_it_matters(search: Search, key: Key, number: int) -> int:
 
 def needed(search: Search, key: Key, number: int, adequate: bool) -> bool:
     """Whether forecasts are clearly worse without an effect."""
-    rest = tuple(i for i in key if i != number)
+    rest = all_but(key, number)
     if rest not in search.validated:
         return False
     group = where_it_matters(search, key, number)
@@ -281,7 +281,7 @@ def brief(search: Search, number: int, values: Array) -> bool:
 
 def share(search: Search, key: Key, number: int) -> tuple[float, float, float]:
     """Part of the nominal squared error that an effect takes off, last of all in its set."""
-    rest = tuple(i for i in key if i != number)
+    rest = all_but(key, number)
     base = rest if rest in search.validated else ()
     squares = search.validated
     return search.currency.share(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from residual.gap.screening import gains, pair_gains
-from residual.gap.search import Key, Search
+from residual.gap.search import Key, Search, all_but
 
 #: Part of the best gain by the linear screen below which no rival is worth a fit.
 HOPELESS = 0.5
@@ -34,7 +34,7 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
     """
     add_without_each(search, key)
     for gone in key:
-        rest = tuple(i for i in key if i != gone)
+        rest = all_but(key, gone)
         if rest not in search.tried:
             continue
         around, family = search.signatures(rest), search.family(gone)

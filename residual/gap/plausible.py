@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from residual.gap.model import Model
 from residual.gap.samples import Samples
+from sims.effects.library import probes, shortly_after
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
-from sims.simulator import random_values
 
 Array = NDArray[np.float64]
 
@@ -64,14 +64,10 @@ def _minor(simulator: HostSimulator, parameter: str, ratio: float) -> bool:
 
     A rotor that weighs a fiftieth of the arm may well weigh twenty times as much.
     """
-    rng = np.random.default_rng(0)
-    states = simulator.smooth_states(96, rng)
-    inputs = [random_values(channel, 96, rng) for channel in simulator.action_channels]
-    commands = simulator.drive(np.reshape(inputs, (len(inputs), 96)).T, np.ones(96), 2, hold="zero")
-    durations = np.full(96, 0.1 * simulator.dt)
+    states, inputs = probes(simulator, np.random.default_rng(0))
     value = float(np.mean(simulator.parameters[parameter].value))
     hosts = [simulator.with_parameters(**{parameter: scale * value}) for scale in (1.0, 1.001)]
-    moves = [host.integrate(states, commands, durations) - states for host in hosts]
+    moves = [shortly_after(host, states, inputs) - states for host in hosts]
     whole = np.linalg.norm(moves[0], axis=0)
     part = np.linalg.norm(moves[1] - moves[0], axis=0) / 0.001
     matters = float(np.max(part[whole > 0] / whole[whole > 0], initial=0.0))

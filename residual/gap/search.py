@@ -54,6 +54,11 @@ class Effort:
     stale: float = 0.05
 
 
+def all_but(key: Key, number: int) -> Key:
+    """A set without one of its members."""
+    return tuple(i for i in key if i != number)
+
+
 class Search:
     """Rival sets of effects fitted to the windows of one fitter.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from residual.gap.exchange import add_without_each
-from residual.gap.search import Key, Search
+from residual.gap.search import Key, Search, all_but
 
 #: Forecast error with an effect over that without, below which it forecasts better.
 BETTER = 0.95
@@ -50,7 +50,7 @@ def pruned(search: Search, key: Key, needed: float) -> Key:
     """What is left of a set when all has gone that chance could do."""
     while key:
         add_without_each(search, key)
-        smaller = [tuple(i for i in key if i != gone) for gone in key]
+        smaller = [all_but(key, gone) for gone in key]
         falls = {
             k: search.tried[k].merit - search.tried[key].merit
             - np.log(size(search)) * (search.numbers(key) - search.numbers(k) - 1)

@@ -20,7 +20,7 @@ from residual.gap.fitting import Fit
 from residual.gap.intervals import deviations
 from residual.gap.model import Model
 from residual.gap.screening import trials
-from residual.gap.search import Key, Search
+from residual.gap.search import Key, Search, all_but
 from residual.gap.significance import size
 from residual.gap.validation import validate
 from residual.gap.widening import widened
@@ -74,7 +74,7 @@ def allow_for_parameters(
     told = []
     for claim in claims:
         if claim.sure:
-            without = tuple(i for i in key if i != claim.number)
+            without = all_but(key, claim.number)
             claim = dataclasses.replace(claim, calibration=as_good(claim, without))
         if claim.sure:
             rivals = [
@@ -129,7 +129,7 @@ def excluded_rivals(search: Search, key: Key, claim: Claim) -> list[tuple[int, K
     Returns:
         At most ``RIVALS`` of those that take a part of the error off: candidate and its set.
     """
-    rest = tuple(i for i in key if i != claim.number)
+    rest = all_but(key, claim.number)
     group = where_it_matters(search, key, claim.number)
     family = search.family(claim.number)
     found = []

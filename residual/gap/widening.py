@@ -15,7 +15,7 @@ from residual.gap.exchange import exchanged
 from residual.gap.fitting import Fit
 from residual.gap.intervals import deviations
 from residual.gap.result import Number
-from residual.gap.search import Key, Search
+from residual.gap.search import Key, Search, all_but
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def _beside_rivals(search: Search, key: Key, claim: Claim, claims: Sequence[Clai
 
 def vital(search: Search, key: Key, claim: Claim) -> bool:
     """Whether nothing comes near without an effect, so that it or a rival of it is there."""
-    rest = tuple(i for i in key if i != claim.number)
+    rest = all_but(key, claim.number)
     if rest not in search.validated or claim.bounded or claim.calibration:
         return False
     group = where_it_matters(search, key, claim.number)

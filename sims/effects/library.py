@@ -182,15 +182,28 @@ def near_combinations(
     return tuple(found)
 
 
+def probes(simulator: HostSimulator, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Random states (96, n_s) and inputs (96, n_a) where a small change has a small effect."""
+    states = simulator.smooth_states(96, rng)
+    inputs = np.empty((96, len(simulator.action_channels)))  # a system may have none
+    for column, channel in enumerate(simulator.action_channels):
+        inputs[:, column] = random_values(channel, 96, rng)
+    return states, inputs
+
+
+def shortly_after(simulator: HostSimulator, states: Array, inputs: Array) -> Array:
+    """States a tenth of a control period later, (n, n_s)."""
+    # The actuator path is applied to the input here, where it has no memory.
+    commands = simulator.drive(inputs, np.ones(len(inputs)), 2, hold="zero")
+    return simulator.integrate(states, commands, np.full(len(states), 0.1 * simulator.dt))
+
+
 def _linear(
     simulator: HostSimulator, rng: np.random.Generator
 ) -> tuple[dict[str, Array], dict[str, float]]:
     """Change of the motion per strength of every effect that is linear in one, of unit length."""
     plain = simulator.with_effects(())
-    states = plain.smooth_states(96, rng)
-    inputs = np.empty((96, len(plain.action_channels)))  # a system may have none
-    for column, channel in enumerate(plain.action_channels):
-        inputs[:, column] = random_values(channel, 96, rng)
+    states, inputs = probes(plain, rng)
     near: dict[str, Array] = {}
     far: dict[str, Array] = {}
     for effect in library(plain):
@@ -251,9 +264,6 @@ def _response(
     ends = []
     for value in (change, -change):
         changed = simulator.with_effects([effect.with_values(**{name: value})])
-        # The actuator path is applied to the input here, where it has no memory.
-        commands = changed.drive(inputs, np.ones(len(inputs)), 2, hold="zero")
-        durations = np.full(len(states), 0.1 * simulator.dt)
-        ends.append(changed.integrate(states, commands, durations))
+        ends.append(shortly_after(changed, states, inputs))
     scale = np.array([channel.scale for channel in simulator.physical_channels])
     return (ends[0] - ends[1]) / (scale * change)

@@ -98,19 +98,12 @@ def held_out(gap: Gap) -> list[str]:
     return lines
 
 
-def found_in_data(findings: Sequence[Finding], severity: str = "") -> list[str]:
-    """What stands out in the logs, equal findings of several files in one line.
-
-    Args:
-        findings: All of them.
-        severity: Which of them, if not all.
-    """
+def found_in_data(findings: Sequence[Finding]) -> list[str]:
+    """What stands out in the logs, equal findings of several files in one line."""
     places: dict[str, list[str]] = {}
     for found in findings:
-        if severity and found.severity != severity:
-            continue
         places.setdefault(found.says, []).append(Path(found.where).name)
     return [
-        f"data: {where[0]}{f' and {len(where) - 1} more' if len(where) > 1 else ''}: {says}"
+        f"{where[0]}{f' and {len(where) - 1} more' if len(where) > 1 else ''}: {says}"
         for says, where in places.items()
     ]
