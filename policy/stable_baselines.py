@@ -25,6 +25,11 @@ if TYPE_CHECKING:
 FORMAT = "simgap.stable_baselines.1"
 _ENTROPY = "log_ent_coef"
 
+#: Exploration noise of an algorithm whose policy has none of its own, as a share of the bounds:
+#: that of Fujimoto, van Hoof and Meger, Addressing Function Approximation Error (2018). The
+#: library's default is none at all.
+EXPLORATION = 0.1
+
 
 def off_policy_class(path: str) -> type[OffPolicyAlgorithm]:
     """An off-policy algorithm by its import path.
@@ -54,7 +59,9 @@ class StableBaselines:
 
     Args:
         kind: Its class.
-        options: Keyword arguments of it; the policy is ``"MlpPolicy"`` unless they say otherwise.
+        options: Keyword arguments of it; the policy is ``"MlpPolicy"`` unless they say otherwise,
+            and ``action_noise`` may be a number: the standard deviation of normal exploration
+            noise as a share of the actions' bounds, for DDPG and TD3 0.1 unless they say otherwise.
         env: For the spaces.
         seed: Seed of everything random; the library also sets the global generators by it.
 
@@ -69,9 +76,17 @@ class StableBaselines:
         env: gymnasium.Env[Any, Any],
         seed: int = 0,
     ) -> None:
+        from stable_baselines3 import TD3
+        from stable_baselines3.common.noise import NormalActionNoise
+
         # Copied, since the library adds to what it is given.
         given = copy.deepcopy(dict(options))
         chosen: dict[str, Any] = {"policy": "MlpPolicy", "device": "cpu"} | given
+        if issubclass(kind, TD3):  # DDPG is one, too.
+            chosen.setdefault("action_noise", EXPLORATION)
+        if isinstance(sigma := chosen.get("action_noise"), int | float):
+            zeros = np.zeros(env.action_space.shape or ())
+            chosen["action_noise"] = NormalActionNoise(zeros, zeros + sigma)
         self._seed = seed % 2**32
         self.model: Any = kind(env=env, seed=self._seed, **chosen)
         self._remembered = 0

@@ -47,6 +47,17 @@ def test_what_is_remembered_is_learnt_from_at_once():
     assert learner.updates >= 9
 
 
+@pytest.mark.parametrize(("options", "spread"), [({}, 0.1), ({"action_noise": 0.03}, 0.03)])
+def test_a_policy_without_noise_of_its_own_explores(options, spread):
+    still = SMALL | {"learning_rate": 0.0, "learning_starts": 0}
+    learner = Algorithm("stable_baselines3.TD3", options=still | options).make(Reach(), 0)
+    learner.learn(Reach(), 400)
+    memory = learner.model.replay_buffer
+    meant = learner.model.policy.scale_action(learner.act(memory.observations[:400, 0]))
+    strayed = memory.actions[:400, 0] - meant
+    assert 0.85 * spread < strayed.std() < 1.15 * spread
+
+
 def test_ours_and_theirs_remember_the_same_actions():
     agent = DDPG.for_env(Reach(), DDPGConfig(hidden=(8, 8), batch=8))
     rng = np.random.default_rng(1)
