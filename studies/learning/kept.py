@@ -21,7 +21,7 @@ from typing import Any, Protocol, TypeVar
 import filelock
 
 from simgap_files import flush_to_disk
-from studies.learning.fingerprint import code_of
+from studies.learning.sources import code_of
 
 _RECORD = "step.json"
 _log = logging.getLogger("simgap")

@@ -24,7 +24,8 @@ from residual.uncertainty_penalty import PenalisedTask
 from simgap_files import jsonable
 from sims.simulator import Simulator
 from sims.system import System
-from studies.learning.fingerprint import modules_in, settings_of
+from studies.learning.described import modules_in, settings_of
+from studies.learning.fingerprint import fingerprint
 from studies.learning.results import Measured, Model, Samples
 from studies.learning.streams import seeded, stream
 from studies.learning.training import Training, exploration, train, transitions, visited
@@ -279,13 +280,8 @@ class Steps:
     @cached_property
     def _common(self) -> dict[str, Any]:
         """What every step depends on."""
-        system = self.system
-        parts = (
-            "nominal", "true", "task", "evaluation", "state_of", "measures", "elsewhere",
-            "cold_noise_sigma", "measurement",
-        )  # fmt: skip
         return {
-            "system": {name: settings_of(getattr(system, name)) for name in parts},
+            "system": fingerprint(self.system),
             "described": dict(self.described),
             "algorithm": settings_of(self.algorithm),
             "seed": self.seed,

@@ -13,10 +13,12 @@ import torch
 
 from residual.persistence import is_ours, save
 from simgap_npz import write_npz
-from studies.learning.fingerprint import code_of
+from studies.learning.described import modules_in, settings_of
+from studies.learning.fingerprint import fingerprint
 from studies.learning.kept import OnDisk
 from studies.learning.loop import run_loop
 from studies.learning.settings import instantiate
+from studies.learning.sources import code_of
 from studies.learning.steps import Steps
 from studies.learning.study import Config, Study
 from studies.running.grids import class_label
@@ -55,6 +57,8 @@ def run_trial(
         trial.smoothing,
         study.describe(config),
     )
+    # What was there before anything ran, not what running may have changed.
+    made_by = code_of_trial(study, config)
     learnt = run_loop(steps, trial.budget, trial.corrected)
     for name, training in learnt.trainings.items():
         training.learner.save(folder / "policies" / f"{name}.safetensors")
@@ -71,17 +75,19 @@ def run_trial(
         "seed": trial.seed,
         "config": config,
         "versions": versions(),
-        "made_by": code_of_trial(study, config),
+        "made_by": made_by,
     }
 
 
 def code_of_trial(study: Study, config: Config) -> str:
-    """A hash of the code behind a trial's result: when it changes, the result is not right."""
+    """A hash of what a trial's result comes from: when it changes, the result is not right."""
     trial = instantiate(study, config)
     system = study.system_of(trial)
     corrected = [] if trial.corrected is None else [trial.corrected]
+    settings = [fingerprint(system), settings_of(trial.estimator), settings_of(corrected)]
     code = code_of(
         run_trial, study.trial, study.system, *system.code(), trial.estimator,
-        trial.algorithm.kind(), *corrected,
+        trial.algorithm.kind(), *corrected, *sorted(modules_in(settings)),
     )  # fmt: skip
-    return hashlib.sha256(json.dumps(code).encode()).hexdigest()
+    told = json.dumps([settings, code], sort_keys=True)
+    return hashlib.sha256(told.encode()).hexdigest()

@@ -134,7 +134,7 @@ def test_settings_tell_values_arrays_and_classes_of_parts():
 
     from sims.effects import ViscousFriction
     from sims.pendulum import Pendulum
-    from studies.learning.fingerprint import modules_in, settings_of
+    from studies.learning.described import modules_in, settings_of
 
     rubbing, free = Pendulum().with_effects([ViscousFriction("pivot", 1e-4)]), Pendulum()
     assert settings_of(rubbing) != settings_of(free)
