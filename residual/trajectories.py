@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,13 @@ class Transitions:
         )
 
     def save(self, path: Path) -> None:
-        """Write all columns to one ``.npz`` file, whole or not at all."""
+        """Write all columns to one ``.npz`` file, whole or not at all.
+
+        Raises:
+            ValueError: ``load`` would refuse them: values that are not finite, or shapes that do
+                not fit together.
+        """
+        refuse_arrays(str(path), vars(self))
         write_npz(path, vars(self))
 
     @classmethod
@@ -70,24 +77,38 @@ class Transitions:
         if set(arrays) != set(names):
             found = ", ".join(sorted(arrays)) or "none"
             raise FileError(f"{path} holds arrays {found:.200}, expected {', '.join(names)}")
-        for name, array in arrays.items():
-            kinds, ndim = ("iu", 1) if name == "episodes" else ("fiu", 2)
-            if array.dtype.kind not in kinds or array.ndim != ndim:
-                raise FileError(
-                    f"{path}: {name} holds {array.dtype} of shape {array.shape}, expected "
-                    f"{'integers' if ndim == 1 else 'numbers'} in {ndim} dimensions"
-                )
-        if len({len(array) for array in arrays.values()}) > 1 or (
-            arrays["states"].shape != arrays["next_states"].shape
-        ):
-            shapes = ", ".join(f"{name} {arrays[name].shape}" for name in names)
-            raise FileError(f"{path}: shapes that do not fit together: {shapes}")
-        unmeasured = np.isnan([arrays["states"], arrays["next_states"]]).all(axis=(0, 1))
-        for name, array in arrays.items():
-            seen = array[:, ~unmeasured] if name in ("states", "next_states") else array
-            if not np.isfinite(seen).all():
-                raise FileError(f"{path}: {name} holds values that are not finite")
+        refuse_arrays(str(path), arrays)
         return cls(**arrays)
+
+
+def refuse_arrays(where: str, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Refuse columns that are no transitions, see ``Transitions``.
+
+    Args:
+        where: The file, for the message.
+        arrays: Its columns by name.
+
+    Raises:
+        ValueError: The message says which column and, if it can, which row.
+    """
+    for name, array in arrays.items():
+        kinds, ndim = ("iu", 1) if name == "episodes" else ("fiu", 2)
+        if array.dtype.kind not in kinds or array.ndim != ndim:
+            raise FileError(
+                f"{where}: {name} holds {array.dtype} of shape {array.shape}, expected "
+                f"{'integers' if ndim == 1 else 'numbers'} in {ndim} dimensions"
+            )
+    if len({len(array) for array in arrays.values()}) > 1 or (
+        arrays["states"].shape != arrays["next_states"].shape
+    ):
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise FileError(f"{where}: shapes that do not fit together: {shapes}")
+    unmeasured = np.isnan([arrays["states"], arrays["next_states"]]).all(axis=(0, 1))
+    for name, array in arrays.items():
+        seen = array[:, ~unmeasured] if name in ("states", "next_states") else array
+        if not np.isfinite(seen).all():
+            row = int(np.argwhere(~np.isfinite(seen))[0][0])
+            raise FileError(f"{where}: {name} holds values that are not finite, first in row {row}")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sims.contract import acceleration_keeps, contract, declared
+from sims.contract import acceleration_keeps, contract, declared, parameters_by_row
 from sims.effects.base import Effect
 from sims.effects.library import library, typical
-from sims.equations import EquationOfMotion
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.findings import Finding, Findings, draw, example
 from sims.host import HostSimulator
 from sims.simulator import Array, Simulator
@@ -77,6 +77,8 @@ def _checks(
         yield acceleration_keeps(simulator, states, actions)
         yield _linear(simulator, states, actions)
     yield from _parameters(simulator, states, actions)
+    if isinstance(simulator, EquationOfMotion | FirstOrderSystem):
+        yield parameters_by_row(simulator, states, actions)
     if isinstance(simulator, HostSimulator):
         yield from _effects(simulator, rng)
 

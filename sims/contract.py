@@ -7,14 +7,15 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sims.equations import EquationOfMotion
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.findings import Finding, draw, example
 from sims.simulator import Array, Channel, Simulator
+from sims.unsound import Unsound
 
 #: What makes every number of a simulator worthless.
 _GRAVE = (
     "period", "channels", "parameters", "shape", "arguments", "repeatable", "pure", "rows",
-    "arguments of acceleration",
+    "arguments of acceleration", "parameters by row",
 )  # fmt: skip
 _ROUNDING = 1e-6
 
@@ -30,16 +31,12 @@ def refuse_unsound(simulator: Simulator) -> None:
     try:
         for finding in _sound(simulator):
             if not finding.ok and finding.check in _GRAVE:
-                raise Unsound(f"{name}: {finding.check}: {finding.says:.300}")
+                raise Unsound(f"{name}: {finding.check}: {finding.says:.400}")
     except Unsound:
         raise
     except Exception as error:
         raise Unsound(f"{name} raised {type(error).__name__}: {error}; try "
                       "sims.check_simulator") from error  # fmt: skip
-
-
-class Unsound(ValueError):
-    """A simulator that breaks its contract."""
 
 
 def _sound(simulator: Simulator) -> Iterator[Finding]:
@@ -59,6 +56,37 @@ def _sound(simulator: Simulator) -> Iterator[Finding]:
     yield Finding("rows", same, "a row's result depends on the rows beside it")
     if isinstance(simulator, EquationOfMotion):
         yield acceleration_keeps(simulator, states, actions)
+    if isinstance(simulator, EquationOfMotion | FirstOrderSystem):
+        yield parameters_by_row(simulator, states, actions)
+
+
+def parameters_by_row(
+    simulator: EquationOfMotion | FirstOrderSystem, states: Array, actions: Array
+) -> Finding:
+    """Is a parameter that is one number for each row taken as the number that it was?
+
+    Whoever fits parameters steps many values at once.
+    """
+    author = "acceleration" if isinstance(simulator, EquationOfMotion) else "derivative"
+    remedy = (
+        f"compute in {author} with columns such as {'q' if author[0] == 'a' else 'x'}[:, 0], and "
+        "stack the results: np.stack([...], axis=1)"
+    )
+    whole = simulator.step(states, actions)
+    for name, parameter in simulator.parameters.items():
+        if np.ndim(parameter.value):
+            continue
+        says = f"{name} as one number for each row, shape (n,), "
+        try:
+            by_row = simulator.with_parameters(**{name: np.full(len(states), parameter.value)})
+            found = by_row.step(states, actions)
+        except Exception as error:
+            told = "" if "stack" in str(error) else f"; {remedy}"
+            says += f"raises {type(error).__name__}: {error}{told}"
+            return Finding("parameters by row", False, says)
+        if not np.allclose(found, whole, rtol=_ROUNDING, atol=0, equal_nan=True):
+            return Finding("parameters by row", False, f"{says}gives other numbers; {remedy}")
+    return Finding("parameters by row", True, "one number for each row acts like the same scalar")
 
 
 def acceleration_keeps(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:

@@ -11,6 +11,7 @@ import numpy as np
 from sims.render import Renderer, renderer_for
 from sims.simulator import Array, Channel, Simulator
 from sims.tasks import Task
+from sims.unsound import refuse_not_finite
 
 # A state can leave any bound that is written down for it, and Gymnasium insists on a box.
 _UNBOUNDED = np.inf
@@ -85,7 +86,11 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._observe(), {"state": self._state.copy()}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Hold ``action`` for one control period; a time-out is ``truncated``."""
+        """Hold ``action`` for one control period; a time-out is ``truncated``.
+
+        Raises:
+            Unsound: The state reached, or its reward, is not finite.
+        """
         states = self._state[None]
         actions = np.clip(np.asarray(action, float)[None], *self._bounds)
         next_states = self.simulator.step(states, actions)
@@ -94,6 +99,8 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._state = next_states[0]
         self._steps += 1
         truncated = self._steps >= self.task.horizon
+        channels, name = self.simulator.state_channels, self.simulator.name
+        refuse_not_finite(name, channels, self._state, self._steps, reward)
         return self._observe(), reward, terminated, truncated, {"state": self._state.copy()}
 
     def render(self) -> np.ndarray | None:

@@ -12,16 +12,21 @@ from numpy.typing import ArrayLike
 from sims.environment import observe
 from sims.simulator import Array, Simulator, wrap
 from sims.tasks import Task
+from sims.unsound import Unsound, refuse_not_finite
 
 #: Reads the state, shape (n_s,), from the environment and its last observation.
 StateOf = Callable[[Any, Any], ArrayLike]
+
+# Start states of a task that tell where they usually are.
+_STARTS = 20
 
 
 class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """Another library's environment under our task, seen as the nominal simulator is seen.
 
     Rewards are the task's, of the states reached; an episode ends where the task or the
-    environment ends it. Angles are continued over whole turns.
+    environment ends it. Angles begin within half a turn of the middle of the task's own start
+    states, and are continued over whole turns.
 
     Args:
         env: Reports its state in ``info["state"]``, or ``state_of`` reads it.
@@ -30,7 +35,8 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         state_of: Reads the state from the environment and its observation.
 
     Raises:
-        ValueError: The actions or the control period are not those of ``nominal``.
+        Unsound: The actions or the control period are not those of ``nominal``; later, the state
+            does not fit its channels, or is not finite.
     """
 
     def __init__(
@@ -57,17 +63,20 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             names = ", ".join(
                 f"{c.name} from {c.low:g} to {c.high:g} {c.unit}" for c in nominal.action_channels
             )
-            raise ValueError(
+            raise Unsound(
                 f"the true environment's actions are {box}, those of {nominal.name} {names}: wrap "
                 "the environment (gymnasium.wrappers.RescaleAction) or change the channels"
             )
         period = getattr(env.unwrapped, "dt", None)
-        if isinstance(period, float) and not np.isclose(period, nominal.dt):
-            raise ValueError(
+        number = isinstance(period, int | float | np.number) and not isinstance(period, bool)
+        if number and not np.isclose(period, nominal.dt):  # type: ignore[arg-type]
+            raise Unsound(
                 f"the true environment's control period is {period:g} s, that of {nominal.name} "
                 f"{nominal.dt:g} s: make them one"
             )
+        self._name = f"the true environment {type(env.unwrapped).__name__}"
         self._angles = np.array([channel.angle for channel in nominal.state_channels])
+        self._usual_start = _middle(task, len(self._angles)) if self._angles.any() else 0.0
         self._state: Array = np.zeros(0)
         self._steps = 0
 
@@ -77,8 +86,10 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """Begin an episode where the environment begins it."""
         super().reset(seed=seed)
         observation, info = self.env.reset(seed=seed, options=options)
-        self._state = self._read(observation, info)
         self._steps = 0
+        start = self._read(observation, info)
+        turned = self._usual_start + wrap(start - self._usual_start)
+        self._state = np.where(self._angles, turned, start)
         return observe(self.nominal, self._state[None])[0], {"state": self._state.copy()}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
@@ -88,14 +99,15 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         held = np.clip(np.asarray(action, float), box.low, box.high)
         dtype = self.env.action_space.dtype
         observation, _, ended, cut, info = self.env.step(held.astype(dtype))
+        self._steps += 1
         reached = self._read(observation, info)
         turned = wrap(reached - self._state)
         reached = np.where(self._angles, self._state + turned, reached)
         before, after = self._state[None], reached[None]
         reward = float(self.task.reward(before, held[None], after)[0])
         terminated = bool(ended or self.task.terminal(after)[0])
+        refuse_not_finite(self._name, self.nominal.state_channels, reached, self._steps, reward)
         self._state = reached
-        self._steps += 1
         truncated = bool(cut or self._steps >= self.task.horizon)
         seen = observe(self.nominal, after)[0]
         return seen, reward, terminated, truncated, {"state": reached.copy()}
@@ -114,15 +126,22 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         elif "state" in info:
             state = np.asarray(info["state"], float)
         else:
-            raise ValueError(
+            raise Unsound(
                 "the true environment does not report its state: put it into info['state'], or "
                 "give the System a function state_of(env, observation)"
             )
         channels = self.nominal.state_channels
         if state.shape != (len(channels),):
             names = ", ".join(channel.name for channel in channels)
-            raise ValueError(
+            raise Unsound(
                 f"the true environment's state has shape {state.shape}, expected "
                 f"({len(channels)},): {names}"
             )
+        refuse_not_finite(self._name, channels, state, self._steps)
         return state
+
+
+def _middle(task: Task, width: int) -> Array:
+    """The middle of where a task's episodes start, shape (n_s,)."""
+    starts = [task.start(np.random.default_rng(seed))[:width] for seed in range(_STARTS)]
+    return 0.5 * (np.min(starts, axis=0) + np.max(starts, axis=0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -14,7 +15,9 @@ from sims.environment import SimulatorEnv
 from sims.measured import MeasuredEnv, Measurement
 from sims.sampled import SampledEnv, StateOf
 from sims.simulator import Array, Channel, Simulator
+from sims.task_contract import refuse_unsound_task
 from sims.tasks import Task
+from sims.unsound import Unsound
 
 # Up to so many state channels are reported one by one, more by their kind.
 _FEW = 6
@@ -116,6 +119,11 @@ class System:
                 f"system {self.name}: nominal is a {type(self.nominal).__name__}, expected a "
                 "Simulator: subclass sims.EquationOfMotion or sims.Simulator"
             )
+        if not isinstance(self.task, Task):
+            raise ValueError(
+                f"system {self.name}: task is a {type(self.task).__name__}, expected a Task: "
+                "derive its class from sims.Task"
+            )
         if isinstance(self.true, Simulator):
             check_same_channels(self.nominal, self.true, f"system {self.name}: the true system")
         names = [channel.name for channel in self.nominal.state_channels]
@@ -150,7 +158,7 @@ class System:
             true = true()
         if isinstance(true, Simulator):
             check_same_channels(self.nominal, true, f"system {self.name}: the true system")
-            env: gymnasium.Env[Any, Any] = SimulatorEnv(true, self.task)
+            env: gymnasium.Env[Any, Any] = SimulatorEnv(_seen_as(self.nominal, true), self.task)
         else:
             env = SampledEnv(true, self.nominal, self.task, self.state_of)
         if not self.measurement:
@@ -174,13 +182,24 @@ class System:
         return dataclasses.replace(self, nominal=simulator)
 
     def check(self) -> None:
-        """Begin an episode on the simulator and on the true system, and reward one step.
+        """Try all parts: rows of simulator and task, and one step of an episode on each system.
 
         Raises:
             ValueError: The task, the simulator and the true system do not fit together, or the
-                simulator is unsound (``sims.contract``).
+                simulator or the task is unsound (``sims.contract``, ``sims.task_contract``).
         """
         refuse_unsound(self.nominal)
+        for channel in self.nominal.action_channels:
+            if not np.isfinite([channel.low, channel.high]).all():
+                raise Unsound(
+                    f"system {self.name}: action channel {channel.name!r} is bounded by "
+                    f"{channel.low:g} and {channel.high:g}, but policies act between bounds: give "
+                    "its Channel a finite low= and high="
+                )
+        try:
+            refuse_unsound_task(self.task, self.nominal)
+        except Unsound as error:
+            raise Unsound(f"system {self.name}: {error}") from error.__cause__ or error
         try:
             for env in (self.environment(self.nominal), self.true_environment()):
                 env.reset(seed=0)
@@ -230,10 +249,28 @@ def physical(channels: tuple[Channel, ...]) -> tuple[Channel, ...]:
     return tuple(channel for channel in channels if channel.kind != "memory")
 
 
+def _seen_as(nominal: Simulator, true: Simulator) -> Simulator:
+    """A true simulator that policies see in the scales of the one that they learnt on."""
+    known = {channel.name: channel for channel in nominal.state_channels}
+    channels = tuple(
+        dataclasses.replace(c, scale=known[c.name].scale, invariant=known[c.name].invariant)
+        if c.name in known
+        else c
+        for c in true.state_channels
+    )
+    if channels == true.state_channels:
+        return true
+    seen = copy.copy(true)
+    seen.state_channels = channels
+    return seen
+
+
 def check_same_channels(
     nominal: Simulator, other: Simulator, what: str, memory: bool = False
 ) -> None:
     """Raise ``ValueError`` unless both have one period and the same channels.
+
+    The same: names in order, units, which are angles, and bounds of actions.
 
     Args:
         nominal, other: The two.
@@ -242,14 +279,23 @@ def check_same_channels(
     """
     for kind in ("state_channels", "action_channels"):
         own, others = (
-            [c.name for c in getattr(one, kind) if memory or c.kind != "memory"]
+            [c for c in getattr(one, kind) if memory or c.kind != "memory"]
             for one in (nominal, other)
         )
-        if own != others:
+        if [c.name for c in own] != [c.name for c in others]:
             raise ValueError(
-                f"{what} has {kind.replace('_', ' ')} {', '.join(others)}, expected "
-                f"{', '.join(own)} as {nominal.name}"
+                f"{what} has {kind.replace('_', ' ')} {', '.join(c.name for c in others)}, "
+                f"expected {', '.join(c.name for c in own)} as {nominal.name}"
             )
+        fields = ("unit", "angle") if kind == "state_channels" else ("unit", "low", "high")
+        for expected, found in zip(own, others, strict=True):
+            for field in fields:
+                wanted, given = getattr(expected, field), getattr(found, field)
+                if wanted != given:
+                    raise ValueError(
+                        f"{what} has channel {found.name!r} with {field}={given!r}, expected "
+                        f"{wanted!r} as {nominal.name}"
+                    )
     if not np.isclose(nominal.dt, other.dt):
         raise ValueError(
             f"{what} has a control period of {other.dt:g} s, expected {nominal.dt:g} s as "

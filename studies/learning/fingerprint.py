@@ -14,7 +14,7 @@ import numpy as np
 
 from sims.findings import draw
 from sims.simulator import Simulator
-from sims.system import System, physical
+from sims.system import System
 from sims.tasks import Task
 from studies.learning.described import Attribute, attributes_of, layers_of, named, settings_of
 
@@ -57,7 +57,7 @@ def behaviour(simulator: Simulator, task: Task) -> dict[str, Any]:
     """
     channels = simulator.state_channels
     states, actions = draw(simulator, _ROWS, np.random.default_rng(0))
-    columns = [channels.index(channel) for channel in physical(channels)]
+    columns = [i for i, channel in enumerate(channels) if channel.kind != "memory"]
     with np.errstate(all="ignore"):
         reached = simulator.step(states, actions)
         before, after = states[:, columns], reached[:, columns]

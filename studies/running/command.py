@@ -26,6 +26,7 @@ import simgap_yaml
 from sims.loading import not_found
 from sims.model_files import located, model_settings, names_model
 from sims.trust import check_file, named_packages, trusting
+from sims.unsound import Unsound
 
 _DEBUG, _DEBUG_VARIABLE, _TRUST = "--debug", "SIMGAP_DEBUG", "--trust"
 _SIMULATORS = ("--simulator", "--corrected")
@@ -227,7 +228,7 @@ def guarded(
                 if debug and isinstance(ended.__context__, Exception):
                     traceback.print_exception(ended.__context__)
                 raise
-            except OSError as error:
+            except (OSError, Unsound) as error:
                 if debug:
                     traceback.print_exc()
                 fail(str(error))
@@ -249,6 +250,8 @@ def users_code(error: BaseException) -> str:
 
     Libraries in between, which only pass on what they were given, do not count.
     """
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{error.filename}, line {error.lineno},"
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         path = Path(frame.filename)
         if not path.is_file() or any(path.is_relative_to(place) for place in _LIBRARIES):

@@ -156,3 +156,124 @@ def test_public_names_are_those_that_are_said():
         assert getattr(sims, name).__name__ == name
     with pytest.raises(AttributeError, match="no attribute 'Nothing'"):
         sims.Nothing  # noqa: B018
+
+
+class Up(SwingUp):
+    """A task whose parts a test replaces."""
+
+    def __init__(self, **parts):
+        super().__init__()
+        for name, part in parts.items():
+            object.__setattr__(self, name, part)
+
+
+def test_a_task_is_a_task_and_actions_have_bounds():
+    class Duck:
+        horizon = 5
+
+    with pytest.raises(ValueError, match=r"task is a Duck, expected a Task.*sims.Task"):
+        System("mine", Pendulum(), Pendulum.true(), Duck())
+    free = Pendulum()
+    free.action_channels = (Channel("voltage", "V", "input"),)
+    with pytest.raises(ValueError, match=r"'voltage' is bounded by -inf and inf.*low= and high="):
+        System("mine", free, Foreign, SwingUp()).check()
+
+
+@pytest.mark.parametrize(
+    ("channel", "says"),
+    [
+        (
+            Channel("angle", "deg", "position", angle=True),
+            "'angle' with unit='deg', expected 'rad'",
+        ),
+        (Channel("angle", "rad", "position"), "'angle' with angle=False, expected True"),
+    ],
+)
+def test_a_true_simulator_in_other_units_is_refused(channel, says):
+    true = Pendulum.true()
+    true.state_channels = (channel, *true.state_channels[1:])
+    with pytest.raises(ValueError, match=says):
+        System("mine", Pendulum(), true, SwingUp())
+    true = Pendulum.true()
+    true.action_channels = (Channel("voltage", "V", "input", low=-6.0, high=6.0),)
+    with pytest.raises(ValueError, match=r"'voltage' with low=-6.0, expected -3.0 as pendulum"):
+        System("mine", Pendulum(), true, SwingUp())
+
+
+def test_policies_see_a_true_simulator_in_the_scales_that_they_learnt_on():
+    true = Pendulum.true()
+    angle, rate = true.state_channels
+    true.state_channels = (angle, Channel("rate", "rad/s", "rate", rate_of="angle", scale=40.0))
+    assert rate.scale == 10.0
+    env = System("mine", Pendulum(), true, SwingUp()).true_environment()
+    seen, info = env.reset(options={"state": [1.0, 5.0]})
+    assert seen[2] == 0.5 and info["state"][1] == 5.0
+    assert true.state_channels[1].scale == 40.0
+
+
+@pytest.mark.parametrize("period", [1, np.float32(0.1), np.float64(0.1)])
+def test_a_period_of_any_kind_of_number_is_compared(period):
+    with pytest.raises(ValueError, match="control period is"):
+        SampledEnv(Foreign(dt=period), Pendulum(), SwingUp())
+    SampledEnv(Foreign(dt=np.float32(0.05)), Pendulum(), SwingUp())
+
+
+class Dropping(Foreign):
+    """Its third reading is lost."""
+
+    def _seen(self):
+        cut, info = super()._seen()
+        if self.steps == 2:
+            info["state"] = np.array([cut[0], np.nan])
+        return cut, info
+
+
+def test_a_reading_that_is_no_number_names_channel_and_step():
+    env = System("mine", Pendulum(), Dropping, SwingUp()).true_environment()
+    env.reset(seed=0)
+    env.step(np.zeros(1))
+    with pytest.raises(ValueError, match="Dropping gave rate = nan rad/s after step 2"):
+        env.step(np.zeros(1))
+
+
+def test_a_reward_or_a_simulator_that_leaves_the_numbers_is_named():
+    task = Up(reward=lambda s, a, n: np.where(np.arange(len(n)) >= 0, np.log(-np.abs(n[:, 0])), 0))
+    for env in (
+        System("mine", Pendulum(), Foreign, task).true_environment(),
+        System("mine", Pendulum(), Foreign, task).environment(Pendulum()),
+    ):
+        env.reset(seed=0)
+        with (
+            np.errstate(all="ignore"),
+            pytest.raises(ValueError, match=r"the reward nan after step 1.*reached was angle"),
+        ):
+            env.step(np.ones(1))
+
+
+@pytest.mark.parametrize(("start", "expected"), [(-3.0, 2 * np.pi - 3), (9.0, 9 - 2 * np.pi)])
+def test_angles_begin_where_the_tasks_own_starts_are(start, expected):
+    class Turned(Foreign):
+        def reset(self, seed=None, options=None):
+            super().reset(seed=seed)
+            self.state = np.array([start, 0.0])
+            return self.state, {"state": self.state}
+
+    env = System("mine", Pendulum(), Turned, SwingUp()).true_environment()
+    assert env.reset(seed=0)[1]["state"][0] == pytest.approx(expected)
+
+
+def test_a_parameter_for_each_row_is_tried_and_the_remedy_named():
+    class Careless(PendulumEquation):
+        def acceleration(self, q, v, u, force, p):
+            return (force + u - 0.1 * v) / p.mass
+
+    with pytest.raises(ValueError, match=r"mass as one number for each row.*columns.*q\[:, 0\]"):
+        System("mine", Careless(), PendulumEquation(), SwingUp()).check()
+
+    class Averaged(PendulumEquation):
+        def acceleration(self, q, v, u, force, p):
+            mass = p.mass if np.ndim(p.mass) == 0 else p.mass.mean() + 1
+            return (force + u - 0.1 * v) / mass
+
+    with pytest.raises(ValueError, match=r"gives other numbers.*np.stack"):
+        System("mine", Averaged(), PendulumEquation(), SwingUp()).check()

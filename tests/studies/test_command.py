@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from studies import learn
 from studies.learning.settings import build_parser
 from studies.pendulum_gap import STUDY
 from studies.running import command
@@ -219,3 +220,48 @@ def test_what_is_not_there_is_named(name, arguments, says, capsys, tmp_path, mon
     assert said.startswith("error: ") and said.count("\n") == 1
     assert says in said
     assert not Path("out").exists()
+
+
+def test_a_system_file_that_is_no_python_is_the_users(tmp_path, monkeypatch, capsys):
+    (tmp_path / "unclosed.py").write_text("from sims import System\n\nSYSTEM = System('x',\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SystemExit, match="2"):
+        learn.main(["--system", "unclosed.SYSTEM", "--output", str(tmp_path / "out")])
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and f"{tmp_path / 'unclosed.py'}, line 3" in said
+    assert "never closed" in said and not (tmp_path / "out").exists()
+
+
+def test_a_sensor_that_drops_out_ends_the_run_and_leaves_no_step(tmp_path, monkeypatch, capsys):
+    (tmp_path / "flaky.py").write_text(
+        "import os\n"
+        "import numpy as np\n"
+        "from sims import EvaluationProtocol, Pendulum, SwingUp, System\n"
+        "from sims.environment import SimulatorEnv\n\n\n"
+        "class Robot(SimulatorEnv):\n"
+        "    def step(self, action):\n"
+        "        told = super().step(action)\n"
+        "        if os.path.exists('FLAKY') and self._steps == 30:\n"
+        "            told[-1]['state'][1] = np.nan\n"
+        "        return told\n\n\n"
+        "def true():\n"
+        "    return Robot(Pendulum.true(), SwingUp(60))\n\n\n"
+        "TESTS = EvaluationProtocol(every=200)\n"
+        "SYSTEM = System('flaky', Pendulum(), true, SwingUp(60), TESTS)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    Path("FLAKY").touch()
+    command = [
+        "--system", "flaky.SYSTEM", "--output", "out", "--estimator", "residual.Linear",
+        "--budget.true_samples", "60", "--budget.iterations", "1",
+        "--budget.idealised_steps", "200", "--budget.difference_steps", "200",
+        "--ddpg.hidden", "[8, 8]", "--ddpg.warm_up", "100",
+    ]  # fmt: skip
+    with pytest.raises(SystemExit, match="2"):
+        learn.main(command)
+    assert "gave rate = nan rad/s after step" in capsys.readouterr().err
+    assert not list(Path("out/stages").glob("collect-*"))
+    Path("FLAKY").unlink()
+    learn.main(command)
+    assert "report:" in capsys.readouterr().out

@@ -35,7 +35,7 @@ class Valley(EquationOfMotion):
     action_channels = (Channel("engine", "1", "input", low=-1.0, high=1.0),)
     parameters = {"power": Parameter(0.002, "1", "engine")}
     def acceleration(self, q, v, u, force, p):
-        return 100 * (p.power * u + force - 0.0025 * np.cos(3 * q))
+        return 100 * (p.power * u[:, 0] + force[:, 0] - 0.0025 * np.cos(3 * q[:, 0]))[:, None]
 
 W = 1.0
 FAR, NAMES = {"a", "b", "c"}, frozenset({"x", "y", "z"})

@@ -1,0 +1,109 @@
+"""What every task promises of its rows, and the refusal of one that breaks it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from sims.findings import draw
+from sims.simulator import Array, Simulator
+from sims.tasks import Task
+from sims.unsound import Unsound
+
+_ROWS, _STARTS = 8, 20
+_ROUNDING = 1e-6
+
+
+def refuse_unsound_task(task: Task, simulator: Simulator) -> None:
+    """Refuse a task with which nothing could be learnt, before anything is computed.
+
+    Args:
+        task: Looked at on a few drawn rows, and on what one step makes of start states.
+        simulator: Its channels name the columns; memory channels are not shown to tasks.
+
+    Raises:
+        Unsound: Its horizon is no count of steps, a start state does not fit the channels, rewards
+            or terminations are not one for each row, depend on other rows or are not finite.
+    """
+    name = type(task).__name__
+    names = [channel.name for channel in simulator.state_channels if channel.kind != "memory"]
+    fits = f"{name} does not fit {simulator.name} ({', '.join(names)})"
+    horizon = task.horizon
+    whole = isinstance(horizon, int | np.integer) and not isinstance(horizon, bool)
+    if not whole or horizon < 1:
+        raise Unsound(f"{name}.horizon is {horizon!r}, expected a whole number of steps from 1")
+    starts = [_start(task, k, names, simulator, fits) for k in range(_STARTS)]
+    rng = np.random.default_rng(0)
+    states, actions = draw(simulator, _ROWS, rng)
+    held = draw(simulator, _STARTS, rng)[1]
+    with np.errstate(all="ignore"):
+        drawn = _transitions(simulator, states, actions, len(names))
+        begun = _transitions(simulator, simulator.augment(np.array(starts)), held, len(names))
+        rewards = _by_row(task.reward, f"{name}.reward", drawn, fits)
+        ends = _by_row(lambda s, a, n: task.terminal(n), f"{name}.terminal", drawn, fits)
+        first = _asked(task.reward, f"{name}.reward", begun, fits)
+    if rewards.dtype.kind not in "biuf":
+        raise Unsound(f"{name}.reward returned {rewards.dtype}, expected real numbers")
+    if ends.dtype.kind not in "biuf":
+        raise Unsound(f"{name}.terminal returned {ends.dtype}, expected true or false by row")
+    bad = np.flatnonzero(~np.isfinite(first) & np.isfinite(begun[2]).all(axis=1))
+    if bad.size:
+        reached = ", ".join(f"{c} {v:.4g}" for c, v in zip(names, begun[2][bad[0]], strict=True))
+        raise Unsound(
+            f"{name}.reward is {first[bad[0]]:g} one step after a start state, expected a finite "
+            f"number; reached was {reached}"
+        )
+
+
+def _start(task: Task, seed: int, names: list[str], simulator: Simulator, fits: str) -> Array:
+    """One start state, as long as the channels say."""
+    what = f"{type(task).__name__}.start"
+    given = _asked(lambda: task.start(np.random.default_rng(seed)), what, (), fits)
+    if given.shape not in ((len(names),), (len(simulator.state_channels),)):
+        raise Unsound(
+            f"{what} returned shape {given.shape}, expected ({len(names)},): one number for each "
+            f"of {', '.join(names)}"
+        )
+    if given.dtype.kind not in "iuf" or not np.isfinite(given).all():
+        raise Unsound(f"{what} returned {given.tolist()}, expected finite numbers")
+    return np.asarray(given[: len(names)], float)
+
+
+def _transitions(simulator: Simulator, states: Array, actions: Array, width: int) -> Any:
+    reached = simulator.step(states, actions)
+    return states[:, :width], actions, np.asarray(reached)[:, :width]
+
+
+def _by_row(ask: Callable[..., Any], what: str, rows: tuple[Array, ...], fits: str) -> np.ndarray:
+    """What a task says of rows, once it says the same of each alone."""
+    said = _asked(ask, what, rows, fits)
+    count = len(rows[0])
+    columns = "compute with columns such as next_states[:, 0], which have one entry for each row"
+    if said.shape != (count,):
+        raise Unsound(f"{what} returned shape {said.shape} for {count} rows, expected ({count},): "
+                      f"{columns}")  # fmt: skip
+    for i in range(count):
+        alone = _asked(ask, what, tuple(array[i : i + 1] for array in rows), fits)
+        same = alone.shape == (1,) and (
+            np.allclose(alone, said[i], rtol=_ROUNDING, atol=_ROUNDING, equal_nan=True)
+        )
+        if not same:
+            raise Unsound(
+                f"{what} gives {alone.tolist()} for a row alone and {said[i]} for the same row "
+                f"among {count}, expected the same number, and no random ones: {columns}"
+            )
+    return said
+
+
+def _asked(ask: Callable[..., Any], what: str, rows: tuple[Array, ...], fits: str) -> np.ndarray:
+    """The answer as an array; rows are copies, and have to be left as they were."""
+    given = [array.copy() for array in rows]
+    try:
+        said = np.asarray(ask(*given))
+    except Exception as error:
+        raise Unsound(f"{fits}: {what} raised {type(error).__name__}: {error}") from error
+    if not all(np.array_equal(a, b, equal_nan=True) for a, b in zip(given, rows, strict=True)):
+        raise Unsound(f"{what} overwrites its arguments: copy them first")
+    return said

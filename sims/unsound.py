@@ -1,0 +1,43 @@
+"""The refusal of what breaks its promises: one line that says what and where."""
+
+from __future__ import annotations
+
+import math
+
+from sims.simulator import Array, Channel
+
+
+class Unsound(ValueError):
+    """A simulator, an environment or a task that breaks its contract; the user can mend it."""
+
+
+def refuse_not_finite(
+    what: str, channels: tuple[Channel, ...], state: Array, step: int, reward: float = 0.0
+) -> None:
+    """Refuse numbers of a running system that are not finite: nothing could be learnt from them.
+
+    Args:
+        what: Whose numbers, in words.
+        channels: One per entry of the state.
+        state: The state reached, shape (n_s,).
+        step: Control periods since the reset, 0 for the start state.
+        reward: Of that step.
+
+    Raises:
+        Unsound: The message names the channel, or the reward, and the step.
+    """
+    if math.isfinite(reward) and math.isfinite(float(state.sum())):
+        return
+    where = f"after step {step}" if step else "at reset"
+    for channel, value in zip(channels, state, strict=True):
+        if not math.isfinite(value):
+            raise Unsound(
+                f"{what} gave {channel.name} = {value:g} {channel.unit} {where}, expected a finite "
+                "number: mend the sensor or the model, or end the episode before that"
+            )
+    if not math.isfinite(reward):
+        reached = ", ".join(f"{c.name} {v:.4g}" for c, v in zip(channels, state, strict=True))
+        raise Unsound(
+            f"{what}: the task gave the reward {reward:g} {where}, expected a finite number; "
+            f"reached was {reached}"
+        )
