@@ -22,7 +22,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
-from sklearn.base import BaseEstimator
 
 from studies.learning.compiled import code_hash, file_content, hash_of, named_in
 from studies.learning.sources import is_ours, is_users
@@ -146,7 +145,7 @@ class _Walk:
     def _object(self, value: Any, around: tuple[Any, ...]) -> Any:
         kind, inside = type(value), (*around, value)
         told = {"class": named(kind), **self._class(kind, inside)}
-        if isinstance(value, BaseEstimator):
+        if callable(getattr(value, "get_params", None)):  # an estimator
             fitted = {k: v for k, v in attributes_of(value).items() if k.endswith("_")}
             return told | self.value({**value.get_params(deep=False), **fitted}, inside)
         if dataclasses.is_dataclass(value):

@@ -16,8 +16,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
+import numpy as np
 from sklearn.base import BaseEstimator
 
 from policy.config import DDPGConfig
@@ -125,8 +126,15 @@ def learn_by_difference(
         Policies, difference models and their accuracy, with ``report`` and ``plot``.
 
     Raises:
+        TypeError: An argument is no such object as it says.
         ValueError: The parts do not fit together, or a budget is too small to learn anything.
     """
+    _expect("estimator", estimator, Regressor, "residual.Linear()")
+    _expect("evaluation", evaluation, EvaluationProtocol, "EvaluationProtocol(every=1000)")
+    _expect("ddpg", ddpg, DDPGConfig, "DDPGConfig(hidden=(64, 64))")
+    _expect("budget", budget, Budget, "Budget(450, 2, 20_000, 20_000)")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise TypeError(f"seed is {seed!r}, expected a whole number from 0, such as seed=0")
     from residual.gaussian_process import GaussianProcess
 
     path = learner if isinstance(learner, str) else f"{learner.__module__}.{learner.__qualname__}"
@@ -141,10 +149,28 @@ def learn_by_difference(
         system,
         estimator or GaussianProcess(),
         algorithm,
-        seed,
+        int(seed),
         OnDisk(keep) if keep else None,
         progress or Bars(),
         replay,
         uncertainty_penalty,
     )
     return run_loop(do, budget)
+
+
+@runtime_checkable
+class Regressor(Protocol):
+    """What every scikit-learn regressor has, whatever it derives from."""
+
+    fit: Any
+    predict: Any
+    get_params: Any
+
+
+def _expect(name: str, given: Any, kind: type, such_as: str) -> None:
+    """Refuse an argument that is neither left out nor an object of a class."""
+    if given is None or (isinstance(given, kind) and not isinstance(given, type)):
+        return
+    # Texts are import paths on the command line, and mappings settings.
+    what = f"the class {given.__name__}" if isinstance(given, type) else f"{given!r:.60}"
+    raise TypeError(f"{name} is {what}, expected an object such as {name}={such_as}")

@@ -52,7 +52,15 @@ class Learnt:
 
     @property
     def model(self) -> DifferenceModel:
-        """The last difference model."""
+        """The last difference model.
+
+        Raises:
+            ValueError: There was no update.
+        """
+        if not self.models:
+            raise ValueError(
+                "no update was made, so there is no difference model: learn with updates=1 or more"
+            )
         return self.models[-1]
 
     def add_policy(self, name: str, training: Training, **more: int) -> None:

@@ -87,5 +87,6 @@ def trial_label(config: Config) -> str:
     """A readable name for a trial's folder."""
     estimator = config["estimator"]["class_path"].rsplit(".", 1)[-1]
     name = f"{estimator}-{config['budget']['true_samples']}-seed{config['seed']}"
-    system = str(config.get("system", "")).rsplit(".", 2)
-    return f"{system[0]}-{name}" if len(system) > 1 else name
+    # One file may hold several systems: arm.SYSTEM and arm.LAGGED.
+    system = ".".join(str(config.get("system") or "").split(".")[-2:])
+    return f"{system}-{name}" if system else name

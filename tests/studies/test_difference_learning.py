@@ -16,6 +16,8 @@ from studies.learning import streams, training
 from studies.learning.budget import Budget
 from studies.learning.kept import OnDisk
 from studies.learning.loop import learn_by_difference, run_loop
+from studies.learning.outcome import Learnt
+from studies.learning.settings import trial_label
 from studies.learning.steps import Steps
 from studies.running.progress import Silent
 
@@ -147,6 +149,42 @@ def test_the_python_call_is_the_loop(tmp_path):
     assert found.plot().axes
     page = found.report(tmp_path / "page.html")
     assert page == tmp_path / "page.html" and "closing the simulation gap" in page.read_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "says"),
+    [
+        (
+            "estimator",
+            "residual.Linear",
+            r"'residual.Linear', expected .*=residual.Linear",
+        ),
+        ("estimator", Linear, r"estimator is the class Linear, expected an object"),
+        ("evaluation", {}, r"evaluation is {}, expected .*EvaluationProtocol\("),
+        ("ddpg", {"hidden": (8, 8)}, r"expected .*ddpg=DDPGConfig\("),
+        ("budget", 450, r"budget is 450, expected .*Budget\("),
+        ("seed", None, r"seed is None, expected a whole number from 0"),
+        ("seed", -1, r"seed is -1"),
+    ],
+)
+def test_an_argument_of_another_kind_is_one_line(name, given, says):
+    arguments = {"estimator": Linear(), "ddpg": DDPG, "progress": Silent(), name: given}
+    with pytest.raises(TypeError, match=says):
+        learn_by_difference(SYSTEM.nominal, SYSTEM.true, SYSTEM.task, **arguments)
+
+
+def test_without_an_update_there_is_no_model():
+    with pytest.raises(ValueError, match="no update was made"):
+        Learnt.of(SYSTEM).model  # noqa: B018
+
+
+def test_systems_of_one_file_have_folders_of_their_own():
+    config = {"estimator": {"class_path": "residual.Linear"}, "budget": {"true_samples": 9}}
+    labels = [
+        trial_label({**config, "seed": 0, "system": name})
+        for name in ("arm.SYSTEM", "robots.arm.LAGGED", "")
+    ]
+    assert labels == ["arm.SYSTEM-Linear-9-seed0", "arm.LAGGED-Linear-9-seed0", "Linear-9-seed0"]
 
 
 def test_a_budget_that_teaches_nothing_is_refused():
