@@ -9,6 +9,7 @@ same objects say the same in another process.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import enum
 import functools
@@ -24,6 +25,7 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from studies.learning.compiled import code_hash, file_content, hash_of, named_in
+from studies.learning.parts import attributes_of, cell_content, layers_of, named, written
 from studies.learning.sources import is_ours, is_users
 
 #: Objects within objects are followed so far, and lists of plain values written out so far.
@@ -47,12 +49,12 @@ def settings_of(value: Any, state: frozenset[Attribute] = frozenset()) -> Any:
         state: Attributes of environments that are no settings.
 
     Returns:
-        What JSON can hold; code of the user's beside it. ``"class"`` and ``"function"`` name
-        classes and functions as ``module:name``.
+        What JSON can hold: the ``value``, and the ``code`` of the user's that it leads to, by name.
+        ``"class"`` and ``"function"`` name classes and functions as ``module:name``.
     """
     walk = _Walk(state)
     told = walk.value(value, ())
-    return {"value": told, "code": walk.code} if walk.code else told
+    return {"value": told, "code": walk.code}
 
 
 def modules_in(settings: Any) -> set[str]:
@@ -63,32 +65,6 @@ def modules_in(settings: Any) -> set[str]:
         return found.union(*(modules_in(value) for value in settings.values()))
     inside = settings if isinstance(settings, list) else []
     return set[str]().union(*(modules_in(one) for one in inside))
-
-
-def named(thing: Any) -> str:
-    """A class or function as ``module:name``."""
-    name = getattr(thing, "__qualname__", None) or getattr(thing, "__name__", "")
-    return f"{getattr(thing, '__module__', None) or 'builtins'}:{name}"
-
-
-def attributes_of(value: Any) -> dict[str, Any]:
-    """All attributes of an object by name, those in slots too."""
-    found: dict[str, Any] = {}
-    for kind in type(value).__mro__:
-        names = kind.__dict__.get("__slots__", ())
-        for name in (names,) if isinstance(names, str) else names:
-            if hasattr(value, name):
-                found[name] = getattr(value, name)
-    return found | getattr(value, "__dict__", {})
-
-
-def layers_of(env: gymnasium.Env[Any, Any]) -> list[gymnasium.Env[Any, Any]]:
-    """An environment and all that it wraps, from outside."""
-    found = [env]
-    while isinstance(env, gymnasium.Wrapper):
-        env = env.env
-        found.append(env)
-    return found
 
 
 class _Walk:
@@ -145,7 +121,7 @@ class _Walk:
     def _object(self, value: Any, around: tuple[Any, ...]) -> Any:
         kind, inside = type(value), (*around, value)
         told = {"class": named(kind), **self._class(kind, inside)}
-        if callable(getattr(value, "get_params", None)):  # an estimator
+        if hasattr(kind, "get_params") and hasattr(kind, "set_params"):  # an estimator
             fitted = {k: v for k, v in attributes_of(value).items() if k.endswith("_")}
             return told | self.value({**value.get_params(deep=False), **fitted}, inside)
         if dataclasses.is_dataclass(value):
@@ -154,7 +130,10 @@ class _Walk:
         if is_users(kind.__module__) or is_ours(kind.__module__):
             # What it is pickled by leaves out what it only keeps for speed.
             own = any("__getstate__" in vars(base) for base in kind.__mro__[:-1])
-            held = value.__getstate__() if own else attributes_of(value)
+            held = attributes_of(value)
+            if own:
+                with contextlib.suppress(Exception):  # what cannot be pickled has attributes
+                    held = value.__getstate__()
             return told | {"held": self.value(held, inside)}
         # From here on it is a library's: a decorated function, an array, or any other object.
         behind = [getattr(value, n, None) for n in ("__wrapped__", "__func__", "func", "fget")]
@@ -163,7 +142,8 @@ class _Walk:
             return told | {"of": self.value(of, inside)}
         if hasattr(value, "__array__"):
             try:
-                return told | {"array": self._array(np.asarray(value), inside)}
+                plain = value.detach() if hasattr(value, "detach") else value
+                return told | {"array": self._array(np.asarray(plain), inside)}
             except Exception:
                 return told
         if callable(value) and hasattr(value, "__name__"):
@@ -171,7 +151,7 @@ class _Walk:
         if around and not _followed(around[-1]):
             return told
         public = {k: v for k, v in attributes_of(value).items() if not k.startswith("_")}
-        return told | (self.value(public, inside) if public else _written(value))
+        return told | (self.value(public, inside) if public else written(value))
 
     def _layer(self, env: gymnasium.Env[Any, Any], inside: tuple[Any, ...]) -> Any:
         """One environment of a chain: what it was made with, and the attributes it has now."""
@@ -206,7 +186,7 @@ class _Walk:
         key = self._meet(function, f"{named(function)} {code_hash(code)}")
         told: dict[str, Any] = {
             "defaults": [function.__defaults__, function.__kwdefaults__],
-            "closure": [_content(cell) for cell in function.__closure__ or ()],
+            "closure": [cell_content(cell) for cell in function.__closure__ or ()],
         }
         told = {name: self.value(given, inside) for name, given in told.items()}
         if is_users(module):
@@ -246,16 +226,23 @@ class _Walk:
         """What code reads: globals, names in the user's modules, and files that it names."""
         names, texts = named_in(code)
         near = Path(code.co_filename).parent
+        found = self._globals(names, places, inside)
+        files = {text: file_content(text, near) for text in sorted(texts)}
+        return found | {text: content for text, content in files.items() if content}
+
+    def _globals(
+        self, names: set[str], places: Mapping[str, Any], inside: tuple[Any, ...]
+    ) -> dict[str, Any]:
+        """Values by name, and by the same names in the user's modules among them."""
         found: dict[str, Any] = {}
         for name in sorted(names & places.keys()):
             value = places[name]
+            if _reserved(name) or any(value is one for one in inside):
+                continue
+            found[name] = self.value(value, inside)
             if isinstance(value, types.ModuleType) and is_users(value.__name__):
-                there = sorted(n for n in names & vars(value).keys() if not _reserved(n))
-                found |= {f"{name}.{n}": self.value(vars(value)[n], inside) for n in there}
-            elif not _reserved(name):
-                found[name] = self.value(value, inside)
-        files = {text: file_content(text, near) for text in sorted(texts)}
-        return found | {text: content for text, content in files.items() if content}
+                found[name] |= self._globals(names, vars(value), (*inside, value))
+        return found
 
 
 def _followed(holder: Any) -> bool:
@@ -266,20 +253,6 @@ def _followed(holder: Any) -> bool:
 
 def _reserved(name: str) -> bool:
     return name.startswith("__") and name.endswith("__")
-
-
-def _written(value: Any) -> dict[str, str]:
-    """What a value without attributes, such as a range or a fraction, says of itself."""
-    hashed: Any = type(value).__hash__
-    text = repr(value) if hashed and hashed != object.__hash__ else ""
-    return {"value": text} if text and " at 0x" not in text else {}
-
-
-def _content(cell: types.CellType) -> Any:
-    try:
-        return cell.cell_contents
-    except ValueError:  # of a function that is not complete yet
-        return None
 
 
 def _short(values: list[Any]) -> Any:

@@ -59,16 +59,18 @@ def code_of(*things: Any) -> dict[str, str]:
     return dict(sorted(found.items()))
 
 
-def is_users(module: str) -> bool:
+def is_users(module: str | None) -> bool:
     """Whether a module is the user's: a file of theirs, a notebook or a script, no library."""
+    if not isinstance(module, str):  # of a class that was made while the program ran
+        return False
     if module == "__main__":
         return True
     return module.split(".")[0] not in _OURS and _source(module) is not None
 
 
-def is_ours(module: str) -> bool:
+def is_ours(module: str | None) -> bool:
     """Whether a module is of this toolkit, where the text of the module is enough."""
-    return module.split(".")[0] in _OURS
+    return isinstance(module, str) and module.split(".")[0] in _OURS
 
 
 def _modules_of(thing: Any) -> Iterator[str]:

@@ -11,6 +11,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
+import torch
 from sklearn.linear_model import Ridge
 
 from sims.pendulum import Pendulum
@@ -155,6 +156,27 @@ def test_what_an_environment_did_is_no_part_of_it():
     assert told(made) != told(System("counting", Pendulum(), lambda: Counting(0.1), SwingUp()))
 
 
+CALLS = {"count": 0}
+KNOWN = {}
+
+
+class Remembering(SwingUp):
+    """It counts its calls and remembers what it said."""
+
+    def reward(self, states, actions, next_states):
+        CALLS["count"] += 1
+        for row in next_states:
+            KNOWN[tuple(row)] = super().reward(row[None], row[None], row[None])[0]
+        return np.array([KNOWN[tuple(row)] for row in next_states])
+
+
+def test_what_a_task_remembers_is_no_part_of_it():
+    system = System("remembering", Pendulum(), Pendulum.true(), Remembering())
+    before = told(system)
+    system.check()
+    assert told(system) == before == told(system)
+
+
 def test_a_librarys_environment_counts_by_its_attributes_and_files(tmp_path):
     env = gymnasium.make("Pendulum-v1", g=10.0)
     before = settings_of(env)
@@ -174,12 +196,12 @@ import numpy as np
 from sims import Parameter, System, SwingUp
 from sims.pendulum_equation import PendulumEquation
 
-P = json.loads((Path(__file__).parent / "params.json").read_text())
+import kit.numbers_of_mine
 TABLE = np.loadtxt(Path(__file__).parent / f"cost{1}.txt")
 
 class Mine(PendulumEquation):
     def acceleration(self, q, v, u, force, p):
-        return super().acceleration(q, v, u, force, p) * P["factor"]
+        return super().acceleration(q, v, u, force, p) * kit.numbers_of_mine.P["factor"]
 
 class Up(SwingUp):
     def reward(self, s, a, n):
@@ -189,6 +211,13 @@ def true():
     return PendulumEquation(float((Path(__file__).parent / "mass.txt").read_text()))
 
 SYSTEM = System("mine", Mine(), true, Up())
+"""
+
+
+HELPER = """
+import json
+from pathlib import Path
+P = json.loads((Path(__file__).parent / "params.json").read_text())
 """
 
 
@@ -202,6 +231,9 @@ def test_data_that_the_system_file_reads_make_another_trial(tmp_path, monkeypatc
         "mass.txt": "0.09",
     }.items():  # fmt: skip
         (tmp_path / name).write_text(content)
+    (tmp_path / "kit").mkdir()
+    (tmp_path / "kit" / "__init__.py").touch()
+    (tmp_path / "kit" / "numbers_of_mine.py").write_text(HELPER.replace("parent", "parents[1]"))
     monkeypatch.syspath_prepend(tmp_path)
     given = build_parser(learn.STUDY).parse_args(["--system", "system_of_mine.SYSTEM"])
     config = json.loads(build_parser(learn.STUDY).dump(given, format="json", skip_unset=False))
@@ -210,7 +242,8 @@ def test_data_that_the_system_file_reads_make_another_trial(tmp_path, monkeypatc
     for name in ("", file):
         if name:
             (tmp_path / name).write_text(text)
-        sys.modules.pop("system_of_mine", None)
+        for module in ("system_of_mine", "kit", "kit.numbers_of_mine"):
+            sys.modules.pop(module, None)
         codes.append(code_of_trial(learn.STUDY, config))
     assert (codes[0] == codes[1]) is not bool(file)
 
@@ -232,6 +265,7 @@ def test_values_of_every_kind_count_and_no_address_does():
         (Slotted(1), Slotted(2)),
         (np.array([Slotted(1)], object), np.array([Slotted(2)], object)),
         (np.cos, np.sin),
+        (torch.nn.Parameter(torch.ones(2)), torch.nn.Parameter(torch.zeros(2))),
         (Ridge().fit([[0.0], [1.0]], [0.0, 1.0]), Ridge().fit([[0.0], [1.0]], [0.0, 2.0])),
         (Fraction(1, 3), Fraction(1, 4)),
         (b"a", b"b"),
@@ -246,15 +280,12 @@ def test_values_of_every_kind_count_and_no_address_does():
     assert __name__ in here
     around = []
     around.append(around)
-    assert settings_of(around) == ["..."]
+    assert settings_of(around)["value"] == ["..."]
 
 
 def test_only_what_two_descriptions_share_counts():
-    one = {"a": 1, "b": [1, 2], "e": [1], "c": {"d": float("nan")}}
-    other = {"a": 2, "b": [1, 3], "e": [1, 2], "c": {"d": float("nan"), "e": 0}}
+    one = {"a": 1, "b": [1, 2], "e": [1], "c": {"class": "C", "d": float("nan")}, "f": {"x": 1}}
+    other = {"a": 2, "b": [1, 3], "e": [1, 2], "c": {**one["c"], "e": 0}, "f": {"x": 1, "y": 2}}
     left = unchanged(one, other)
-    assert (
-        left["a"] == left["e"] == "changes"
-        and left["b"] == [1, "changes"]
-        and np.isnan(left["c"]["d"])
-    )
+    assert left["a"] == left["e"] == left["f"] == "changes" and left["b"] == [1, "changes"]
+    assert np.isnan(left["c"]["d"]) and len(left["c"]) == 2
