@@ -16,8 +16,9 @@ from policy.config import DDPGConfig
 from policy.learner import OURS, Algorithm
 from residual import DropoutNet
 from sims.measured import Measurement
+from sims.same_channels import check_same_channels
 from sims.simulator import Simulator
-from sims.system import System, check_same_channels
+from sims.system import System
 from studies.learning.budget import Budget
 from studies.learning.warm_start import ReplayRule
 
