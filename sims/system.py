@@ -13,7 +13,7 @@ from sims.contract import refuse_unsound
 from sims.environment import SimulatorEnv
 from sims.measured import MeasuredEnv, Measurement
 from sims.sampled import SampledEnv, StateOf
-from sims.simulator import Array, Channel, Simulator
+from sims.simulator import Array, Simulator, physical
 from sims.tasks import Task
 
 # Up to so many state channels are reported one by one, more by their kind.
@@ -36,7 +36,8 @@ class EvaluationProtocol:
         finalists: So many of the best policies of a training are tested once more at its end.
         final_episodes: Rollouts of each of them, from other starts; 0 for no final.
         true_episodes: Rollouts of the policy kept on the true system: the result.
-        visited_seconds: Accuracy is measured over the first seconds of fresh rollouts.
+        visited_seconds: Accuracy is measured over the first so many seconds of fresh rollouts, at
+            least 20 control periods.
         visited_rollouts: How many of those.
         visited_stride: Open-loop predictions start at every so many-th state of them.
     """
@@ -223,11 +224,6 @@ class System:
             "published": dict(self.published),
             "starts": self.evaluation.true_episodes,
         }
-
-
-def physical(channels: tuple[Channel, ...]) -> tuple[Channel, ...]:
-    """Without the hidden memory of effects."""
-    return tuple(channel for channel in channels if channel.kind != "memory")
 
 
 def check_same_channels(

@@ -247,7 +247,8 @@ def guarded(
 def users_code(error: BaseException) -> str:
     """File, line and function of the user's that an error comes from; empty if it is ours.
 
-    Libraries in between, which only pass on what they were given, do not count.
+    Libraries in between, which only pass on what they were given, do not count. Where
+    ours made the error of another one, that one tells.
     """
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         path = Path(frame.filename)
@@ -256,8 +257,10 @@ def users_code(error: BaseException) -> str:
         ours = path.parent == _HOME or (path.is_relative_to(_HOME) and (
             path.relative_to(_HOME).parts[0] in ("sims", "policy", "residual", "studies")
         ))  # fmt: skip
-        return "" if ours else f"{path}, line {frame.lineno}, in {frame.name}"
-    return ""
+        if not ours:
+            return f"{path}, line {frame.lineno}, in {frame.name}"
+        break
+    return users_code(error.__cause__) if error.__cause__ else ""
 
 
 def _typed(error: BaseException) -> str:

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from studies import learn
 from studies.learning.settings import build_parser
 from studies.pendulum_gap import STUDY
 from studies.running import command
@@ -219,3 +220,20 @@ def test_what_is_not_there_is_named(name, arguments, says, capsys, tmp_path, mon
     assert said.startswith("error: ") and said.count("\n") == 1
     assert says in said
     assert not Path("out").exists()
+
+
+def test_a_value_error_of_the_users_task_says_where(tmp_path, monkeypatch, capsys):
+    (tmp_path / "my_swing.py").write_text(
+        "from sims import Pendulum, SwingUp, System\n\n"
+        "class Mine(SwingUp):\n"
+        "    def reward(self, states, actions, next_states):\n"
+        "        angle, = next_states.T\n"
+        "        return -angle\n\n"
+        "SYSTEM = System('mine', Pendulum(), Pendulum.true(), Mine())\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SystemExit, match="2"):
+        learn.main(["--system", "my_swing.SYSTEM", "--output", str(tmp_path / "out")])
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "too many values to unpack" in said
+    assert f"{tmp_path / 'my_swing.py'}, line 5, in reward" in said
