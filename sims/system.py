@@ -18,6 +18,8 @@ from sims.tasks import Task
 
 # Up to so many state channels are reported one by one, more by their kind.
 _FEW = 6
+#: Starts of a test on the true system where they differ.
+USUAL_STARTS = 5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,7 +37,8 @@ class EvaluationProtocol:
             chosen for one lucky path through the model's errors.
         finalists: So many of the best policies of a training are tested once more at its end.
         final_episodes: Rollouts of each of them, from other starts; 0 for no final.
-        true_episodes: Rollouts of the policy kept on the true system: the result.
+        true_episodes: Rollouts of the policy kept on the true system: the result. All policies of
+            a seed begin in the same states. None: 5, or 1 where every reset gives the same state.
         visited_seconds: Accuracy is measured over the first so many seconds of fresh rollouts, at
             least 20 control periods.
         visited_rollouts: How many of those.
@@ -48,7 +51,7 @@ class EvaluationProtocol:
     noisy: int = 3
     finalists: int = 1
     final_episodes: int = 0
-    true_episodes: int = 1
+    true_episodes: int | None = None
     # Later a good policy balances, where there is next to nothing to predict.
     visited_seconds: float = 2.0
     visited_rollouts: int = 5
@@ -222,7 +225,6 @@ class System:
             "path": list(self.path or []),
             "target": self.target,
             "published": dict(self.published),
-            "starts": self.evaluation.true_episodes,
         }
 
 

@@ -230,7 +230,9 @@ class Steps:
                 recorder or env,
                 tested,
                 steps,
-                lambda purpose: stream(self.seed, purpose, kind, update),
+                stream(self.seed, "select", kind, update),
+                # Of no kind and no update: what differs between policies is not where they began.
+                stream(self.seed, "test starts"),
                 report,
                 on_true,
                 RANDOM_STEPS if start is None else 0,

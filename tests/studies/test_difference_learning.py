@@ -96,6 +96,24 @@ def test_policies_are_tested_from_several_starts_with_the_measures_asked_for(out
             assert all(test["turned"] > 0 for test in policy["tests"])
 
 
+def test_all_policies_are_tested_from_the_same_starts(outcome):
+    tested = [[t["start"] for t in p["tests"]] for p in outcome.policies if "tests" in p]
+    assert len(tested) == 8 and all(starts == tested[0] for starts in tested)
+    assert len({tuple(start) for start in tested[0]}) == 3
+    starts = np.array([training.episode["states"][0] for training in outcome.trainings.values()])
+    np.testing.assert_array_equal(starts, starts[:1].repeat(len(starts), axis=0))
+
+
+@pytest.mark.parametrize(("start_at", "count"), [("anywhere", 5), ("hanging", 1)])
+def test_there_are_several_starts_where_they_differ(start_at, count):
+    task = SwingUp(horizon=20, start_at=start_at)
+    found = quickly(PendulumEquation(), PendulumEquation.true(), task)
+    for policy in found.policies:
+        assert len(policy["tests"]) == count
+        returns = [test["return"] for test in policy["tests"]]
+        assert policy["return_true"] == pytest.approx(np.mean(returns))
+
+
 def test_the_reference_read_at_a_smaller_budget_is_the_cold_start(outcome):
     cold = next(p for p in outcome.policies if p["name"] == "cold")
     assert cold["true_samples"] == 60 and max(step for step, _ in cold["curve"]) <= 60
@@ -127,8 +145,12 @@ def test_no_two_steps_share_a_random_stream(monkeypatch):
     for module in (steps_module, training):
         monkeypatch.setattr(module, "stream", watched)
     learnt_with(None)
+    # Tests of policies that are to be compared begin alike; that stream is theirs alone.
+    common = [pair for pair in drawn if pair[1] == (0, "test starts")]
+    drawn = [pair for pair in drawn if pair not in common] + common[:1]
     purposes = {purpose for _, purpose in drawn}
-    # Nothing is drawn twice, and no two purposes begin within reach of each other.
+    assert len(common) == len({p for p in purposes if p[1] == "train"}) == 8
+    # Nothing else is drawn twice, and no two purposes begin within reach of each other.
     assert len(drawn) == len(purposes) >= 30
     begins = sorted(found for found, _ in drawn)
     assert all(b - a >= 2**20 for a, b in itertools.pairwise(begins))
