@@ -23,6 +23,8 @@ Tone = Literal["good", "warning", "bad", "neutral"]
 _PLACE = ["true_samples", "estimator", "iteration"]
 # A model that leaves so much of the gap in one step, in its worst group of channels, closes none.
 _OPEN = 0.5
+# Returns that differ by a smaller share are the same.
+_UNCHANGED = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,8 +35,10 @@ class Evidence:
         gain: Return above the idealised policy's, over the pairs.
         seeds: So many were compared; a single one is compared start by start.
         worth: The same above the control's; None without a control.
+        unchanged: Whether the return is the idealised policy's.
         error: One-step error of the model where the policy goes, as a share of the gap, of its
             worst group of channels; None if there is none.
+        worst: That group.
         same: Whether the true system does what the simulator does.
         passed: Whether the target is reached on every seed; None without one to reach.
         near: Whether the policy learnt on the true system gains hardly more; None without one.
@@ -43,7 +47,9 @@ class Evidence:
     gain: Mean
     seeds: int
     worth: Mean | None = None
+    unchanged: bool = False
     error: float | None = None
+    worst: str = ""
     same: bool = False
     passed: bool | None = None
     near: bool | None = None
@@ -67,6 +73,8 @@ class Evidence:
         """The verdict in a word or two, and its tone."""
         if self.same:
             return "no gap found", "neutral"
+        if self.unchanged:
+            return "unchanged", "warning"
         if self.gain.high < 0:
             return "worse", "bad"
         if self.gain.low <= 0:
@@ -104,11 +112,14 @@ def headline(
     control, value = _control(kinds, update), _value(chosen)
     pairs = above(chosen, control) if control is not None else []
     true = _value(kinds["true"]) if "true" in kinds else None
+    worst, error = _worst(seen, about)
     found = Evidence(
         gain=mean(above(chosen, before) or [value - start]),
         seeds=chosen["seed"].nunique(),
         worth=mean(pairs) if pairs else None,
-        error=_worst(seen, about),
+        unchanged=abs(value - start) <= _UNCHANGED * max(abs(value), abs(start)),
+        error=error,
+        worst=worst,
         same=no_gap(seen),
         passed=reached if target is not None and start < target else None,
         near=None if true is None else value - start >= NEAR * (true - start),
@@ -127,7 +138,7 @@ def headline(
     if found.error is not None and not found.same:
         tiles["one-step error, share of gap"] = f"{found.error:.2g}"
     label, tone = found.says()
-    same = "No gap found: where the policy goes, the true system does what the simulator does."
+    same = "Where the policy goes, the true system does what the simulator does."
     return [
         Verdict(same if found.same else went, " ".join(text), tone=tone, label=label),
         KeyValues(tiles, style="tiles"),
@@ -141,8 +152,8 @@ def _of_gain(found: Evidence, tested: int) -> str:
     common = f"{tested} common starts" if tested > 1 else "one start"
     if found.seeds == 1:
         return (
-            f"Start by start over {common} the gain is {found.gain}, for this training: other "
-            "seeds are others."
+            f"Start by start over {common} the gain is {found.gain}, of this training alone: "
+            "another seed may do otherwise."
         )
     return f"Seed by seed, each over {common}, the gain is {found.gain}."
 
@@ -168,7 +179,7 @@ def _of_cause(found: Evidence, control: float | None) -> list[str]:
             f"As much training without a difference model ends at {control:.5g}; {by} the model is "
             f"worth {found.worth}."
         ]
-    if found.same or found.gain.low <= 0:
+    if found.same or found.unchanged or found.gain.low <= 0:
         return []
     return [
         "Whether that is the difference model's doing or that of longer training, a control shows: "
@@ -180,11 +191,11 @@ def _of_rest(found: Evidence, true: float | None, best: float | None) -> list[st
     """What is left, and what would be possible."""
     text = []
     if found.same:
-        text.append("There is nothing for a difference model to learn; what differs is training.")
+        text.append("A difference model has nothing to learn there; what differs is training.")
     elif found.error is not None and found.error >= _OPEN:
         text.append(
             f"One step of the corrected simulator still errs by {found.error:.2g} of the gap in "
-            "its worst channels: the gap is not closed, whatever the return."
+            f"{found.worst}: the gap is not closed, whatever the return."
         )
     if true is not None:
         text.append(f"Learnt on the true system: {true:.5g}.")
@@ -206,12 +217,12 @@ def _control(kinds: Mapping[str, pd.DataFrame], update: int) -> pd.DataFrame | N
     return rows if len(rows) else None
 
 
-def _worst(seen: pd.DataFrame, about: About) -> float | None:
-    """The one-step error of the worst group of channels, mean over seeds."""
+def _worst(seen: pd.DataFrame, about: About) -> tuple[str, float | None]:
+    """The worst group of channels, and its one-step error, mean over seeds."""
     if seen.empty:
-        return None
+        return "", None
     errors = by_group(seen, "one_step", about).mean().dropna()
-    return float(errors.max()) if len(errors) else None
+    return (str(errors.idxmax()), float(errors.max())) if len(errors) else ("", None)
 
 
 def _chosen(learnt: pd.DataFrame, target: float | None) -> tuple[pd.DataFrame, bool]:

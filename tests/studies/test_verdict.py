@@ -88,13 +88,15 @@ def test_a_control_that_does_as_well_shows_no_cause():
 def test_nothing_is_closed_by_a_model_that_leaves_the_gap(error):
     found, _ = verdict(trial([more(8)], control=more(1), error=error))
     assert (found.label, found.tone) == ("better, gap remains", "warning")
-    assert f"errs by {error:.2g} of the gap" in found.text
+    assert f"errs by {error:.2g} of the gap in upper" in found.text
 
 
 def test_a_gain_within_its_interval_is_not_settled():
     uneven = [value + gain for value, gain in zip(STARTS, [30, -12, 9, -8, 4], strict=True)]
     found, _ = verdict(trial([uneven], control=STARTS))
     assert (found.label, found.tone) == ("not settled", "warning")
+    kept, _ = verdict(trial([more(-0.01, wobble=0)]))
+    assert kept.label == "unchanged" and "-0.010" in kept.text
     worse, _ = verdict(trial([more(-8)]))
     assert (worse.label, worse.tone) == ("worse", "bad")
 
