@@ -48,7 +48,7 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.simulator = simulator
         self.task = task
         self.render_mode = render_mode
-        fps = round(1 / simulator.dt)
+        fps = max(1, round(1 / simulator.dt))
         self.metadata = {"render_modes": ["rgb_array"], "render_fps": fps}
         self._renderer: Renderer | None = renderer_for(simulator) if render_mode else None
         low = np.array([channel.low for channel in simulator.action_channels])

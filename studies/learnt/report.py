@@ -11,9 +11,9 @@ import yaml
 
 from simgap_npz import read_npz
 from studies.learnt.figures import (
-    SECONDS,
     budgets_figure,
     curves_figure,
+    drawn_steps,
     episodes_figure,
     path_figure,
     updates_figure,
@@ -93,7 +93,8 @@ def write_report(
         drawings.append((
             "trajectories", episodes_figure(about, drawn), "Episodes on the true system",
             "State and action over time for each policy on the true system.",
-            f"The first {SECONDS:g} s on the true system; a line ends where its episode ends.",
+            f"The first {drawn_steps(about['dt']) * about['dt']:.4g} s on the true system; a line "
+            "ends where its episode ends.",
         ))  # fmt: skip
         if about.get("path"):
             drawings.append((

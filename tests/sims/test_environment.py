@@ -141,6 +141,10 @@ def test_a_simulator_without_pictures_says_so():
         SimulatorEnv(Bare(), SwingUp(), render_mode="rgb_array")
 
 
+def test_a_slow_simulator_has_a_frame_rate():
+    assert SimulatorEnv(Pendulum(dt=3.0), SwingUp()).metadata["render_fps"] == 1
+
+
 def test_effects_with_memory_start_at_rest_and_can_be_set():
     from sims.effects import Delay
 

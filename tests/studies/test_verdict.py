@@ -1,8 +1,10 @@
 """A verdict claims what pairs of policies show, and no more."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from studies.learnt.figures import drawn_steps, episodes_figure
 from studies.learnt.pairs import above
 from studies.learnt.report import write_report
 from studies.learnt.sections import policies_once
@@ -172,6 +174,14 @@ def test_pairs_are_of_one_seed_one_start_and_the_same_settings():
     several = [pd.concat([rows(r), rows(r, seed=1)]) for r in ([1.0, 5.0], [0.5, 2.0])]
     assert above(*several) == [1.75, 1.75]
     assert above(rows([1.0], settings="a"), rows([0.0], settings="b")) == []
+
+
+def test_slow_systems_are_drawn_over_enough_of_their_periods():
+    about = ABOUT | {"dt": 60.0, "states": [{"name": "upper", "unit": "rad", "angle": True}]}
+    episode = {"states": np.arange(151.0)[:, None], "actions": np.zeros((150, 1))}
+    _, numbers = episodes_figure(about, {"idealised": episode})
+    assert numbers["time_s"].max() == 60.0 * 99
+    assert drawn_steps(0.05) == 200  # ten seconds
 
 
 def test_the_terminal_says_what_its_columns_mean(tmp_path):
