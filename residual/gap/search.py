@@ -146,6 +146,11 @@ class Search:
         """How many numbers the windows are good for."""
         return max(3, len(self.fitter.blocks.windows) // 2)
 
+    def surprises(self, key: Key) -> int:
+        """Effects of a set that are larger than their kind usually is."""
+        bound = self.tried[key].model.bind(self.tried[key].theta).effects
+        return sum(effect.surprising for effect in bound[len(self.simulator.effects) :])
+
     def usable(self) -> list[Key]:
         """Sets that converged and may be right."""
         return [k for k in self.validated if k not in self.unfit and k not in self.refused]

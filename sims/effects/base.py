@@ -138,6 +138,12 @@ class Effect(abc.ABC):
         """The joint, actuator, channel or parameter that it acts on."""
         return getattr(self, dataclasses.fields(self)[0].name)
 
+    @property
+    def surprising(self) -> bool:
+        """Whether it is larger than its kind usually is, so that what explains as much and is not
+        comes first."""
+        return False
+
     @classmethod
     def numbers(cls) -> tuple[str, ...]:
         """Names of the numeric fields."""
