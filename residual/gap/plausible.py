@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from residual.gap.model import Model
 from residual.gap.samples import Samples
+from sims.effects.actuator import StaticActuatorEffect
 from sims.effects.library import probes, shortly_after
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
@@ -47,6 +48,9 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
         small = ratio > FACTOR and _minor(given, effect.parameter, ratio)
         if not 1 / FACTOR <= ratio <= FACTOR and not small:
             return number, f"{effect.parameter} would be {ratio:.3g} times its nominal value"
+    once = _shows_once(host, samples, len(model.simulator.effects))
+    if once is not None:
+        return once, "the input reaches where it acts only once, so that nothing confirms it"
     before = Model(given).inputs(samples, np.zeros((1, 0)))[0]
     after = model.inputs(samples, theta[None])[0]
     for j, channel in enumerate(host.action_channels):
@@ -57,6 +61,23 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
             number = where.index(channel.name) if channel.name in where else len(where)
             return number, f"{channel.name} would have {left / usual:.2g} of its strength"
     return len(model.chosen), ""
+
+
+def _shows_once(host: HostSimulator, samples: Samples, own: int) -> int | None:
+    """Which effect of an actuator shows in a single stretch of the data, if any.
+
+    What happens beyond the end of all other data can be fitted, but not forecast.
+    """
+    inputs = [channel.name for channel in host.action_channels]
+    for number, effect in enumerate(host.effects[own:]):
+        if not isinstance(effect, StaticActuatorEffect):
+            continue
+        column = inputs.index(effect.actuator)
+        shown = [effect.shows(run.actions[:, column]) for run in samples.recorded]
+        stretches = sum(int(s[0]) + int((s[1:] & ~s[:-1]).sum()) for s in shown)
+        if stretches == 1 and not all(s.all() for s in shown):
+            return number
+    return None
 
 
 def _minor(simulator: HostSimulator, parameter: str, ratio: float) -> bool:

@@ -9,9 +9,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sims.effects.base import Effect, number, place
 from sims.effects.joint import Value
+from sims.simulator import Array
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
@@ -46,6 +48,10 @@ class StaticActuatorEffect(ActuatorEffect):
     @abc.abstractmethod
     def shape(self, u: Value) -> Value:
         """What the actuator receives for the command ``u``, by row."""
+
+    def shows(self, u: Array) -> NDArray[np.bool_]:
+        """Where it changes the command beyond what other effects of the actuator do, by row."""
+        return np.ones(np.shape(u), bool)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -115,6 +121,10 @@ class Saturation(StaticActuatorEffect):
     def shape(self, u: Value) -> Value:
         """The command, cut."""
         return np.clip(u, -self.level, self.level)
+
+    def shows(self, u: Array) -> NDArray[np.bool_]:
+        """Where the command goes beyond the level."""
+        return np.abs(u) > self.level
 
 
 @dataclasses.dataclass(frozen=True)

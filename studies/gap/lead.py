@@ -20,6 +20,8 @@ from studies.gap.words import (
 
 #: Rivals that are listed.
 FEW_RIVALS = 2
+#: Error on records set aside, over that of the nominal simulator, from which on it is worse.
+WORSE = 1.05
 
 
 def lead(result: GapResult, tolerance: float | None = None) -> str:
@@ -37,11 +39,25 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
         return f"Nothing that matters: the {ahead(gap)} is {before}, allowed is {allowed}.{smaller}"
     kinds = {verdict.kind for verdict in result.verdicts}
     if kinds & {"confirmed", "ambiguous", "calibrated"}:
-        return f"{capitalized(percent(gap.share.value))} of the gap is {_what(result)}."
+        share = f"{capitalized(percent(gap.share.value))} of the gap is {_what(result)}."
+        return share + _but_worse_apart(result)
     if "unexplained" in kinds:
         return f"The gap has no name: the {ahead(gap)} is {before}."
     floor = quantity_text(gap.noise_floor.value, gap.unit)
     return f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
+
+
+def _but_worse_apart(result: GapResult) -> str:
+    """What speaks against the corrected simulator on the records that were set aside, if it is
+    worse there."""
+    apart = result.held_out
+    if apart is None or apart.after.value <= WORSE * apart.before.value:
+        return ""
+    before, after = (quantity_text(s.value, apart.unit) for s in (apart.before, apart.after))
+    return (
+        f" But it does not hold on the records set aside, where the corrected simulator is worse: "
+        f"the {ahead(apart)} is {after}, the nominal one's {before}."
+    )
 
 
 def _what(result: GapResult) -> str:
