@@ -125,7 +125,8 @@ def beside_noise(simulator: HostSimulator, fitter: Fitter, sigma: Array) -> floa
     fit = fitter.fit(Model(simulator), np.zeros(0))
     squares, floor = validate(fitter, fit).squares, noise_floor(fitter, fit, sigma)
     main = main_channel(simulator, fitter.samples.measured, squares, floor)
-    return float(np.sqrt(np.nanmean(squares[:, main]) / max(np.nanmean(floor[:, main]), 1e-300)))
+    by_noise = max(float(np.nanmean(floor[:, main])), 1e-300)
+    return float(np.sqrt(np.nanmean(squares[:, main]) / by_noise))
 
 
 def rollouts(search: Search, before: Validated, after: Validated) -> tuple[Rollout, ...]:

@@ -20,6 +20,8 @@ from studies.gap.words import (
 
 #: Rivals that are listed.
 FEW_RIVALS = 2
+#: Part of the gap that calibrated parameters take off alone, below which they only serve the rest.
+TRIFLE = 0.05
 #: Error on records set aside, over that of the nominal simulator, from which on it is worse.
 WORSE = 1.05
 
@@ -64,17 +66,21 @@ def _what(result: GapResult) -> str:
     """What the gap is made of, certain names first."""
     certain = [v for v in result.verdicts if v.kind == "confirmed"]
     others = [v for v in result.verdicts if v.kind == "ambiguous"]
+    moved = [verdict for verdict in result.verdicts if verdict.kind == "calibrated"]
     words = _by_place([_briefly(verdict, result) for verdict in certain])
-    if any(verdict.kind == "calibrated" for verdict in result.verdicts):
+    beside = ""
+    if moved and (moved[0].share.value > TRIFLE or not (certain or others)):
         words.append("parameters that are off within their tolerance")
+    elif moved:
+        beside = ", beside parameters that are moved within their tolerance"
     sure = listed(words)
     if not others:
-        return sure
+        return sure + beside
     if len(others) == 1:
         doubtful = _with_rivals(others[0], result)
     else:
         doubtful = "perhaps " + listed(_by_place([_briefly(v, result) for v in others]))
-    return f"{sure} and {doubtful}" if sure else doubtful
+    return (f"{sure} and {doubtful}" if sure else doubtful) + beside
 
 
 def _briefly(verdict: Verdict, result: GapResult) -> str:

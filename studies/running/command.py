@@ -147,16 +147,17 @@ def _check_given(name: str, value: str) -> None:
     """
     if not name.startswith("--") or name == "--output":
         return
+    lacking = ""
     if value.endswith((".yaml", ".yml")):
         try:
             simgap_yaml.read(value)
         except ValueError as error:
             raise ValueError(f"{name} {error}") from None
-    elif name in _CLASSES and (
-        in_file(value) or (_IMPORT_PATH.fullmatch(value) and not Path(value).exists())
-    ):
-        if lacking := in_file(value) or not_found(value):
-            raise ValueError(f"{name}: {lacking}")
+    elif name in _CLASSES:
+        path = _IMPORT_PATH.fullmatch(value) and not Path(value).exists()
+        lacking = in_file(value) or (not_found(value) if path else "")
+    if lacking:
+        raise ValueError(f"{name}: {lacking}")
 
 
 def _settings(source: str | Path) -> dict[str, Any] | None:
