@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from residual.gap.model import Model
 from residual.gap.samples import Samples
-from sims.effects.actuator import StaticActuatorEffect
+from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
+from sims.effects.base import Effect
 from sims.effects.library import probes, shortly_after
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
@@ -57,10 +58,14 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
         usual = float(before[..., j, 0].std())
         left = float(after[..., j, 0].std())
         if usual > 0 and not THROUGH <= left / usual <= 1 / THROUGH:
-            where = [effect.effect.where for effect in model.chosen]
-            number = where.index(channel.name) if channel.name in where else len(where)
+            acting = [_acts_on(one.effect, channel.name) for one in model.chosen]
+            number = acting.index(True) if any(acting) else len(acting)
             return number, f"{channel.name} would have {left / usual:.2g} of its strength"
     return len(model.chosen), ""
+
+
+def _acts_on(effect: Effect, actuator: str) -> bool:
+    return isinstance(effect, ActuatorEffect) and actuator in effect.actuators
 
 
 def _shows_once(host: HostSimulator, samples: Samples, own: int) -> int | None:
@@ -72,8 +77,8 @@ def _shows_once(host: HostSimulator, samples: Samples, own: int) -> int | None:
     for number, effect in enumerate(host.effects[own:]):
         if not isinstance(effect, StaticActuatorEffect):
             continue
-        column = inputs.index(effect.actuator)
-        shown = [effect.shows(run.actions[:, column]) for run in samples.recorded]
+        columns = [inputs.index(name) for name in effect.actuators]
+        shown = [effect.shows(run.actions[:, c]) for run in samples.recorded for c in columns]
         stretches = sum(int(s[0]) + int((s[1:] & ~s[:-1]).sum()) for s in shown)
         if stretches == 1 and not all(s.all() for s in shown):
             return number

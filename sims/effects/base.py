@@ -144,6 +144,14 @@ class Effect(abc.ABC):
         comes first."""
         return False
 
+    def contains(self, other: Effect) -> bool:
+        """Whether another effect is a special case of it at the same place."""
+        return other.name in self.special_cases and self.where == other.where
+
+    def covers(self, other: Effect) -> bool:
+        """Whether another effect beside it would be there twice."""
+        return self.contains(other)
+
     @classmethod
     def numbers(cls) -> tuple[str, ...]:
         """Names of the numeric fields."""
