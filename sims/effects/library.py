@@ -92,10 +92,12 @@ def library(simulator: HostSimulator) -> tuple[Effect, ...]:
 
 
 def like_inputs(simulator: HostSimulator) -> list[tuple[str, ...]]:
-    """Names of inputs with the same unit, bounds, scale and hold, as two wheels have, by kind."""
+    """Names of inputs with the same unit, finite bounds, scale and hold, as two wheels have, by
+    kind; without bounds nothing says that they are of one make."""
     kinds: dict[tuple[object, ...], list[str]] = {}
     for c in simulator.action_channels:
-        kinds.setdefault((c.unit, c.low, c.high, c.scale, c.hold), []).append(c.name)
+        if np.isfinite([c.low, c.high]).all():
+            kinds.setdefault((c.unit, c.low, c.high, c.scale, c.hold), []).append(c.name)
     return [tuple(names) for names in kinds.values() if len(names) > 1]
 
 

@@ -73,6 +73,9 @@ def test_inputs_are_alike_if_everything_declared_of_them_is():
     first = Rover.action_channels[0]
     other.action_channels = (first, Channel("right", "V", "input", low=-9.0, high=9.0, scale=3.0))
     assert "left and right" not in {effect.where for effect in library(other)}
+    free = [Channel(side, "V", "input", scale=3.0) for side in ("left", "right")]
+    other.action_channels = tuple(free)
+    assert "left and right" not in {effect.where for effect in library(other)}
     other.action_channels = (first, Channel("right", "N", "input", scale=3.0))
     with pytest.raises(ValueError, match="inputs of several units: V, N"):
         other.with_effects([Delay("left and right", 0.1)])
