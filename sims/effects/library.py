@@ -57,6 +57,8 @@ JOINT_EFFECTS: tuple[type[Effect], ...] = (
 ACTUATOR_EFFECTS = (ActuatorGain, ActuatorBias, DeadZone, Saturation, Delay, ActuatorLag)
 #: What inputs of one kind have in common: amplifiers, motors and links of one make.
 SHARED_EFFECTS = (ActuatorGain, DeadZone, Saturation, Delay, ActuatorLag)
+#: Most inputs that have something in common.
+ROTORS = 4
 SENSOR_EFFECTS = (SensorOffset, SensorScale)
 
 
@@ -92,13 +94,16 @@ def library(simulator: HostSimulator) -> tuple[Effect, ...]:
 
 
 def like_inputs(simulator: HostSimulator) -> list[tuple[str, ...]]:
-    """Names of inputs with the same unit, finite bounds, scale and hold, as two wheels have, by
-    kind; without bounds nothing says that they are of one make."""
+    """Names of two to four inputs with the same unit, finite bounds, scale and hold, by kind.
+
+    So many wheels, thrusters or rotors are of one make. Without bounds nothing says so, and more
+    inputs are the joints of a robot, of which each has an actuator and a load of its own.
+    """
     kinds: dict[tuple[object, ...], list[str]] = {}
     for c in simulator.action_channels:
         if np.isfinite([c.low, c.high]).all():
             kinds.setdefault((c.unit, c.low, c.high, c.scale, c.hold), []).append(c.name)
-    return [tuple(names) for names in kinds.values() if len(names) > 1]
+    return [tuple(names) for names in kinds.values() if 1 < len(names) <= ROTORS]
 
 
 def typical(effect: Effect, simulator: HostSimulator, share: float = 1.0) -> Effect:
