@@ -23,7 +23,7 @@ import jsonargparse
 import yaml
 
 import simgap_yaml
-from sims.loading import not_found
+from sims.loading import in_file, not_found
 from sims.model_files import located, model_settings, names_model
 from sims.trust import check_file, named_packages, trusting
 
@@ -147,15 +147,17 @@ def _check_given(name: str, value: str) -> None:
     """
     if not name.startswith("--") or name == "--output":
         return
+    lacking = ""
     if value.endswith((".yaml", ".yml")):
         try:
             simgap_yaml.read(value)
         except ValueError as error:
             raise ValueError(f"{name} {error}") from None
-    elif name in _CLASSES and _IMPORT_PATH.fullmatch(value) and not Path(value).exists():
-        lacking = not_found(value)
-        if lacking:
-            raise ValueError(f"{name}: {lacking}")
+    elif name in _CLASSES:
+        path = _IMPORT_PATH.fullmatch(value) and not Path(value).exists()
+        lacking = in_file(value) or (not_found(value) if path else "")
+    if lacking:
+        raise ValueError(f"{name}: {lacking}")
 
 
 def _settings(source: str | Path) -> dict[str, Any] | None:
