@@ -13,9 +13,11 @@ import numpy as np
 
 from residual.calibration import NINETY_PERCENT
 from residual.corrected import CorrectedSimulator
-from sims.simulator import Array, Simulator, state_difference
+from sims.simulator import Array, Simulator, physical, state_difference
 
-HORIZONS = (0.25, 1.0)
+# In s; a slow system is forecast over at least so many periods, as a fast one is over more.
+_HORIZONS = (0.25, 1.0)
+_LEAST_STEPS = (5, 20)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,37 +27,48 @@ class Accuracy:
     Attributes:
         one_step: Per channel, RMS error of the predicted difference over the RMS of the true
             difference: 0 is perfect, 1 is as bad as no correction.
-        multi_step: Per horizon (key such as ``"1 s"``) and channel, RMS error of an open-loop
-            prediction over that of the uncorrected simulator.
+        multi_step: Per horizon (key such as ``"1 s"``, steps times control period) and channel,
+            RMS error of an open-loop prediction over that of the uncorrected simulator.
         multi_step_error: The same in the channel's unit.
         coverage90: Share of true differences inside the predicted 90 % interval, all channels
             together; None if the estimator predicts no spread.
+        gap: Per channel, RMS of the true difference over the RMS of what a step of the true
+            system changes: 0 where it does what the uncorrected simulator does.
     """
 
     one_step: dict[str, float]
     multi_step: dict[str, dict[str, float]]
     multi_step_error: dict[str, dict[str, float]]
     coverage90: float | None
+    gap: dict[str, float]
 
     def __repr__(self) -> str:
         errors = ", ".join(f"{name} {error:.2g}" for name, error in self.one_step.items())
         return f"Accuracy(one-step error as a share of the gap: {errors})"[:160]
 
 
+def usual_steps(dt: float) -> tuple[int, ...]:
+    """The usual horizons in steps: a quarter of a second and one, but at least 5 and 20 periods."""
+    pairs = zip(_HORIZONS, _LEAST_STEPS, strict=True)
+    return tuple(max(round(horizon / dt), least) for horizon, least in pairs)
+
+
 def accuracy_along(
     corrected: CorrectedSimulator,
-    states: Array,
-    actions: Array,
-    horizons: Sequence[float] = HORIZONS,
+    states: Array | Sequence[Array],
+    actions: Array | Sequence[Array],
+    horizons: Sequence[float] | None = None,
     stride: int = 1,
 ) -> Accuracy:
     """Accuracy along rollouts of the true system.
 
     Args:
         corrected: The idealised simulator with its difference model.
-        states: States the true system went through, shape (n, T + 1, n_s).
-        actions: Actions applied, shape (n, T, n_a).
-        horizons: Prediction horizons in s; one longer than the rollouts is left out.
+        states: States the true system went through: n rollouts, each of shape (T + 1, n_s); they
+            may differ in length.
+        actions: Actions applied, each of shape (T, n_a).
+        horizons: Prediction horizons in s, each at least a step; one longer than every rollout is
+            left out. By default those of ``usual_steps``.
         stride: Open-loop predictions start at every so many-th state that has the horizon
             ahead of it; more than 1 saves time with a slow simulator.
 
@@ -63,25 +76,28 @@ def accuracy_along(
         The errors.
     """
     names = [channel.name for channel in corrected.state_channels]
-    n_states, n_actions = states.shape[-1], actions.shape[-1]
-    before = states[:, :-1].reshape(-1, n_states)
-    held = actions.reshape(-1, n_actions)
-    after = states[:, 1:].reshape(-1, n_states)
+    before, held, after = (
+        np.concatenate(parts)
+        for parts in ([s[:-1] for s in states], list(actions), [s[1:] for s in states])
+    )
     truth = state_difference(
         corrected.state_channels, after, corrected.simulator.step(before, held)
     )
+    moved = state_difference(corrected.state_channels, after, before)
     predicted, spread = corrected.difference.predict(before, held, return_std=True)
     covered = None
     if spread is not None:
         covered = float(np.mean(np.abs(truth - predicted) <= NINETY_PERCENT * spread))
     relative, absolute = {}, {}
-    for horizon in horizons:
-        steps = round(horizon / corrected.dt)
-        if steps > actions.shape[1]:
+    dt = corrected.dt
+    wanted = usual_steps(dt) if horizons is None else [max(round(h / dt), 1) for h in horizons]
+    longest = max(len(one) for one in actions)
+    for steps in wanted:
+        if steps > longest:
             continue
         with_model = _horizon_error(corrected, states, actions, steps, stride)
         without = _horizon_error(corrected.simulator, states, actions, steps, stride)
-        key = f"{horizon:g} s"
+        key = f"{steps * dt:g} s"
         relative[key] = dict(zip(names, _ratio(with_model, without), strict=True))
         absolute[key] = dict(zip(names, with_model.tolist(), strict=True))
     return Accuracy(
@@ -89,6 +105,7 @@ def accuracy_along(
         multi_step=relative,
         multi_step_error=absolute,
         coverage90=covered,
+        gap=dict(zip(names, _ratio(_rms(truth), _rms(moved)), strict=True)),
     )
 
 
@@ -97,31 +114,42 @@ def uniform_rollouts(
 ) -> tuple[Array, Array]:
     """Rollouts of ``system`` from uniformly random states under uniformly random actions.
 
-    Angles are drawn from a whole turn, other states within 1.5 times their scale. The
-    comparison that shows why accuracy is measured where the policy goes.
+    Angles are drawn from a whole turn, other states within 1.5 times their scale; hidden memory
+    begins at rest. The comparison that shows why accuracy is measured where the policy goes.
 
     Returns:
-        States (rollouts, steps + 1, n_s) and actions (rollouts, steps, n_a).
+        States without hidden memory, shape (rollouts, steps + 1, n_s), and actions, shape
+        (rollouts, steps, n_a).
     """
-    reach = np.array([np.pi if c.angle else 1.5 * c.scale for c in system.state_channels])
+    channels = physical(system.state_channels)
+    reach = np.array([np.pi if c.angle else 1.5 * c.scale for c in channels])
     low = np.array([channel.low for channel in system.action_channels])
     high = np.array([channel.high for channel in system.action_channels])
     starts = rng.uniform(-reach, reach, (rollouts, len(reach)))
     actions = rng.uniform(low, high, (rollouts, steps, len(low)))
-    return system.rollout(starts, actions), actions
+    states = system.rollout(system.augment(starts), actions)
+    return states[:, :, : len(channels)], actions
 
 
 def _horizon_error(
-    model: Simulator, states: Array, actions: Array, steps: int, stride: int
+    model: Simulator,
+    states: Array | Sequence[Array],
+    actions: Array | Sequence[Array],
+    steps: int,
+    stride: int,
 ) -> Array:
     """RMS error per channel of ``model`` after ``steps`` open-loop steps, shape (n_s,)."""
-    starts = states[:, : states.shape[1] - steps : stride].reshape(-1, states.shape[-1])
-    windows = np.lib.stride_tricks.sliding_window_view(actions, steps, axis=1)[:, ::stride]
-    inputs = np.moveaxis(windows, -1, 2).reshape(-1, steps, actions.shape[-1])
-    reached = model.rollout(starts, inputs)[:, -1]
-    truth = states[:, steps::stride].reshape(-1, states.shape[-1])
+    starts, inputs, truth = [], [], []
+    for path, acted in zip(states, actions, strict=True):
+        if len(acted) < steps:
+            continue
+        windows = np.lib.stride_tricks.sliding_window_view(acted, steps, axis=0)[::stride]
+        starts.append(path[: len(path) - steps : stride])
+        inputs.append(np.moveaxis(windows, -1, 1))
+        truth.append(path[steps::stride])
+    reached = model.rollout(np.concatenate(starts), np.concatenate(inputs))[:, -1]
     # The model starts at the measured, unwrapped state, so whole turns must agree as well.
-    return _rms(reached - truth)
+    return _rms(reached - np.concatenate(truth))
 
 
 def _rms(rows: Array) -> Array:

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 
 from sims.render import Renderer, renderer_for
-from sims.simulator import Array, Channel, Simulator
+from sims.simulator import Array, Channel, Simulator, physical
 from sims.tasks import Task
 from sims.unsound import refuse_not_finite
 
@@ -23,7 +23,7 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     Observation: for every state channel in order, an angle as its cosine and sine, anything
     else divided by the channel's scale; memory channels and those that the motion does not
     depend on are hidden. Action: in the units of the action channels. ``info["state"]`` holds
-    the simulator's state, shape (n_s,).
+    the simulator's state, shape (n_s,), memory included; the task sees it without.
 
     Args:
         simulator: Nominal, true or corrected.
@@ -49,7 +49,7 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.simulator = simulator
         self.task = task
         self.render_mode = render_mode
-        fps = round(1 / simulator.dt)
+        fps = max(1, round(1 / simulator.dt))
         self.metadata = {"render_modes": ["rgb_array"], "render_fps": fps}
         self._renderer: Renderer | None = renderer_for(simulator) if render_mode else None
         low = np.array([channel.low for channel in simulator.action_channels])
@@ -94,8 +94,8 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         states = self._state[None]
         actions = np.clip(np.asarray(action, float)[None], *self._bounds)
         next_states = self.simulator.step(states, actions)
-        reward = float(self.task.reward(states, actions, next_states)[0])
-        terminated = bool(self.task.terminal(next_states)[0])
+        rewards, ends = judged(self.simulator, self.task, states, actions, next_states)
+        reward, terminated = float(rewards[0]), bool(ends[0])
         self._state = next_states[0]
         self._steps += 1
         truncated = self._steps >= self.task.horizon
@@ -109,6 +109,24 @@ class SimulatorEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _observe(self) -> np.ndarray:
         return observe(self.simulator, self._state[None], self._observed)[0]
+
+
+def judged(
+    simulator: Simulator, task: Task, states: Array, actions: Array, next_states: Array
+) -> tuple[Array, np.ndarray]:
+    """What a task says of transitions: it is shown the physical channels, never hidden memory.
+
+    Args:
+        simulator: Its channels name the columns.
+        task: Reward and termination.
+        states, actions, next_states: shape (n, n_s), (n, n_a), (n, n_s).
+
+    Returns:
+        Rewards, shape (n,), and whether the episode has failed, shape (n,).
+    """
+    seen = len(physical(simulator.state_channels))
+    reached = next_states[:, :seen]
+    return task.reward(states[:, :seen], actions, reached), task.terminal(reached)
 
 
 def observed_channels(

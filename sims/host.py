@@ -184,11 +184,11 @@ class HostSimulator(Simulator):
         return [e for e in self.effects if isinstance(e, Backlash) and not e.absent]
 
     def actuator_effects(self, actuator: str) -> list[ActuatorEffect]:
-        """The effects on one input that are not at zero strength."""
+        """The effects on one input, alone or with others, that are not at zero strength."""
         return [
             e
             for e in self.effects
-            if isinstance(e, ActuatorEffect) and e.actuator == actuator and not e.absent
+            if isinstance(e, ActuatorEffect) and actuator in e.actuators and not e.absent
         ]
 
     # -- one control period ---------------------------------------------------------------

@@ -8,6 +8,7 @@ import importlib
 import importlib.util
 import inspect
 import pydoc
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -224,6 +225,17 @@ def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
     except (jsonargparse.ArgumentError, TypeError) as error:
         lacking = not_found(value)
         raise ValueError(f"simulator {source}: {lacking or _one_line(error)}") from None
+
+
+def in_file(source: str) -> str:
+    """How to write what names a class by its file, ``arm.py:Arm``; or nothing if it does not."""
+    found = re.fullmatch(r"(.*[/\\])?(\w+)(?:\.py(?::(\w+))?|:(\w+))", source)
+    if not found:
+        return ""
+    folder, module, *kinds = found.groups()
+    start = f" and start Python in {folder}" if folder else ""
+    kind = next((kind for kind in kinds if kind), "CLASS")
+    return f"{source!r} is no import path; write {module}.{kind}{start}"
 
 
 def not_found(source: str | Mapping[str, Any]) -> str:

@@ -187,6 +187,11 @@ class Simulator(abc.ABC):
         return states, np.clip(actions, low, high)
 
 
+def physical(channels: tuple[Channel, ...]) -> tuple[Channel, ...]:
+    """State channels without the hidden memory of effects, which comes after all others."""
+    return tuple(channel for channel in channels if channel.kind != "memory")
+
+
 def as_rows(
     state_channels: tuple[Channel, ...],
     action_channels: tuple[Channel, ...],

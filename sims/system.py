@@ -14,13 +14,15 @@ from sims.environment import SimulatorEnv
 from sims.measured import MeasuredEnv, Measurement
 from sims.same_channels import check_same_channels, seen_as
 from sims.sampled import SampledEnv, StateOf
-from sims.simulator import Array, Channel, Simulator
+from sims.simulator import Array, Simulator, physical
 from sims.task_contract import refuse_unsound_task
 from sims.tasks import Task
 from sims.unsound import Unsound
 
 # Up to so many state channels are reported one by one, more by their kind.
 _FEW = 6
+#: Starts of a test on the true system where they differ.
+USUAL_STARTS = 5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,8 +40,10 @@ class EvaluationProtocol:
             chosen for one lucky path through the model's errors.
         finalists: So many of the best policies of a training are tested once more at its end.
         final_episodes: Rollouts of each of them, from other starts; 0 for no final.
-        true_episodes: Rollouts of the policy kept on the true system: the result.
-        visited_seconds: Accuracy is measured over the first seconds of fresh rollouts.
+        true_episodes: Rollouts of the policy kept on the true system: the result. All policies of
+            a seed begin in the same states. None: 5, or 1 where every reset gives the same state.
+        visited_seconds: Accuracy is measured over the first so many seconds of fresh rollouts, at
+            least 20 control periods.
         visited_rollouts: How many of those.
         visited_stride: Open-loop predictions start at every so many-th state of them.
     """
@@ -50,7 +54,7 @@ class EvaluationProtocol:
     noisy: int = 3
     finalists: int = 1
     final_episodes: int = 0
-    true_episodes: int = 1
+    true_episodes: int | None = None
     # Later a good policy balances, where there is next to nothing to predict.
     visited_seconds: float = 2.0
     visited_rollouts: int = 5
@@ -240,10 +244,4 @@ class System:
             "path": list(self.path or []),
             "target": self.target,
             "published": dict(self.published),
-            "starts": self.evaluation.true_episodes,
         }
-
-
-def physical(channels: tuple[Channel, ...]) -> tuple[Channel, ...]:
-    """Without the hidden memory of effects."""
-    return tuple(channel for channel in channels if channel.kind != "memory")

@@ -30,6 +30,7 @@ from residual.gap import GapResult, find_gap
 from residual.logs import LogData, LogFormat, read_logs
 from residual.step_check import advice
 from sims.contract import refuse_unsound
+from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
@@ -194,7 +195,12 @@ def holds(simulator: HostSimulator, hold: str | Mapping[str, Hold]) -> dict[str,
 
 def not_upstream(effects: Sequence[Effect], hold: Mapping[str, Hold]) -> tuple[Effect, ...]:
     """Effects without those whose consequence a measured input ("linear") holds already."""
-    return tuple(e for e in effects if not (e.upstream_of_sensor and hold.get(e.where) == "linear"))
+
+    def recorded(effect: Effect) -> bool:
+        inputs = effect.actuators if isinstance(effect, ActuatorEffect) else ()
+        return effect.upstream_of_sensor and any(hold.get(name) == "linear" for name in inputs)
+
+    return tuple(effect for effect in effects if not recorded(effect))
 
 
 def hosting(simulator: Simulator) -> HostSimulator:

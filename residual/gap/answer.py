@@ -35,6 +35,8 @@ from residual.trajectories import Trajectory
 
 #: Sets listed as evidence.
 EVIDENCE = 40
+#: Forecast error over that by noise alone up to which there may be no gap.
+NEAR_NOISE = 1.5
 #: Rise of the loss with inputs held the other way, as a share of it, that rules that out.
 OTHER_HOLD = 0.5
 
@@ -201,6 +203,12 @@ def verdicts(
         )
     elif not answer.key and left.adequate and not search.beside:
         made.append(no_gap_verdict("no gap above noise"))
+    elif not answer.key and not search.beside and within_noise(table):
+        made.append(
+            no_gap_verdict(
+                f"forecasts err no more than by noise; residuals are {left.ratio:.3g} times that"
+            )
+        )
     elif not left.adequate and (left.ratio > FOOTNOTE or not made):
         made.append(remainder_verdict(left, table, answer.leads))
     for number, taken in minor(answer).items():
@@ -208,6 +216,12 @@ def verdicts(
     if blind:
         made.append(blind_verdict(blind))
     return made
+
+
+def within_noise(table: Gap) -> bool:
+    """Whether forecasts of the nominal simulator err by no more than noise may."""
+    near = table.before.value <= NEAR_NOISE * table.noise_floor.value
+    return near and table.before.low <= table.noise_floor.high
 
 
 def minor(answer: Answer) -> dict[int, tuple[float, float, float]]:

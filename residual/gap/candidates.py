@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.samples import Samples
+from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect, Quantity
 from sims.effects.joint import JointEffect
 from sims.effects.library import typical
@@ -123,8 +124,9 @@ def candidates(
         for values in itertools.product(*(q.starts for q in whole.values())):
             fixed = effect.with_values(**dict(zip(whole, values, strict=True)))
             reach = 0.0
-            if effect.enters == "actuator" and effect.where in inputs:
-                reach = float(np.abs(samples.actions[:, inputs.index(effect.where)]).max())
+            if isinstance(effect, ActuatorEffect):
+                columns_of = [inputs.index(name) for name in effect.actuators]
+                reach = float(np.abs(samples.actions[:, columns_of]).max())
             found.append(_candidate(fixed, known, reach))
     return found
 

@@ -71,12 +71,13 @@ def choose(search: Search, enough: Callable[[Key], bool] = lambda _: False) -> C
 
 
 def _better_fit(search: Search, keys: list[Key]) -> Key:
-    """The set that forecasts best, or one that is as good within chance and fits better."""
+    """The set that forecasts best, or one that is as good within chance, of sizes that surprise
+    less, and fits better."""
     best = min(keys, key=search.error)
     near = [
         k for k in keys if as_good(search, k, best) and search.error(k) < NEAR * search.error(best)
     ]
-    return min(near or [best], key=lambda key: search.tried[key].merit)
+    return min(near or [best], key=lambda key: (search.surprises(key), search.tried[key].merit))
 
 
 def _smaller(search: Search, key: Key, among: list[Key]) -> list[Key]:

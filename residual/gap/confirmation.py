@@ -82,7 +82,12 @@ class Claim:
     def sure(self) -> bool:
         """Whether nothing speaks against it."""
         against = (self.bounded, self.calibration, self.brief, self.rivals, self.alike)
-        return self.needed and self.steady and self.sound and not any(against)
+        return self.needed and self.gains and self.steady and self.sound and not any(against)
+
+    @property
+    def gains(self) -> bool:
+        """Whether it takes a part of the gap off, whichever blocks of data are drawn."""
+        return self.share[1] >= 0
 
 
 def claims(

@@ -36,8 +36,6 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
         simulator: Gives the channels and the control period.
         trajectories: Measured runs.
     """
-    total = sum(float(t.times[-1] - t.times[0]) for t in trajectories)
-    longest = max(float(t.times[-1] - t.times[0]) for t in trajectories)
     step = float(np.median(np.concatenate([t.durations for t in trajectories])))
     periods = []
     for column, channel in enumerate(simulator.physical_channels):
@@ -53,9 +51,15 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
             periods.append(period)
     part = 2 * PART if simulator.has_contacts else PART
     wanted = part * float(np.median(periods)) if periods else 20 * simulator.dt
-    most = (1 - LEAD) * min(total / WINDOWS, longest)
+    most = longest_horizon(trajectories)
     least = STRIDE if simulator.has_contacts else (1 - LEAD) * SAMPLES
     return float(max(min(wanted, most), least * step))
+
+
+def longest_horizon(trajectories: Sequence[Trajectory]) -> float:
+    """The longest of which the records still hold enough windows, in s."""
+    lengths = [float(t.times[-1] - t.times[0]) for t in trajectories]
+    return (1 - LEAD) * min(sum(lengths) / WINDOWS, max(lengths))
 
 
 def _period(trajectories: Sequence[Trajectory], column: int, angle: bool) -> float:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from residual.gap.model import Model
 from residual.gap.samples import Samples
+from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
+from sims.effects.base import Effect
 from sims.effects.library import probes, shortly_after
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
@@ -47,16 +49,40 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
         small = ratio > FACTOR and _minor(given, effect.parameter, ratio)
         if not 1 / FACTOR <= ratio <= FACTOR and not small:
             return number, f"{effect.parameter} would be {ratio:.3g} times its nominal value"
+    once = _shows_once(host, samples, len(model.simulator.effects))
+    if once is not None:
+        return once, "the input reaches where it acts only once, so that nothing confirms it"
     before = Model(given).inputs(samples, np.zeros((1, 0)))[0]
     after = model.inputs(samples, theta[None])[0]
     for j, channel in enumerate(host.action_channels):
         usual = float(before[..., j, 0].std())
         left = float(after[..., j, 0].std())
         if usual > 0 and not THROUGH <= left / usual <= 1 / THROUGH:
-            where = [effect.effect.where for effect in model.chosen]
-            number = where.index(channel.name) if channel.name in where else len(where)
+            acting = [_acts_on(one.effect, channel.name) for one in model.chosen]
+            number = acting.index(True) if any(acting) else len(acting)
             return number, f"{channel.name} would have {left / usual:.2g} of its strength"
     return len(model.chosen), ""
+
+
+def _acts_on(effect: Effect, actuator: str) -> bool:
+    return isinstance(effect, ActuatorEffect) and actuator in effect.actuators
+
+
+def _shows_once(host: HostSimulator, samples: Samples, own: int) -> int | None:
+    """Which effect of an actuator shows in a single stretch of the data, if any.
+
+    What happens beyond the end of all other data can be fitted, but not forecast.
+    """
+    inputs = [channel.name for channel in host.action_channels]
+    for number, effect in enumerate(host.effects[own:]):
+        if not isinstance(effect, StaticActuatorEffect):
+            continue
+        columns = [inputs.index(name) for name in effect.actuators]
+        shown = [effect.shows(run.actions[:, c]) for run in samples.recorded for c in columns]
+        stretches = sum(int(s[0]) + int((s[1:] & ~s[:-1]).sum()) for s in shown)
+        if stretches == 1 and not all(s.all() for s in shown):
+            return number
+    return None
 
 
 def _minor(simulator: HostSimulator, parameter: str, ratio: float) -> bool:

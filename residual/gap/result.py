@@ -22,7 +22,7 @@ Kind = Literal[
 #: kind does as well.
 Doubt = Literal[
     "not_needed", "unsteady", "numerics", "at_bound", "calibration", "clock", "may_be_zero",
-    "rivals",
+    "share_may_be_zero", "rivals",
 ]  # fmt: skip
 
 

@@ -135,9 +135,11 @@ class Search:
     def fits_in(self, key: Key) -> bool:
         """Whether a set has few enough numbers for the windows there are, and each effect once.
 
-        A law beside its own special case is one law too many.
+        A law beside its own special case is one law too many, and so is a delay of two inputs
+        beside that of one of them.
         """
-        if any(self.contains(one, other) for one in key for other in key):
+        effects = [self.candidates[i].effect for i in key]
+        if any(one.covers(other) for one in effects for other in effects):
             return False
         return len(key) <= self.effort.most and self.numbers(key) <= self.most_numbers
 
@@ -145,6 +147,11 @@ class Search:
     def most_numbers(self) -> int:
         """How many numbers the windows are good for."""
         return max(3, len(self.fitter.blocks.windows) // 2)
+
+    def surprises(self, key: Key) -> int:
+        """Effects of a set that are larger than their kind usually is."""
+        bound = self.tried[key].model.bind(self.tried[key].theta).effects
+        return sum(effect.surprising for effect in bound[len(self.simulator.effects) :])
 
     def usable(self) -> list[Key]:
         """Sets that converged and may be right."""
@@ -267,8 +274,7 @@ class Search:
 
     def contains(self, one: int, other: int) -> bool:
         """Whether an effect is a special case of another at the same place."""
-        law, case = self.candidates[one].effect, self.candidates[other].effect
-        return case.name in law.special_cases and law.where == case.where
+        return self.candidates[one].effect.contains(self.candidates[other].effect)
 
     def family(self, number: int) -> str:
         """What effects that differ in form more than in kind have in common, and where."""

@@ -36,6 +36,8 @@ RIVALS = 4
 #: Squared residual that linear parameters promise a rival, over that of the chosen set, from which
 #: on it is not fitted with them: on a robot's logs the promise was right within a factor of 1.5.
 HOPELESS = 10.0
+#: Units of which the zero means nothing: of 298 K a share is no accuracy.
+ANY_ZERO = ("degC", "°C", "K", "degF", "°F")
 #: Parameters that are allowed for, those that matter most.
 MOST = 12
 
@@ -118,7 +120,7 @@ def within(search: Search, claim: Claim, tolerance: float) -> bool:
     effect = search.candidates[claim.number].effect
     if not isinstance(effect, ParameterChange):
         return False
-    size = tolerance * float(np.max(np.abs(search.simulator.parameters[effect.parameter].value)))
+    size = tolerance * _size(search, effect.parameter)
     (change,) = claim.numbers.values()
     return change.low < size and change.high > -size
 
@@ -150,8 +152,7 @@ def allowed(search: Search, tolerance: float) -> list[Candidate]:
     found, reach = [], []
     for candidate in candidates(simulator, changes, search.fitter.samples):
         assert isinstance(candidate.effect, ParameterChange)
-        value = simulator.parameters[candidate.effect.parameter].value
-        most = tolerance * float(np.max(np.abs(value)))
+        most = tolerance * _size(search, candidate.effect.parameter)
         (knob,) = candidate.knobs
         if most > 0:
             bounded = dataclasses.replace(
@@ -166,6 +167,19 @@ def allowed(search: Search, tolerance: float) -> list[Candidate]:
     trials = np.array([candidate.trials[0].values[0, 0] for candidate in found])
     matters = np.linalg.norm(columns, axis=(0, 1)) * np.array(reach) / np.abs(trials)
     return [found[i] for i in np.sort(np.argsort(-matters)[:MOST])]
+
+
+def _size(search: Search, parameter: str) -> float:
+    """What a parameter is known to a share of: its value, or, where zero means nothing, the range
+    over which the log has that quantity."""
+    known = search.simulator.parameters[parameter]
+    value = float(np.max(np.abs(known.value)))
+    if known.unit not in ANY_ZERO:
+        return value
+    samples, channels = search.fitter.samples, search.simulator.physical_channels
+    columns = [c for c in samples.measured if channels[c].unit in ANY_ZERO]
+    spans = [float(np.ptp(seen[np.isfinite(seen)])) for seen in samples.seen[:, columns].T]
+    return min(value, max(spans)) if spans else value
 
 
 @dataclasses.dataclass(frozen=True)

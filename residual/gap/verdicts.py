@@ -104,6 +104,8 @@ def effect_verdict(
         says.append("its size is at its bound")
     if vanishes:
         says.append("its size may be zero")
+    if not claim.gains:
+        says.append("its share of the gap may be zero")
     return Verdict(
         kind, effect.name, effect.where, claim.numbers,
         tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
@@ -122,6 +124,7 @@ def doubts(claim: Claim, vanishes: bool) -> tuple[Doubt, ...]:
         "calibration": claim.calibration,
         "clock": claim.brief,
         "may_be_zero": vanishes,
+        "share_may_be_zero": not claim.gains,
         "rivals": bool(claim.rivals or claim.alike),
     }
     return tuple(doubt for doubt, there in why.items() if there)

@@ -251,8 +251,16 @@ def _jumps_by_360(signal: Signal) -> bool:
 
 
 def _speeds(times: Array, values: Array, span: int = 3) -> Array:
-    """Mean speeds over ``span`` samples: noise counts less, and a fast swing still shows."""
+    """Mean speeds over ``span`` samples: noise counts less, and a fast swing still shows.
+
+    Time stamps that come late, and then in a bunch, make nothing fast, and neither does an angle
+    that is cut at half a turn.
+    """
     good = np.isfinite(values)
     times, values = times[good], values[good]
+    if values.size and np.abs(values).max() < 1.01 * np.pi:
+        values = np.unwrap(values)
     span = min(span, max(1, len(times) // 4))
-    return np.abs(values[span:] - values[:-span]) / (times[span:] - times[:-span])
+    passed = times[span:] - times[:-span]
+    passed = np.maximum(passed, np.median(passed)) if len(passed) else passed
+    return np.abs(values[span:] - values[:-span]) / passed

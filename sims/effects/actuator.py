@@ -9,12 +9,18 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sims.effects.base import Effect, number, place
 from sims.effects.joint import Value
+from sims.simulator import Array
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
+
+
+#: Between the names of inputs on which one effect acts alike.
+AND = " and "
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,6 +31,7 @@ class ActuatorEffect(Effect):
     bias, dead zone, saturation (an amplifier and its output stage), then delay, then lag.
 
     Attributes:
+        actuator: The input, or several of one unit on which it acts alike, ``"left and right"``.
         stage: Rank in that order.
     """
 
@@ -33,11 +40,24 @@ class ActuatorEffect(Effect):
     enters: ClassVar = "actuator"
     stage: ClassVar[int]
 
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """The inputs that it acts on."""
+        return tuple(self.actuator.split(AND))
+
+    def covers(self, other: Effect) -> bool:
+        """Also the same effect on some of its inputs."""
+        part = isinstance(other, ActuatorEffect) and set(other.actuators) < set(self.actuators)
+        return super().covers(other) or (part and other.name == self.name)
+
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of the input, and the control period."""
         inputs = {channel.name: channel for channel in simulator.action_channels}
-        channel = place("actuator", self.actuator, inputs)
-        return {"input": (channel.unit, channel.scale), "time": ("s", simulator.dt)}
+        channels = [place("actuator", name, inputs) for name in self.actuators]
+        units = dict.fromkeys(channel.unit for channel in channels)
+        if len(units) > 1:
+            raise ValueError(f"{self.actuator!r} are inputs of several units: {', '.join(units)}")
+        return {"input": (channels[0].unit, channels[0].scale), "time": ("s", simulator.dt)}
 
 
 class StaticActuatorEffect(ActuatorEffect):
@@ -46,6 +66,10 @@ class StaticActuatorEffect(ActuatorEffect):
     @abc.abstractmethod
     def shape(self, u: Value) -> Value:
         """What the actuator receives for the command ``u``, by row."""
+
+    def shows(self, u: Array) -> NDArray[np.bool_]:
+        """Where it changes the command beyond what other effects of the actuator do, by row."""
+        return np.ones(np.shape(u), bool)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -115,6 +139,10 @@ class Saturation(StaticActuatorEffect):
     def shape(self, u: Value) -> Value:
         """The command, cut."""
         return np.clip(u, -self.level, self.level)
+
+    def shows(self, u: Array) -> NDArray[np.bool_]:
+        """Where the command goes beyond the level."""
+        return np.abs(u) > self.level
 
 
 @dataclasses.dataclass(frozen=True)

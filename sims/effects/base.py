@@ -138,6 +138,20 @@ class Effect(abc.ABC):
         """The joint, actuator, channel or parameter that it acts on."""
         return getattr(self, dataclasses.fields(self)[0].name)
 
+    @property
+    def surprising(self) -> bool:
+        """Whether it is larger than its kind usually is, so that what explains as much and is not
+        comes first."""
+        return False
+
+    def contains(self, other: Effect) -> bool:
+        """Whether another effect is a special case of it at the same place."""
+        return other.name in self.special_cases and self.where == other.where
+
+    def covers(self, other: Effect) -> bool:
+        """Whether another effect beside it would be there twice."""
+        return self.contains(other)
+
     @classmethod
     def numbers(cls) -> tuple[str, ...]:
         """Names of the numeric fields."""

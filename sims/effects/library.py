@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sims.effects.actuator import (
+    AND,
     ActuatorBias,
     ActuatorGain,
     ActuatorLag,
@@ -54,6 +55,10 @@ JOINT_EFFECTS: tuple[type[Effect], ...] = (
     Backlash,
 )
 ACTUATOR_EFFECTS = (ActuatorGain, ActuatorBias, DeadZone, Saturation, Delay, ActuatorLag)
+#: What inputs of one kind have in common: amplifiers, motors and links of one make.
+SHARED_EFFECTS = (ActuatorGain, DeadZone, Saturation, Delay, ActuatorLag)
+#: Most inputs that have something in common.
+ROTORS = 4
 SENSOR_EFFECTS = (SensorOffset, SensorScale)
 
 
@@ -67,6 +72,8 @@ def library(simulator: HostSimulator) -> tuple[Effect, ...]:
         places += [(effect, joint.name) for effect in JOINT_EFFECTS]
     for channel in simulator.action_channels:
         places += [(effect, channel.name) for effect in ACTUATOR_EFFECTS]
+    for names in like_inputs(simulator):
+        places += [(effect, AND.join(names)) for effect in SHARED_EFFECTS]
     for channel in simulator.physical_channels:
         places += [(effect, channel.name) for effect in SENSOR_EFFECTS]
     places += [(ParameterChange, name) for name in simulator.parameters]
@@ -84,6 +91,19 @@ def library(simulator: HostSimulator) -> tuple[Effect, ...]:
         }
         found.append(effect.with_values(**typical))
     return tuple(found)
+
+
+def like_inputs(simulator: HostSimulator) -> list[tuple[str, ...]]:
+    """Names of two to four inputs with the same unit, finite bounds, scale and hold, by kind.
+
+    So many wheels, thrusters or rotors are of one make. Without bounds nothing says so, and more
+    inputs are the joints of a robot, of which each has an actuator and a load of its own.
+    """
+    kinds: dict[tuple[object, ...], list[str]] = {}
+    for c in simulator.action_channels:
+        if np.isfinite([c.low, c.high]).all():
+            kinds.setdefault((c.unit, c.low, c.high, c.scale, c.hold), []).append(c.name)
+    return [tuple(names) for names in kinds.values() if 1 < len(names) <= ROTORS]
 
 
 def typical(effect: Effect, simulator: HostSimulator, share: float = 1.0) -> Effect:
@@ -140,7 +160,9 @@ def exact_aliases(
             says = f"{', '.join(twins)}: the same motion, no data tells which"
             found.append(Alias(tuple(twins), says))
     sets: list[set[str]] = []
-    involved = _in_null_space({name: columns[name] for name in alike}, blurs)
+    # What acts on several inputs alike is no news as the sum of what acts on each.
+    single = [name for name in alike if AND not in name]
+    involved = _in_null_space({name: columns[name] for name in single}, blurs)
     for size in range(3, most + 1):
         for names in itertools.combinations(involved, size):
             if any(known <= set(names) for known in sets):

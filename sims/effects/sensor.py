@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 #: Ranges of the readings by which zero lies outside them where a scale about zero means nothing.
 FAR = 5.0
+#: Share by which the scale of a sensor is seldom wrong: a wrong unit or gear is, but more often
+#: what moves is larger or smaller.
+USUAL = 0.2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,6 +96,11 @@ class SensorScale(SensorEffect):
     sentence: ClassVar[str] = "The sensor's scale is wrong: it reads a fixed share too much."
     needs: ClassVar[str] = "a wide range of positions"
     stage: ClassVar[int] = 0
+
+    @property
+    def surprising(self) -> bool:
+        """Whether it is more than a matter of calibration."""
+        return bool(np.max(np.abs(self.scale)) > USUAL)
 
     def read(self, x: Value) -> Value:
         """Reading."""

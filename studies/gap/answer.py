@@ -35,6 +35,7 @@ DOUBTS: dict[Doubt, str] = {
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
     "may_be_zero": "its interval holds zero",
+    "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
     "calibration": "parameters that are a few percent off would do nearly as well",
     "rivals": "an effect of another kind does nearly as well",
 }

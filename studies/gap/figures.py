@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ from studies.reporting.figures import (
 )
 
 NARROW = 4.0
+#: Letters of a name on one line beside a bar.
+LONGEST_NAME = 22
 
 
 @styled()
@@ -46,7 +49,7 @@ def shrinking(result: GapResult, path: Path | None = None) -> Drawing:
             va="center", color="white" if inside else INK, fontsize=9,
         )  # fmt: skip
     axis.axvline(gap.noise_floor.value, color=GREEN, linestyle=(0, (4, 3)), label="noise floor")
-    axis.set_yticks(range(len(rows)), [name for name, _ in rows])
+    axis.set_yticks(range(len(rows)), [textwrap.fill(name, LONGEST_NAME) for name, _ in rows])
     axis.set(ylim=(len(rows) - 0.5, -0.5), xlim=(0, 1.06 * top))
     axis.set_xlabel(f"error of {gap.channel}" + (f" ({gap.unit})" if gap.unit else ""))
     axis.grid(axis="y", visible=False)

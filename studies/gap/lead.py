@@ -20,6 +20,10 @@ from studies.gap.words import (
 
 #: Rivals that are listed.
 FEW_RIVALS = 2
+#: Part of the gap that calibrated parameters take off alone, below which they only serve the rest.
+TRIFLE = 0.05
+#: Error on records set aside, over that of the nominal simulator, from which on it is worse.
+WORSE = 1.05
 
 
 def lead(result: GapResult, tolerance: float | None = None) -> str:
@@ -37,28 +41,46 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
         return f"Nothing that matters: the {ahead(gap)} is {before}, allowed is {allowed}.{smaller}"
     kinds = {verdict.kind for verdict in result.verdicts}
     if kinds & {"confirmed", "ambiguous", "calibrated"}:
-        return f"{capitalized(percent(gap.share.value))} of the gap is {_what(result)}."
+        share = f"{capitalized(percent(gap.share.value))} of the gap is {_what(result)}."
+        return share + _but_worse_apart(result)
     if "unexplained" in kinds:
         return f"The gap has no name: the {ahead(gap)} is {before}."
     floor = quantity_text(gap.noise_floor.value, gap.unit)
     return f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
 
 
+def _but_worse_apart(result: GapResult) -> str:
+    """What speaks against the corrected simulator on the records that were set aside, if it is
+    worse there."""
+    apart = result.held_out
+    if apart is None or apart.after.value <= WORSE * apart.before.value:
+        return ""
+    before, after = (quantity_text(s.value, apart.unit) for s in (apart.before, apart.after))
+    return (
+        f" But it does not hold on the records set aside, where the corrected simulator is worse: "
+        f"the {ahead(apart)} is {after}, the nominal one's {before}."
+    )
+
+
 def _what(result: GapResult) -> str:
     """What the gap is made of, certain names first."""
     certain = [v for v in result.verdicts if v.kind == "confirmed"]
     others = [v for v in result.verdicts if v.kind == "ambiguous"]
+    moved = [verdict for verdict in result.verdicts if verdict.kind == "calibrated"]
     words = _by_place([_briefly(verdict, result) for verdict in certain])
-    if any(verdict.kind == "calibrated" for verdict in result.verdicts):
+    beside = ""
+    if moved and (moved[0].share.value > TRIFLE or not (certain or others)):
         words.append("parameters that are off within their tolerance")
+    elif moved:
+        beside = ", beside parameters that are moved within their tolerance"
     sure = listed(words)
     if not others:
-        return sure
+        return sure + beside
     if len(others) == 1:
         doubtful = _with_rivals(others[0], result)
     else:
         doubtful = "perhaps " + listed(_by_place([_briefly(v, result) for v in others]))
-    return f"{sure} and {doubtful}" if sure else doubtful
+    return (f"{sure} and {doubtful}" if sure else doubtful) + beside
 
 
 def _briefly(verdict: Verdict, result: GapResult) -> str:

@@ -20,7 +20,7 @@ from studies.learning.trial import code_of_trial, run_trial
 from studies.learnt.films import write_films
 from studies.learnt.report import read_episodes, write_report
 from studies.learnt.tables import write_tables
-from studies.running.command import check_output, fail, guarded
+from studies.running.command import check_output, fail, guarded, users_code
 from studies.running.curves import Curves
 from studies.running.grids import expand_grid
 from studies.running.progress import Bars, Several
@@ -58,7 +58,8 @@ def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
     try:
         study.system_of(instantiate(study, settings)).check()
     except ValueError as error:
-        fail(str(error))
+        place = users_code(error)
+        fail(f"{error} ({place})" if place else str(error))
     check_output(output or home)
     if execution.backend != "local" and not grid:
         fail(

@@ -9,13 +9,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
 from sklearn.base import BaseEstimator
 
-from policy.evaluate import collect, rollout
+from policy.evaluate import collect
 from policy.learner import Algorithm
 from policy.selection import Point
-from residual.accuracy import accuracy_along, uniform_rollouts
 from residual.corrected import CorrectedSimulator
 from residual.difference import DifferenceModel
 from residual.measured import fit_measured
@@ -26,9 +24,10 @@ from sims.simulator import Simulator
 from sims.system import System
 from studies.learning.described import modules_in, settings_of
 from studies.learning.fingerprint import fingerprint
+from studies.learning.measuring import anywhere, where_it_goes
 from studies.learning.results import Measured, Model, Samples
 from studies.learning.streams import seeded, stream
-from studies.learning.training import Training, exploration, train, transitions, visited
+from studies.learning.training import Training, exploration, train, transitions
 from studies.learning.warm_start import Recorder, ReplayRule, WarmStart
 
 if TYPE_CHECKING:
@@ -232,7 +231,9 @@ class Steps:
                 recorder or env,
                 tested,
                 steps,
-                lambda purpose: stream(self.seed, purpose, kind, update),
+                stream(self.seed, "select", kind, update),
+                # Of no kind and no update: what differs between policies is not where they began.
+                stream(self.seed, "test starts"),
                 report,
                 on_true,
                 RANDOM_STEPS if start is None else 0,
@@ -246,28 +247,11 @@ class Steps:
         return dataclasses.replace(done, simulated=taken, summary=done.summary | {"held": held})
 
     def _measure(self, model: Model, policy: Training, update: int) -> Measured:
-        system, protocol = self.system, self.system.evaluation
-        seed = stream(self.seed, "measure", update)
-        corrected = self._corrected(model)
-        env = system.true_environment(corrected)
-        steps = max(1, round(protocol.visited_seconds / corrected.dt))
-        runs = [rollout(policy.policy, env, seed, max_steps=steps)]
-        runs += [
-            rollout(
-                policy.policy, env, seed + k, exploration(system, self.algorithm, seed + k), steps
-            )
-            for k in range(1, protocol.visited_rollouts)
-        ]
-        # A run that fell ends early; all are cut to the shortest so that they stack.
-        shortest = min(len(run.rewards) for run in runs)
-        states = np.stack([visited(system, run)[: shortest + 1] for run in runs])
-        actions = np.stack([run.actions[:shortest] for run in runs])
-        stride = protocol.visited_stride
-        found = {"visited": accuracy_along(corrected, states, actions, stride=stride)}
-        if self.system.elsewhere or isinstance(system.true, Simulator):
-            rng = np.random.default_rng(stream(self.seed, "elsewhere", update))
-            draw = system.elsewhere or (lambda rng: uniform_rollouts(system.true, rng))  # type: ignore[arg-type]
-            found["uniform"] = accuracy_along(corrected, *draw(rng), stride=stride)
+        corrected, acting = self._corrected(model), policy.policy
+        seed, elsewhere = (stream(self.seed, name, update) for name in ("measure", "elsewhere"))
+        found = {"visited": where_it_goes(self.system, self.algorithm, acting, corrected, seed)}
+        if accuracy := anywhere(self.system, corrected, elsewhere):
+            found["uniform"] = accuracy
         return Measured(jsonable(found))
 
     def _corrected(self, model: Model) -> CorrectedSimulator:

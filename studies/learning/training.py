@@ -19,7 +19,7 @@ from policy.selection import Point, learn_and_select
 from residual.trajectories import Transitions
 from simgap_npz import read_npz, write_npz
 from sims.simulator import Array, Simulator
-from sims.system import System
+from sims.system import USUAL_STARTS, System
 from studies.learning.streams import stream
 from studies.learning.warm_start import Simulated
 
@@ -40,7 +40,7 @@ class Training:
         learner: With the networks of the policy that was kept.
         curve: Tests while it learnt, in the environment that it learnt in.
         summary: ``simulated_steps``, ``updates``, ``return_model``, ``seconds``, ``return_true``,
-            and, if asked for, ``tests`` with measures of every test on the true system.
+            and ``tests``, every test on the true system with what is measured of it.
         episode: One episode on the true system: ``states``, ``actions`` and ``rewards``.
         simulated: The transitions it learnt from, if they are to be learnt from again.
         key: Of the step that it was kept as.
@@ -92,7 +92,8 @@ def train(
     env: gymnasium.Env,
     tested: gymnasium.Env,
     steps: int,
-    seed: Callable[[str], int],
+    seed: int,
+    starts: int,
     tell: Callable[[Point], None],
     on_true: bool = False,
     random_steps: int = 0,
@@ -106,7 +107,8 @@ def train(
         env: To learn in.
         tested: Another one like it.
         steps: Of the environment.
-        seed: Seed by purpose: ``"select"`` and ``"test"``.
+        seed: Of the tests while it learns.
+        starts: Of the starts on the true system, the same for policies that are to be compared.
         tell: Told every test.
         on_true: Whether the environment is the true system: then the test is the measure itself.
         random_steps: The first so many actions are random.
@@ -120,7 +122,7 @@ def train(
         steps,
         every=protocol.every_true if on_true else protocol.every,
         noisy=0 if on_true else protocol.noisy,
-        seed=seed("select"),
+        seed=seed,
         callback=tell,
         random_steps=random_steps,
         episodes=protocol.episodes,
@@ -138,25 +140,48 @@ def train(
         ),
         "seconds": seconds,
     }
-    tests, episode = test_on_truth(system, learner.policy, seed("test"), believed)
+    tests, episode = test_on_truth(system, learner.policy, starts, believed)
     return Training(learner, selection.curve, summary | tests, episode)
 
 
 def test_on_truth(
     system: System, policy: Policy, seed: int, believed: Simulator | None = None
 ) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Rollouts on the true system: mean return and measures, and the first rollout."""
+    """Rollouts on the true system, each from a start of its own.
+
+    Args:
+        system: Says how many, and what is measured.
+        policy: Acts without noise.
+        seed: Of the first reset; the others count on from it. Policies tested with one seed begin
+            in the same states.
+        believed: Makes a state of what the true system's sensors show, see ``System``.
+
+    Returns:
+        Their mean return and every test, and the first rollout.
+    """
     env = system.true_environment(believed)
-    runs = [rollout(policy, env, seed + k) for k in range(system.evaluation.true_episodes)]
-    result: dict[str, Any] = {"return_true": float(np.mean([run.total for run in runs]))}
-    if system.measures:
-        result["tests"] = [
-            {"return": run.total, **system.measures(visited(system, run), run.actions)}
-            for run in runs
-        ]
+    runs = [rollout(policy, env, seed + k) for k in range(_starts(system, env, seed))]
+    measure = system.measures or (lambda states, actions: {})
+    tests = []
+    for run in runs:
+        states = visited(system, run)
+        test: dict[str, Any] = {"start": states[0].tolist(), "return": run.total}
+        tests.append(test | dict(measure(states, run.actions)))
+    result: dict[str, Any] = {
+        "return_true": float(np.mean([run.total for run in runs])),
+        "tests": tests,
+    }
     first = runs[0]
     episode = {"states": visited(system, first), "actions": first.actions}
     return result, episode | {"rewards": first.rewards}
+
+
+def _starts(system: System, env: gymnasium.Env, seed: int) -> int:
+    """How many starts a test on the true system has."""
+    if system.evaluation.true_episodes is not None:
+        return system.evaluation.true_episodes
+    one, other = (env.reset(seed=seed + k)[1]["state"] for k in range(2))
+    return 1 if np.array_equal(one, other) else USUAL_STARTS
 
 
 def exploration(system: System, algorithm: Algorithm, seed: int) -> OrnsteinUhlenbeck:

@@ -19,7 +19,7 @@ from policy.learner import Learner
 from policy.replay import Seen
 from residual.corrected import CorrectedSimulator
 from residual.difference import DifferenceModel
-from sims.environment import SimulatorEnv, observe
+from sims.environment import SimulatorEnv, judged, observe
 from sims.simulator import Array
 
 if TYPE_CHECKING:
@@ -89,15 +89,9 @@ class WarmStart:
                     following = simulator.step(states, actions)
                 elif self.rule == "all" and isinstance(simulator, CorrectedSimulator):
                     following = simulator.correct(states, actions, following)
-                learner.remember(
-                    Seen(
-                        observe(simulator, states),
-                        actions,
-                        task.reward(states, actions, following),
-                        observe(simulator, following),
-                        task.terminal(following),
-                    )
-                )
+                rewards, ends = judged(simulator, task, states, actions, following)
+                seen, after = observe(simulator, states), observe(simulator, following)
+                learner.remember(Seen(seen, actions, rewards, after, ends))
                 done += len(states)
                 tell(done)
 

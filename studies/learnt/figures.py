@@ -18,8 +18,8 @@ from studies.reporting.figures import PALETTE, draw_lines, draw_over_time, new_f
 
 Drawn = tuple[Figure, pd.DataFrame]
 
-#: So much of an episode is drawn, in s.
-SECONDS = 10.0
+# So much of an episode is drawn, in s, and of a slow system at least so many control periods.
+_SECONDS, _LEAST_STEPS = 10.0, 100
 #: Errors below are drawn here, or a model without error would flatten all others.
 LEAST_SHOWN = 1e-5
 _DASHED: Any = {"color": "#6e7781", "linestyle": (0, (4, 3)), "linewidth": 1.2}
@@ -78,6 +78,11 @@ def curves_figure(results: Results) -> Drawn:
     return figure, pd.DataFrame(rows)
 
 
+def drawn_steps(dt: float) -> int:
+    """How many steps of an episode are drawn over time."""
+    return max(round(_SECONDS / dt), _LEAST_STEPS)
+
+
 @styled()
 def episodes_figure(
     about: Mapping[str, Any], episodes: Mapping[str, Mapping[str, np.ndarray]]
@@ -89,7 +94,7 @@ def episodes_figure(
         episodes: ``states`` and ``actions`` by name of the policy.
     """
     names = [channel["name"] for channel in about["states"]]
-    steps = round(SECONDS / about["dt"])
+    steps = drawn_steps(about["dt"])
     wanted: list[tuple[str, int, dict[str, Any]]] = [
         ("states", names.index(name), about["states"][names.index(name)]) for name in about["shown"]
     ]

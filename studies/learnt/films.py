@@ -14,7 +14,8 @@ from sims.simulator import Simulator
 from studies.learnt.report import read_episodes
 from studies.reporting.media import encode_gif
 
-SECONDS = 6.0
+# So much of an episode is filmed, in s, and of a slow system at least so many control periods.
+_SECONDS, _LEAST_STEPS = 6.0, 60
 _FRAME = 0.05  # s between pictures, if the control period is shorter
 _SHOWN = ("idealised", "corrected", "true")
 
@@ -36,8 +37,8 @@ def write_films(results: Mapping[str, Any], folder: Path, simulator: Simulator) 
 
 
 def film(simulator: Simulator, states: np.ndarray) -> bytes:
-    """The first seconds of an episode, shape (T + 1, n_s), as a GIF."""
+    """The first seconds of an episode, shape (T + 1, n_s), or all of a short one, as a GIF."""
     draw = renderer_for(simulator).frame
     stride = max(1, round(_FRAME / simulator.dt))
-    steps = min(len(states), round(SECONDS / simulator.dt))
+    steps = max(round(_SECONDS / simulator.dt), _LEAST_STEPS)
     return encode_gif([draw(state) for state in states[:steps:stride]], stride * simulator.dt)

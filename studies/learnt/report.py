@@ -11,9 +11,9 @@ import yaml
 
 from simgap_npz import read_npz
 from studies.learnt.figures import (
-    SECONDS,
     budgets_figure,
     curves_figure,
+    drawn_steps,
     episodes_figure,
     path_figure,
     updates_figure,
@@ -21,12 +21,13 @@ from studies.learnt.figures import (
 from studies.learnt.samples_needed import samples_section
 from studies.learnt.sections import (
     accuracy_section,
-    headline,
+    legend,
     policies_once,
     policies_section,
     summarise,
 )
 from studies.learnt.tables import apart, tables_of
+from studies.learnt.verdict import headline
 from studies.learnt.words import Results, by_name, measures_of, policy_name, record_key
 from studies.reporting import Animation, Code, Figure, Gallery, KeyValues, Report, Section
 from studies.reporting.figures import save_figure
@@ -65,7 +66,7 @@ def write_report(
         name: Of the page.
 
     Returns:
-        The table of the policies as text.
+        The table of the policies as text, and what its columns mean.
     """
     about = results[0]["about"]
     rows, errors = tables_of(results)
@@ -92,7 +93,8 @@ def write_report(
         drawings.append((
             "trajectories", episodes_figure(about, drawn), "Episodes on the true system",
             "State and action over time for each policy on the true system.",
-            f"The first {SECONDS:g} s on the true system; a line ends where its episode ends.",
+            f"The first {drawn_steps(about['dt']) * about['dt']:.4g} s on the true system; a line "
+            "ends where its episode ends.",
         ))  # fmt: skip
         if about.get("path"):
             drawings.append((
@@ -126,7 +128,7 @@ def write_report(
         save_figure(figure, folder / "figures" / f"{file}.png", numbers)
         sections.append(Figure(figure, alt, caption, heading=heading))
     sections += [
-        policies_section(summary, about, best),
+        policies_section(summary, once, best),
         *accuracy_section(errors, about),
         *samples_section(once, apart(results), about),
         *_provenance(results),
@@ -140,7 +142,8 @@ def write_report(
     Report(title, subtitle, sections).write(folder / name)
     # What others published makes lines too long for a terminal.
     told = summary.drop(columns="published", errors="ignore")
-    return told.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
+    table = told.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
+    return "\n".join([table, "", *legend(summary, once)])
 
 
 def _shown(results: Results) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Verdict and tables over one trial or many, of any system."""
+"""The tables of a report over one trial or many, of any system."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from studies.learnt.errors import by_group, model_errors
+from studies.learnt.pairs import above, starts
 from studies.learnt.statistics import Mean, mean
-from studies.learnt.words import NEAR, POLICY_WORDS, duration, grouped
-from studies.reporting import KeyValues, Section, Table, Verdict
+from studies.learnt.words import POLICY_WORDS, duration
+from studies.reporting import Section, Table
 
 About = Mapping[str, Any]
-_PLACE = ["true_samples", "estimator", "iteration"]
 
 
 def policies_once(rows: pd.DataFrame) -> pd.DataFrame:
@@ -64,7 +65,7 @@ def summarise(
         if name == "difference" and len(errors):
             seen = model_errors(errors, estimator, samples, update)
             row |= {
-                "error": float(_by_group(seen, "one_step", about).mean(axis=1).mean()),
+                "error": float(by_group(seen, "one_step", about).mean(axis=1).mean()),
                 "in 90 %": round(seen["coverage90"].astype(float).mean(), 3),
                 "fit s": round(float(seen["fit_seconds"].mean()), 2),
             }
@@ -76,132 +77,55 @@ def summarise(
     return pd.DataFrame(table)
 
 
-def model_errors(errors: pd.DataFrame, estimator: str, samples: int, update: int) -> pd.DataFrame:
-    """The errors of one difference model where the policy goes, one row for each seed."""
-    if errors.empty:
-        return errors
-    wanted = {"where": "visited", "estimator": estimator, "true_samples": samples,
-              "iteration": update}  # fmt: skip
-    return errors[(errors[list(wanted)] == pd.Series(wanted)).all(axis=1)]
+def legend(summary: pd.DataFrame, once: pd.DataFrame) -> list[str]:
+    """What the columns of ``summarise`` mean, a sentence for each that needs one.
 
-
-def policies_section(summary: pd.DataFrame, about: About, best: float | None) -> Table:
-    """What ``summarise`` found."""
-    seeds = "mean over seeds with its 95 % interval" if "seeds" in summary else "of one seed"
-    starts = f", each the mean of {about['starts']} starts" if about["starts"] > 1 else ""
-    known = f" The best return that is possible is {best:.0f}." if best is not None else ""
-    caption = f"Returns: {seeds}{starts}.{known}"
+    Args:
+        summary: What it found.
+        once: The policies that it was given.
+    """
+    several, tested = "seeds" in summary, starts(once)
+    seeds = "mean over seeds with its 95 % interval" if several else "of one seed"
+    each = f", each the mean of {tested} starts, the same for all policies" if tested > 1 else ""
+    says = [f"Returns: {seeds}{each}."]
     if "above control" in summary:
-        caption += (
-            " Above control: seed by seed, less what as much training without a difference model "
+        pairs = "seed by seed" if several else "start by start" if tested > 1 else "the return"
+        says.append(
+            f"Above control: {pairs}, less what as much training without a difference model "
             "returns."
         )
     if "error" in summary:
-        caption += (
-            " Error: of one step where the policy goes, as a share of the gap, mean over the "
-            "groups of channels; in 90 %: share of the truth inside the predicted 90 % interval."
-        )
+        says += [
+            "Error: of one step where the policy goes, as a share of the gap (1 is as bad as no "
+            "model), mean over the groups of channels.",
+            "In 90 %: share of the truth inside the predicted 90 % interval.",
+        ]
+    return says
+
+
+def policies_section(summary: pd.DataFrame, once: pd.DataFrame, best: float | None) -> Table:
+    """What ``summarise`` found."""
+    known = [f"The best return that is possible is {best:.0f}."] if best is not None else []
+    caption = " ".join([*legend(summary, once), *known])
     return Table.of(summary, heading="Policies", caption=caption, digits=2)
-
-
-def above(learnt: pd.DataFrame, control: pd.DataFrame) -> list[float]:
-    """Return less that of the control, for every seed that has both."""
-    one, other = (part.set_index("seed")["return_true"] for part in (learnt, control))
-    return [float(value) for value in (one - other).dropna()]
-
-
-def headline(
-    once: pd.DataFrame, errors: pd.DataFrame, about: About, best: float | None
-) -> list[Section]:
-    """Did it work on every seed, was it the difference model's doing, and in which numbers?"""
-    kinds = {str(name): part for name, part in once.groupby("name")}
-    before = kinds["idealised"].groupby("seed")["return_true"].mean()
-    target, learnt = about["target"], kinds.get("difference", kinds.get("corrected"))
-    if learnt is None:
-        good = target is not None and before.min() >= target
-        says = f"Trained on the simulator alone, the policy returns {before.mean():.5g} on the "
-        tone: Any = "neutral" if target is None else "good" if good else "bad"
-        return [Verdict(f"{says}true system.", tone=tone)]
-    chosen, reached = _chosen(learnt, target)
-    value, start = chosen["return_true"].mean(), before.mean()
-    samples, estimator, update = chosen.iloc[0][_PLACE]
-    text, closed = [], bool(value > start)
-    if target is not None and start < target:
-        seeds = " on every seed" if len(chosen) > 1 else ""
-        closed = reached
-        text.append(
-            f"The target of {target:g} is passed{seeds}."
-            if reached
-            else f"The target of {target:g} is not reached{seeds}: more samples, another update or "
-            "another estimator may close the rest; the accuracy below says where the model errs."
-        )
-    if "control" in kinds:
-        control = kinds["control"][kinds["control"]["iteration"] == update]
-        if pairs := above(chosen, control):
-            text.append(
-                "As much training without a difference model ends at "
-                f"{control['return_true'].mean():.5g}; seed by seed the model is worth "
-                f"{mean(pairs)}."
-            )
-            # A single run each: less than half of the gain is no contest.
-            least = (value - start) / 2 if len(pairs) == 1 else 0.0
-            closed = closed and mean(pairs).value > least
-    if "true" in kinds:
-        true = kinds["true"]["return_true"].mean()
-        text.append(f"Learnt on the true system: {true:.5g}.")
-        closed = closed and value - start >= NEAR * (true - start)
-    if best is not None:
-        text.append(f"The best that is possible is {best:.0f}.")
-    by = f"{estimator}, update {update}" if "difference" in kinds else POLICY_WORDS["corrected"]
-    needed = f"{samples} true samples, {duration(samples * about['dt'])}"
-    better = bool(value > start)
-    tiles: dict[str, Any] = {
-        "idealised policy": f"{start:.5g}", f"after update {update}": f"{value:.5g}",
-        "true interaction": duration(samples * about["dt"]),
-    }  # fmt: skip
-    seen = model_errors(errors, estimator, samples, update)
-    if len(seen) and len(worst := _by_group(seen, "one_step", about).mean().dropna()):
-        tiles["one-step error, share of gap"] = f"{worst.max():.2g}"
-    return [
-        Verdict(
-            f"On the true system the return went from {start:.5g} to {value:.5g} ({by}, {needed}).",
-            " ".join(text),
-            tone="good" if closed else "warning" if better else "bad",
-            label="gap closed" if closed else "not settled" if better else "gap remains",
-        ),
-        KeyValues(tiles, style="tiles"),
-    ]
-
-
-def _chosen(learnt: pd.DataFrame, target: float | None) -> tuple[pd.DataFrame, bool]:
-    """The policies with the fewest samples that reach the target on every seed, or the best.
-
-    Returns:
-        One policy for each seed, and whether all reach it.
-    """
-    found = learnt.groupby(_PLACE)["return_true"].agg(["min", "mean"])
-    works: Any = found.index[found["min"] >= target] if target is not None else []
-    place: Any = works[0] if len(works) else found["mean"].idxmax()
-    chosen = (learnt[_PLACE] == pd.Series(place, index=_PLACE)).all(axis=1)
-    return learnt[chosen], bool(len(works))
 
 
 def accuracy_section(errors: pd.DataFrame, about: About) -> list[Section]:
     """One-step and multi-step error, by estimator, samples, place and group of channels."""
     if errors.empty:
         return []
-    found = (re.match(r"([\d.]+s)_", str(name)) for name in errors.columns)
+    found = (re.match(r"([\d.e+-]+s)_", str(name)) for name in errors.columns)
     horizons = list(dict.fromkeys(match[1] for match in found if match))
     groups, table = list(about["groups"]), []
     keys = ["estimator", "true_samples", "iteration", "where"]
     for _, part in errors.groupby(keys, sort=False):
         estimator, samples, update, where = part.iloc[0][keys]
-        one_step = _by_group(part, "one_step", about)
+        one_step = by_group(part, "one_step", about)
         table.append([
             f"{estimator}, update {update}", int(samples),
             "where it goes" if where == "visited" else "anywhere",
             *(_finite(one_step[name]).text(3) for name in groups),
-            *(_finite(_by_group(part, h, about).mean(axis=1)).text(3) or None for h in horizons),
+            *(_finite(by_group(part, h, about).mean(axis=1)).text(3) or None for h in horizons),
             float(part["coverage90"].astype(float).mean()),
             float(part["fit_seconds"].median()),
         ])  # fmt: skip
@@ -217,15 +141,6 @@ def accuracy_section(errors: pd.DataFrame, about: About) -> list[Section]:
             heading="Where the difference model is right",
         )
     ]  # fmt: skip
-
-
-def _by_group(errors: pd.DataFrame, prefix: str, about: About) -> pd.DataFrame:
-    """Errors by group of channels, one row per trial and update."""
-    part = errors.filter(regex=f"^{re.escape(prefix)}_")
-    part = part.rename(columns=lambda name: name.removeprefix(f"{prefix}_"))
-    found = [grouped({str(k): v for k, v in row.items()}, about["groups"])
-             for _, row in part.iterrows()]  # fmt: skip
-    return pd.DataFrame(found, columns=list(about["groups"]), dtype=float)
 
 
 def _finite(values: pd.Series) -> Mean:

@@ -38,7 +38,12 @@ class Mean:
     def __str__(self) -> str:
         if self.count == 1:
             return f"{self.value:.5g}"
-        return self._decimals(0 if abs(self.value) >= 100 else 1)
+        larger = max(abs(self.value), float(np.nan_to_num(self.half_width)))
+        if abs(self.value) >= 100:
+            return self._decimals(0)
+        # Of what is small, two digits.
+        size = np.floor(np.log10(larger)) if larger else 0
+        return self._decimals(int(np.clip(1 - size, 1, 9)))
 
     def text(self, digits: int) -> str:
         """The mean to so many digits, and its interval."""

@@ -10,7 +10,10 @@ from typing import Any
 import pandas as pd
 
 from simgap_files import atomic_path, atomic_write_text, write_sealed
-from studies.learnt.words import measures_of
+from studies.learnt.words import measures_of, returns_by_start
+
+#: The column with a policy's returns on the true system by where they began.
+BY_START = "by_start"
 
 # Policies of trials that differ in these only are the same, or stand in rows of their own.
 _IN_COLUMNS = {
@@ -39,6 +42,7 @@ def write_tables(
     """
     rows, errors = tables_of(results)
     for name, table in (("results", rows), ("accuracy", errors)):
+        table = table.drop(columns=BY_START, errors="ignore")
         atomic_write_text(folder / f"{name}.csv", table.to_csv(index=False))
         with atomic_path(folder / f"{name}.parquet") as path:
             table.to_parquet(path, index=False)
@@ -87,9 +91,13 @@ def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def policy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """One row per policy of every trial."""
+    """One row per policy of every trial, with its returns by start."""
     return pd.DataFrame(
-        [_trial(trial) | _policy(policy) for trial in results for policy in trial["policies"]]
+        [
+            _trial(trial) | _policy(policy) | {BY_START: returns_by_start(policy)}
+            for trial in results
+            for policy in trial["policies"]
+        ]
     )
 
 
@@ -116,6 +124,7 @@ def accuracy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
                 "fit_seconds": record["fit_seconds"],
                 "coverage90": record[where]["coverage90"],
                 **{f"one_step_{k}": v for k, v in record[where]["one_step"].items()},
+                **{f"gap_{k}": v for k, v in record[where].get("gap", {}).items()},
                 **{
                     f"{horizon.replace(' ', '')}_{k}": v
                     for horizon, errors in record[where]["multi_step"].items()

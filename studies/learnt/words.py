@@ -11,6 +11,8 @@ import pandas as pd
 Results = Mapping[str, Any]
 Record = Mapping[str, Any]
 Errors = Mapping[str, float | None]
+#: A state, and which of the tests from it.
+Start = tuple[tuple[float, ...], int]
 Groups = Mapping[str, Sequence[str]]
 
 POLICY_WORDS = {
@@ -38,12 +40,27 @@ def by_name(results: Results, name: str) -> list[Record]:
 
 def measures_of(record: Record) -> dict[str, float]:
     """The mean of a policy's tests on the true system, by measure."""
-    table = pd.DataFrame(record.get("tests", [])).drop(columns="return", errors="ignore")
+    table = pd.DataFrame(record.get("tests", []))
+    table = table.drop(columns=["return", "start"], errors="ignore")
     return {str(name): float(value) for name, value in table.mean().items()}
 
 
+def returns_by_start(record: Record) -> dict[Start, float]:
+    """The returns of a policy's tests on the true system by the state that they began in.
+
+    A test that was the same as another one in all counts once; where chance gave another return
+    from the same state, each is told apart by its number. An earlier version did not keep states.
+    """
+    found: dict[Start, float] = {}
+    for test in record.get("tests", []):
+        again = [key for key in found if key[0] == tuple(test.get("start", ()))]
+        if "start" in test and test["return"] not in [found[key] for key in again]:
+            found[tuple(test["start"]), len(again)] = test["return"]
+    return found
+
+
 def grouped(errors: Errors, groups: Groups) -> dict[str, float]:
-    """Errors by channel, averaged within each group; a channel without a gap is left out."""
+    """Errors by channel, averaged within each group; a channel without a number is left out."""
     found = {}
     for name, channels in groups.items():
         values = [errors[c] for c in channels if c in errors]

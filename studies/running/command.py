@@ -23,7 +23,7 @@ import jsonargparse
 import yaml
 
 import simgap_yaml
-from sims.loading import not_found
+from sims.loading import in_file, not_found
 from sims.model_files import located, model_settings, names_model
 from sims.trust import check_file, named_packages, trusting
 from sims.unsound import Unsound
@@ -148,15 +148,17 @@ def _check_given(name: str, value: str) -> None:
     """
     if not name.startswith("--") or name == "--output":
         return
+    lacking = ""
     if value.endswith((".yaml", ".yml")):
         try:
             simgap_yaml.read(value)
         except ValueError as error:
             raise ValueError(f"{name} {error}") from None
-    elif name in _CLASSES and _IMPORT_PATH.fullmatch(value) and not Path(value).exists():
-        lacking = not_found(value)
-        if lacking:
-            raise ValueError(f"{name}: {lacking}")
+    elif name in _CLASSES:
+        path = _IMPORT_PATH.fullmatch(value) and not Path(value).exists()
+        lacking = in_file(value) or (not_found(value) if path else "")
+    if lacking:
+        raise ValueError(f"{name}: {lacking}")
 
 
 def _settings(source: str | Path) -> dict[str, Any] | None:
@@ -248,7 +250,8 @@ def guarded(
 def users_code(error: BaseException) -> str:
     """File, line and function of the user's that an error comes from; empty if it is ours.
 
-    Libraries in between, which only pass on what they were given, do not count.
+    Libraries in between, which only pass on what they were given, do not count. Where
+    ours made the error of another one, that one tells.
     """
     if isinstance(error, SyntaxError) and error.filename:
         return f"{error.filename}, line {error.lineno},"
@@ -259,8 +262,10 @@ def users_code(error: BaseException) -> str:
         ours = path.parent == _HOME or (path.is_relative_to(_HOME) and (
             path.relative_to(_HOME).parts[0] in ("sims", "policy", "residual", "studies")
         ))  # fmt: skip
-        return "" if ours else f"{path}, line {frame.lineno}, in {frame.name}"
-    return ""
+        if not ours:
+            return f"{path}, line {frame.lineno}, in {frame.name}"
+        break
+    return users_code(error.__cause__) if error.__cause__ else ""
 
 
 def _typed(error: BaseException) -> str:

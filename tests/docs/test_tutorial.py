@@ -60,3 +60,13 @@ def test_nothing_else_is_claimed_and_the_gap_closes(worked):
     assert gap["gap"]["after"]["value"] <= 1.1 * gap["gap"]["noise_floor"]["value"]
     assert "Coulomb friction at cart" in told and "Viscous friction at hinge" in told
     assert used.count("[") == 2
+
+
+def test_the_heater_has_a_longer_time_constant_and_a_delay(tmp_path):
+    for code in blocks("python"):
+        name = code.splitlines()[0].removeprefix("# ")
+        if "heater" in name:
+            (tmp_path / name).write_text(code)
+    says = run([sys.executable, "ask_heater.py"], tmp_path)
+    assert re.search(r"CONFIRMED +Time constant: \+(29|30)[.\d]* s", says)
+    assert re.search(r"CONFIRMED +Delay at power: time (5\.9|6\.[01])\d* s", says)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from residual import CorrectedSimulator, DifferenceModel, Linear, accuracy_along
-from residual.accuracy import uniform_rollouts
+from residual.accuracy import uniform_rollouts, usual_steps
 from residual.trajectories import Transitions
 from sims.checks import check_simulator
+from sims.effects import ActuatorLag
 from sims.pendulum import Pendulum
 
 
@@ -102,6 +103,41 @@ class TestAccuracy:
         np.testing.assert_allclose(
             list(measured.multi_step_error["1 s"].values()), expected, rtol=1e-12
         )
+
+    def test_horizons_are_so_many_seconds_and_at_least_so_many_periods(self):
+        assert usual_steps(0.05) == (5, 20)  # a quarter of a second and one
+        assert usual_steps(0.002) == (125, 500)
+        assert usual_steps(0.1) == usual_steps(2.0) == (5, 20)
+
+    def test_a_slow_system_is_forecast_and_horizons_are_named_by_what_they_last(self):
+        slow = Pendulum(dt=0.6)
+        data = sampled(slow.with_parameters(mass=0.07), 300)
+        model = CorrectedSimulator(slow, DifferenceModel(Linear(), slow).fit(data))
+        rollouts = uniform_rollouts(slow, np.random.default_rng(6), 3, steps=6)
+        assert list(accuracy_along(model, *rollouts).multi_step) == ["3 s"]
+        asked = accuracy_along(model, *rollouts, horizons=(0.25, 1.0))
+        assert list(asked.multi_step) == ["0.6 s", "1.2 s"]
+
+    def test_rollouts_may_differ_in_length(self, corrected):
+        """One that ends early takes nothing from the others."""
+        states, actions = uniform_rollouts(Pendulum.true(), np.random.default_rng(7), 3, steps=30)
+        whole = accuracy_along(corrected, states, actions)
+        short = accuracy_along(corrected, [*states, states[0, :4]], [*actions, actions[0, :3]])
+        assert short.multi_step_error == whole.multi_step_error
+        assert list(short.multi_step) == ["0.25 s", "1 s"]
+
+    def test_the_gap_is_told_as_a_share_of_what_a_step_changes(self, corrected):
+        states, actions = uniform_rollouts(Pendulum.true(), np.random.default_rng(8), 20)
+        assert min(accuracy_along(corrected, states, actions).gap.values()) > 0.01
+        states, actions = uniform_rollouts(Pendulum(), np.random.default_rng(8), 20)
+        assert set(accuracy_along(corrected, states, actions).gap.values()) == {0.0}
+
+    def test_rollouts_from_anywhere_begin_at_rest_and_show_no_memory(self):
+        lagging = Pendulum(effects=[ActuatorLag("voltage", 0.1)])
+        states, actions = uniform_rollouts(lagging, np.random.default_rng(9), 4, steps=6)
+        assert states.shape == (4, 7, 2)
+        again = lagging.rollout(lagging.augment(states[:, 0]), actions)
+        np.testing.assert_array_equal(states, again[:, :, :2])
 
     def test_horizons_beyond_the_rollouts_are_left_out(self, corrected):
         states, actions = uniform_rollouts(Pendulum.true(), np.random.default_rng(5), 3, steps=6)

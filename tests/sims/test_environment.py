@@ -112,12 +112,37 @@ def test_memory_channels_are_hidden_from_the_policy():
     np.testing.assert_array_equal(seen, [[2.0]])
 
 
+def test_a_task_is_shown_no_hidden_memory():
+    """Columns of a state unpack by name whatever effects the true system hosts."""
+    from sims.effects import ActuatorLag, Delay
+
+    class Named(SwingUp):
+        def reward(self, states, actions, next_states):
+            (_, rate), (angle, _) = states.T, next_states.T
+            return -(angle**2) - rate**2
+
+        def terminal(self, next_states):
+            angle, _ = next_states.T
+            return np.abs(angle) > 9
+
+    lagging = Pendulum(effects=[Delay("voltage", 0.05), ActuatorLag("voltage", 0.1)])
+    env = SimulatorEnv(lagging, Named())
+    _, info = env.reset(seed=0)
+    _, reward, ended, _, after = env.step(np.array([2.0]))
+    assert len(info["state"]) > 2 and not ended
+    assert reward == pytest.approx(-(after["state"][0] ** 2) - info["state"][1] ** 2)
+
+
 def test_a_simulator_without_pictures_says_so():
     class Bare(Pendulum):
         renderer = None
 
     with pytest.raises(ValueError, match="renderer"):
         SimulatorEnv(Bare(), SwingUp(), render_mode="rgb_array")
+
+
+def test_a_slow_simulator_has_a_frame_rate():
+    assert SimulatorEnv(Pendulum(dt=3.0), SwingUp()).metadata["render_fps"] == 1
 
 
 def test_effects_with_memory_start_at_rest_and_can_be_set():

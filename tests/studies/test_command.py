@@ -203,6 +203,8 @@ SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
         ("find_gap", ("--simulator", "bytes.yaml"), "bytes.yaml is no YAML: character 1: "),
         ("find_gap", ("--simulator=sims.None",), "--simulator: there is no class sims.None; expec"),
         ("find_gap", ("--simulator", "no_such.X"), "there is no module 'no_such' for no_such"),
+        ("find_gap", ("--simulator", "arm.py:Arm"), "is no import path; write arm.Arm"),
+        ("find_gap", ("--simulator", "a/arm.py"), "write arm.CLASS and start Python in a/"),
         ("find_gap", (*SIMULATOR, "--columns", "none.yaml"), "--columns none.yaml: there is no"),
         ("find_gap", (*SIMULATOR, "--logs", "none.csv"), "none.csv: there is no such file"),
         ("learn", (*SYSTEM, "--corrected", "none.yaml"), "--corrected none.yaml: there is no"),
@@ -265,3 +267,20 @@ def test_a_sensor_that_drops_out_ends_the_run_and_leaves_no_step(tmp_path, monke
     Path("FLAKY").unlink()
     learn.main(command)
     assert "report:" in capsys.readouterr().out
+
+
+def test_a_value_error_of_the_users_task_says_where(tmp_path, monkeypatch, capsys):
+    (tmp_path / "my_swing.py").write_text(
+        "from sims import Pendulum, SwingUp, System\n\n"
+        "class Mine(SwingUp):\n"
+        "    def reward(self, states, actions, next_states):\n"
+        "        angle, = next_states.T\n"
+        "        return -angle\n\n"
+        "SYSTEM = System('mine', Pendulum(), Pendulum.true(), Mine())\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SystemExit, match="2"):
+        learn.main(["--system", "my_swing.SYSTEM", "--output", str(tmp_path / "out")])
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "too many values to unpack" in said
+    assert f"{tmp_path / 'my_swing.py'}, line 5, in reward" in said

@@ -1,16 +1,19 @@
 """The loop itself: the control arm, tests from several starts, and what is reported of them."""
 
 import itertools
+from types import MappingProxyType
 
 import numpy as np
 import pytest
 
 from policy import Algorithm, DDPGConfig
 from residual import Linear
+from sims import Channel, FirstOrderSystem, Parameter
+from sims.effects import ActuatorLag
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.system import EvaluationProtocol, System
-from sims.tasks import SwingUp
+from sims.tasks import SwingUp, Task
 from studies.learning import steps as steps_module
 from studies.learning import streams, training
 from studies.learning.budget import Budget
@@ -95,6 +98,24 @@ def test_policies_are_tested_from_several_starts_with_the_measures_asked_for(out
             assert all(test["turned"] > 0 for test in policy["tests"])
 
 
+def test_all_policies_are_tested_from_the_same_starts(outcome):
+    tested = [[t["start"] for t in p["tests"]] for p in outcome.policies if "tests" in p]
+    assert len(tested) == 8 and all(starts == tested[0] for starts in tested)
+    assert len({tuple(start) for start in tested[0]}) == 3
+    starts = np.array([training.episode["states"][0] for training in outcome.trainings.values()])
+    np.testing.assert_array_equal(starts, starts[:1].repeat(len(starts), axis=0))
+
+
+@pytest.mark.parametrize(("start_at", "count"), [("anywhere", 5), ("hanging", 1)])
+def test_there_are_several_starts_where_they_differ(start_at, count):
+    task = SwingUp(horizon=20, start_at=start_at)
+    found = quickly(PendulumEquation(), PendulumEquation.true(), task)
+    for policy in found.policies:
+        assert len(policy["tests"]) == count
+        returns = [test["return"] for test in policy["tests"]]
+        assert policy["return_true"] == pytest.approx(np.mean(returns))
+
+
 def test_the_reference_read_at_a_smaller_budget_is_the_cold_start(outcome):
     cold = next(p for p in outcome.policies if p["name"] == "cold")
     assert cold["true_samples"] == 60 and max(step for step, _ in cold["curve"]) <= 60
@@ -126,13 +147,60 @@ def test_no_two_steps_share_a_random_stream(monkeypatch):
     for module in (steps_module, training):
         monkeypatch.setattr(module, "stream", watched)
     learnt_with(None)
+    # Tests of policies that are to be compared begin alike; that stream is theirs alone.
+    common = [pair for pair in drawn if pair[1] == (0, "test starts")]
+    drawn = [pair for pair in drawn if pair not in common] + common[:1]
     purposes = {purpose for _, purpose in drawn}
-    # Nothing is drawn twice, and no two purposes begin within reach of each other.
+    assert len(common) == len({p for p in purposes if p[1] == "train"}) == 8
+    # Nothing else is drawn twice, and no two purposes begin within reach of each other.
     assert len(drawn) == len(purposes) >= 30
     begins = sorted(found for found, _ in drawn)
     assert all(b - a >= 2**20 for a, b in itertools.pairwise(begins))
     trainings = {p[2:] for p in purposes if p[1] == "train"}
     assert {("difference", 1), ("difference", 2), ("control", 1), ("cold", 0)} <= trainings
+
+
+def quickly(nominal, true, task, **options):
+    """The loop with next to no training."""
+    return learn_by_difference(
+        nominal, true, task, estimator=Linear(), samples=40, updates=1, steps=60,
+        ddpg=DDPG, progress=Silent(), **options,
+    )  # fmt: skip
+
+
+def test_a_true_system_with_hidden_memory_is_learnt_and_measured():
+    class Named(SwingUp):
+        def reward(self, states, actions, next_states):
+            angle, rate = next_states.T
+            return -np.abs(angle) - rate**2
+
+    lagging = PendulumEquation(effects=[ActuatorLag("voltage", 0.1)])
+    (accuracy,) = quickly(PendulumEquation(), lagging, Named(horizon=30)).accuracy
+    for where in ("visited", "uniform"):
+        assert set(accuracy[where]["one_step"]) == {"angle", "rate"}
+
+
+def test_a_control_period_of_seconds_is_measured_over_enough_of_them():
+    class Tank(FirstOrderSystem):
+        dt = 2.0
+        state_channels = (Channel("level", "m", "other"),)
+        action_channels = (Channel("pump", "V", "input", low=0.0, high=1.0),)
+        parameters = MappingProxyType({"hole": Parameter(0.05, "1/s", "outflow", low=0.0)})
+
+        def derivative(self, x, u, p):
+            return (0.1 * u[:, 0] - p.hole * x[:, 0])[:, None]
+
+    class Level(Task):
+        horizon = 25
+
+        def start(self, rng):
+            return rng.uniform(0, 1, 1)
+
+        def reward(self, states, actions, next_states):
+            return -np.abs(next_states[:, 0] - 0.5)
+
+    (accuracy,) = quickly(Tank(), Tank().with_parameters(hole=0.07), Level()).accuracy
+    assert list(accuracy["visited"]["multi_step"]) == ["10 s", "40 s"]
 
 
 def test_the_python_call_is_the_loop(tmp_path):

@@ -67,6 +67,18 @@ def result(*verdicts, share=0.98, effects=None, blocks=20):
     )  # fmt: skip
 
 
+@pytest.mark.parametrize(("after", "worse"), [(0.9, False), (1.2, True)])
+def test_the_first_sentence_says_where_the_corrected_simulator_is_worse(after, worse):
+    found = result(MASS)
+    apart = dataclasses.replace(found.gap, after=Span(after, 0.5 * after, 2 * after))
+    says = lead(dataclasses.replace(found, held_out=apart))
+    assert says.startswith("98 % of the gap is mass.")
+    assert (
+        "does not hold on the records set aside, where the corrected simulator is worse: the 1 s "
+        "error of angle is 1.2 rad, the nominal one's 1 rad." in says
+    ) is worse
+
+
 @pytest.mark.parametrize(
     ("verdicts", "first"),
     [

@@ -48,6 +48,12 @@ def test_ties_go_to_the_better_fit():
     assert choose(worse).key == (0,)
 
 
+def test_what_would_be_surprisingly_large_comes_after_what_does_as_well():
+    merits = {(0,): 50.0, (3,): 20.0}
+    assert choose(Toy({(0,): 0.200, (3,): 0.201}, merits, surprising={3})).key == (0,)
+    assert choose(Toy({(0,): 0.400, (3,): 0.201}, merits, surprising={3})).key == (3,)
+
+
 def test_a_set_that_is_good_enough_asks_for_no_more():
     toy = Toy({(0,): 0.10, (0, 1): 0.05})
     assert choose(toy).key == (0, 1)

@@ -156,6 +156,7 @@ def test_only_what_leaves_no_doubt_is_confirmed():
         "unsteady": {"steady": False},
         "numerics": {"sound": False},
         "at_bound": {"bounded": True},
+        "share_may_be_zero": {"share": (0.35, -0.3, 0.7)},
         "rivals": {"rivals": ("constant_load@pivot",)},
     }.items():
         verdict = effect_verdict(toy, claim(**changed), 20)

@@ -1,15 +1,23 @@
 """How far forecasts go if the user does not say."""
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
-from residual.gap.horizon import SAMPLES, WINDOWS, usual_horizon
+from residual.gap import find_gap
+from residual.gap.find import beyond_noise
+from residual.gap.horizon import SAMPLES, WINDOWS, longest_horizon, usual_horizon
+from residual.gap.prepare import prepare
 from residual.gap.smooth import LEAD
 from residual.trajectories import Trajectory
+from sims.equations import EquationOfMotion
 from sims.leo import Leo
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel, Parameter
 
 
 def swing(period, seconds=60.0, step=0.02, size=0.4, noise=0.0, name="run"):
@@ -63,3 +71,50 @@ def test_what_strikes_the_ground_is_foretold_over_ten_steps_at_least():
     states = np.zeros((50, 18))
     run = Trajectory("walk", 0.03 * np.arange(50), states, np.zeros((49, 6)))
     assert usual_horizon(Leo(), [run]) == pytest.approx(10 * Leo().dt)
+
+
+class Frame(EquationOfMotion):
+    """A plate that swings from a corner, without friction."""
+
+    dt = 0.01
+    state_channels = (
+        Channel("angle", "rad", "position", angle=True),
+        Channel("rate", "rad/s", "rate", rate_of="angle", scale=3.0),
+    )
+    action_channels = ()
+    parameters: ClassVar = {"stiffness": Parameter(70.0, "1/s^2", "gravity over length", low=1.0)}
+
+    def acceleration(self, q, v, u, force, p):
+        return (force[:, 0] - p.stiffness * np.sin(q[:, 0]))[:, None]
+
+
+def swinging(friction, noise, seconds=9.0):
+    """A log of the true plate, by an independent integrator."""
+    times = np.arange(0, seconds, 0.01)
+
+    def slope(_, x):
+        return [x[1], -70.0 * np.sin(x[0]) - friction * x[1]]
+
+    found = solve_ivp(slope, (0, times[-1]), [0.4, 0.0], t_eval=times, rtol=1e-9, atol=1e-10)
+    angle = found.y[0] + np.random.default_rng(3).normal(0, noise, len(times))
+    states = np.stack([angle, np.full(len(times), np.nan)], axis=1)
+    return Trajectory("swing", times, states, np.zeros((len(times) - 1, 0)))
+
+
+@pytest.mark.parametrize("noise", [0.01, 1e-4])
+def test_forecasts_go_farther_where_noise_would_hide_what_is_missing(noise):
+    runs = [swinging(0.25, noise)]
+    usual = usual_horizon(Frame(), runs)
+    found = beyond_noise(Frame(), runs, prepare(Frame(), runs, usual))
+    assert found.horizon == pytest.approx(2 * usual if noise > 1e-3 else usual)
+    assert found.horizon <= longest_horizon(runs)
+
+
+@pytest.mark.parametrize(("friction", "kinds"), [(0.25, {"dissipation"}), (0.0, set())])
+def test_so_that_light_friction_is_found_in_a_noisy_log_and_none_where_there_is_none(
+    friction, kinds
+):
+    found = find_gap(Frame(), [swinging(friction, 0.01)])
+    named = [v for v in found.verdicts if v.kind in ("confirmed", "ambiguous")]
+    assert {effect.family for effect in found.effects} == kinds
+    assert bool(named) is bool(kinds)

@@ -47,3 +47,20 @@ def test_what_switches_the_system_off_is_refused(effect, values, words):
 )
 def test_what_may_be_is_left_to_the_data(effect, values):
     assert said(effect, **values) == ""
+
+
+def test_a_limit_that_the_input_reaches_once_is_refused():
+    rng = np.random.default_rng(0)
+    times = 0.05 * np.arange(201.0)
+    states = np.array([np.pi, 0.0]) + rng.standard_normal((201, 2))
+    for bumps, refused in ((1, True), (2, False)):
+        volts = rng.uniform(-1, 1, (200, 1))
+        for k in range(bumps):
+            volts[30 + 80 * k : 60 + 80 * k] = 3.0
+        samples = Samples.join([Trajectory("run", times, states, volts)], 4)
+        model = Model(
+            PendulumEquation(), candidates(PendulumEquation(), [Saturation("voltage")], samples)
+        )
+        number, why = absurd(model, np.array([2.0]), samples)
+        assert ("only once" in why) is refused
+        assert number == (0 if refused else 1)

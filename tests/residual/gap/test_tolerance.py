@@ -1,11 +1,16 @@
 """What parameters of the simulator that are a little off can do is no certain effect."""
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
 from residual.gap import find_gap
+from residual.trajectories import Trajectory
 from sims.effects.library import library
+from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel, Parameter
 from studies.hidden.data import Truth, make_logs
 
 INERTIA = 1.91e-4
@@ -63,3 +68,36 @@ def test_a_delay_of_less_than_half_a_sample_is_not_certain(delay, sure):
     assert first.kind == ("confirmed" if sure else "ambiguous")
     assert ("clock" in first.doubts) is not sure
     assert np.isclose(first.parameters["time"].value, delay, rtol=0.1)
+
+
+class Plate(FirstOrderSystem):
+    """A plate that a heater warms, near the temperature of an oven."""
+
+    dt = 1.0
+    state_channels = (Channel("temperature", "degC", "other", scale=5.0),)
+    action_channels = (Channel("power", "W", "input", low=0.0, high=1.0, scale=1.0),)
+    parameters: ClassVar = {
+        "base": Parameter(300.0, "degC", "temperature of the oven"),
+        "gain": Parameter(6.0, "degC/W", "rise at full power"),
+        "late": Parameter(8.0, "s", "time constant", low=0.1),
+    }
+
+    def derivative(self, x, u, p):
+        return ((p.base + p.gain * u[:, 0] - x[:, 0]) / p.late)[:, None]
+
+
+def test_of_a_temperature_no_share_is_known_but_one_of_its_range():
+    """3 % of 300 degC would be more than all that happens, and anything could hide in it."""
+    rng = np.random.default_rng(0)
+    power = np.repeat(rng.integers(0, 2, 40), 10).astype(float)
+    base, late = 300.0 + 0.02 * np.cumsum(rng.standard_normal(401)), 5.0
+    x = np.full(401, 300.0)
+    for k in range(400):  # the exact solution; the oven drifts, which no library holds
+        end = base[k] + 6.0 * power[k]
+        x[k + 1] = end + (x[k] - end) * np.exp(-1.0 / late)
+    log = Trajectory("run", np.arange(401.0), x[:, None], power[:, None])
+    found = find_gap(Plate(), [log], effects=["late"])
+    first = found.verdicts[0]
+    assert (first.kind, first.effect) == ("confirmed", "late")
+    assert first.parameters["change"].low <= -3.0 <= first.parameters["change"].high
+    assert first.parameters["change"].high - first.parameters["change"].low < 2.0

@@ -40,9 +40,13 @@ class Toy:
         blocks: Number of blocks.
         scatter: Relative spread of the blocks' errors about the given ones.
         half: Errors at half the horizon, if not the same.
+        surprising: Numbers of effects that are larger than usual.
     """
 
-    def __init__(self, errors, merits=None, joints=1, blocks=20, scatter=0.0, half=None):
+    def __init__(
+        self, errors, merits=None, joints=1, blocks=20, scatter=0.0, half=None, surprising=()
+    ):
+        self.surprising = set(surprising)
         rng = np.random.default_rng(0)
         drive = rng.uniform(0.5, 2.0, (blocks, joints))
         errors = {(): 1.0, **errors}
@@ -78,6 +82,9 @@ class Toy:
             samples=SimpleNamespace(times=0.1 * np.arange(4.0 * blocks), names=("run",)),
             tie=lambda nominal: 0.05,
         )
+
+    def surprises(self, key):
+        return len(self.surprising & set(key))
 
     def usable(self):
         return [k for k in self.validated if k not in self.unfit and k not in self.refused]

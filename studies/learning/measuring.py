@@ -1,0 +1,60 @@
+"""How right a difference model is on the true system: where its policy goes, and anywhere."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from policy.evaluate import Policy, rollout
+from policy.learner import Algorithm
+from residual.accuracy import Accuracy, accuracy_along, uniform_rollouts
+from residual.corrected import CorrectedSimulator
+from sims.simulator import Simulator
+from sims.system import System
+from studies.learning.training import exploration, visited
+
+# Control periods that rollouts last at least: the longest of the usual horizons.
+_LEAST_STEPS = 20
+
+
+def where_it_goes(
+    system: System, algorithm: Algorithm, policy: Policy, corrected: CorrectedSimulator, seed: int
+) -> Accuracy:
+    """Accuracy along fresh true rollouts of a policy, all but the first with exploration noise.
+
+    Args:
+        system: What is controlled; says how many rollouts, and how long.
+        algorithm: Its exploration noise.
+        policy: Trained on ``corrected``.
+        corrected: The simulator with its difference model.
+        seed: Where the random numbers of the rollouts begin.
+    """
+    protocol = system.evaluation
+    env = system.true_environment(corrected)
+    steps = max(_LEAST_STEPS, round(protocol.visited_seconds / corrected.dt))
+    runs = [rollout(policy, env, seed, max_steps=steps)]
+    runs += [
+        rollout(policy, env, seed + k, exploration(system, algorithm, seed + k), steps)
+        for k in range(1, protocol.visited_rollouts)
+    ]
+    # One that fell ends early, and is as long as it is.
+    states, actions = [visited(system, run) for run in runs], [run.actions for run in runs]
+    return accuracy_along(corrected, states, actions, stride=protocol.visited_stride)
+
+
+def anywhere(system: System, corrected: CorrectedSimulator, seed: int) -> Accuracy | None:
+    """Accuracy along true rollouts from anywhere; None if the true system cannot be set.
+
+    Args:
+        system: What is controlled; may say what anywhere is.
+        corrected: The simulator with its difference model.
+        seed: Of what is drawn.
+    """
+    rng = np.random.default_rng(seed)
+    if system.elsewhere:
+        states, actions = system.elsewhere(rng)
+    elif isinstance(system.true, Simulator):
+        states, actions = uniform_rollouts(system.true, rng)
+    else:
+        return None
+    states = states[..., : len(system.nominal.state_channels)]
+    return accuracy_along(corrected, states, actions, stride=system.evaluation.visited_stride)

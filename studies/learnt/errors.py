@@ -1,0 +1,53 @@
+"""The errors of difference models, out of the tables over trials."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from studies.learnt.words import grouped
+
+# A step of the true system that differs by less, as a share of what the step changes, does not.
+_NO_GAP = 1e-4
+
+
+def model_errors(errors: pd.DataFrame, estimator: str, samples: int, update: int) -> pd.DataFrame:
+    """The errors of one difference model where the policy goes, one row for each seed."""
+    if errors.empty:
+        return errors
+    wanted = {"where": "visited", "estimator": estimator, "true_samples": samples,
+              "iteration": update}  # fmt: skip
+    return errors[(errors[list(wanted)] == pd.Series(wanted)).all(axis=1)]
+
+
+def by_group(errors: pd.DataFrame, prefix: str, about: Mapping[str, Any]) -> pd.DataFrame:
+    """Errors by group of channels, one row per trial and update.
+
+    Args:
+        errors: Rows of ``tables.accuracy_rows``.
+        prefix: ``"one_step"``, of which channels without a gap are left out, or a horizon.
+        about: The system.
+    """
+    part = _measured(errors, prefix)
+    if prefix == "one_step":
+        gaps = _measured(errors, "gap").reindex(columns=part.columns)
+        part = part.mask(gaps <= _NO_GAP)
+    found = [grouped({str(k): v for k, v in row.items()}, about["groups"])
+             for _, row in part.iterrows()]  # fmt: skip
+    return pd.DataFrame(found, columns=list(about["groups"]), dtype=float)
+
+
+def _measured(errors: pd.DataFrame, prefix: str) -> pd.DataFrame:
+    """One kind of measurement by channel."""
+    part = errors.filter(regex=f"^{re.escape(prefix)}_").astype(float)
+    return part.rename(columns=lambda name: name.removeprefix(f"{prefix}_"))
+
+
+def no_gap(errors: pd.DataFrame) -> bool:
+    """Whether the true system did what the simulator does in all that was measured."""
+    gaps = _measured(errors, "gap")
+    # Where a gap is not known, or is beyond all bounds, it is not nothing.
+    return bool(gaps.size and (gaps <= _NO_GAP).all(axis=None))

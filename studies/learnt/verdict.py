@@ -1,0 +1,240 @@
+"""The verdict over one trial or many: is the policy better, is it the model's doing, what is left?
+
+Returns differ from seed to seed and from start to start, so policies are compared in pairs, and
+what the interval of the pairs does not leave out is not claimed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import pandas as pd
+
+from studies.learnt.errors import by_group, model_errors, no_gap
+from studies.learnt.pairs import above, starts
+from studies.learnt.statistics import Mean, mean
+from studies.learnt.words import NEAR, POLICY_WORDS, duration
+from studies.reporting import KeyValues, Section, Verdict
+
+About = Mapping[str, Any]
+Tone = Literal["good", "warning", "bad", "neutral"]
+_PLACE = ["true_samples", "estimator", "iteration"]
+# A model that leaves so much of the gap in one step, in its worst group of channels, closes none.
+_OPEN = 0.5
+# Returns that differ by a smaller share are the same.
+_UNCHANGED = 1e-3
+
+
+@dataclasses.dataclass(frozen=True)
+class Evidence:
+    """What a verdict rests on.
+
+    Attributes:
+        gain: Return above the idealised policy's, over the pairs.
+        seeds: So many were compared; a single one is compared start by start.
+        worth: The same above the control's; None without a control.
+        unchanged: Whether the return is the idealised policy's.
+        error: One-step error of the model where the policy goes, as a share of the gap, of its
+            worst group of channels; None if there is none.
+        worst: That group.
+        same: Whether the true system does what the simulator does.
+        passed: Whether the target is reached on every seed; None without one to reach.
+        near: Whether the policy learnt on the true system gains hardly more; None without one.
+    """
+
+    gain: Mean
+    seeds: int
+    worth: Mean | None = None
+    unchanged: bool = False
+    error: float | None = None
+    worst: str = ""
+    same: bool = False
+    passed: bool | None = None
+    near: bool | None = None
+
+    @property
+    def by_model(self) -> bool:
+        """Whether the control shows that the gain is the difference model's doing."""
+        if self.worth is None:
+            return False
+        # The interval of a single seed does not hold the luck of training.
+        least = self.gain.value / 2 if self.seeds == 1 else 0.0
+        return self.worth.low > 0 and self.worth.value > least
+
+    @property
+    def left(self) -> bool:
+        """Whether something of the gap is known to be left."""
+        open_ = self.error is not None and self.error >= _OPEN
+        return open_ or self.passed is False or self.near is False
+
+    def says(self) -> tuple[str, Tone]:
+        """The verdict in a word or two, and its tone."""
+        if self.same:
+            return "no gap found", "neutral"
+        if self.unchanged:
+            return "unchanged", "warning"
+        if self.gain.high < 0:
+            return "worse", "bad"
+        if self.gain.low <= 0:
+            return "not settled", "warning"
+        if not self.by_model:
+            return "better, cause not shown", "warning" if self.left or not self.passed else "good"
+        if self.left:
+            return "better, gap remains", "warning"
+        if self.gain.count == 1:
+            return "better, not settled", "warning"
+        return "gap closed", "good"
+
+
+def headline(
+    once: pd.DataFrame, errors: pd.DataFrame, about: About, best: float | None
+) -> list[Section]:
+    """Did it work, was it the difference model's doing, and in which numbers?
+
+    Args:
+        once: Every policy once, as ``policies_once`` gives them.
+        errors: One row for each measurement of accuracy.
+        about: The system.
+        best: The best return that is possible, if it is known.
+    """
+    kinds = {str(name): part for name, part in once.groupby("name")}
+    before, target = kinds["idealised"], about["target"]
+    start, learnt = _value(before), kinds.get("difference", kinds.get("corrected"))
+    if learnt is None:
+        good = target is not None and before["return_true"].min() >= target
+        says = f"Trained on the simulator alone, the policy returns {start:.5g} on the true system."
+        return [Verdict(says, tone="neutral" if target is None else "good" if good else "bad")]
+    chosen, reached = _chosen(learnt, target)
+    samples, estimator, update = chosen.iloc[0][_PLACE]
+    seen = model_errors(errors, estimator, samples, update)
+    control, value = _control(kinds, update), _value(chosen)
+    pairs = above(chosen, control) if control is not None else []
+    true = _value(kinds["true"]) if "true" in kinds else None
+    worst, error = _worst(seen, about)
+    found = Evidence(
+        gain=mean(above(chosen, before) or [value - start]),
+        seeds=chosen["seed"].nunique(),
+        worth=mean(pairs) if pairs else None,
+        unchanged=abs(value - start) <= _UNCHANGED * max(abs(value), abs(start)),
+        error=error,
+        worst=worst,
+        same=no_gap(seen),
+        passed=reached if target is not None and start < target else None,
+        near=None if true is None else value - start >= NEAR * (true - start),
+    )
+    by = f"{estimator}, update {update}" if "difference" in kinds else POLICY_WORDS["corrected"]
+    needed = f"{samples} true samples, {duration(samples * about['dt'])}"
+    went = f"On the true system the return went from {start:.5g} to {value:.5g} ({by}, {needed})."
+    alone = _value(control) if control is not None else None
+    text = [went] if found.same else []
+    text += [_of_gain(found, starts(chosen)), *_of_target(found, target)]
+    text += [*_of_cause(found, alone), *_of_rest(found, true, best)]
+    tiles = {
+        "idealised policy": f"{start:.5g}", f"after update {update}": f"{value:.5g}",
+        "gain": str(found.gain), "true interaction": duration(samples * about["dt"]),
+    }  # fmt: skip
+    if found.error is not None and not found.same:
+        tiles["one-step error, share of gap"] = f"{found.error:.2g}"
+    label, tone = found.says()
+    same = "Where the policy goes, the true system does what the simulator does."
+    return [
+        Verdict(same if found.same else went, " ".join(text), tone=tone, label=label),
+        KeyValues(tiles, style="tiles"),
+    ]
+
+
+def _of_gain(found: Evidence, tested: int) -> str:
+    """The gain, and what its interval holds."""
+    if found.gain.count == 1:
+        return "One seed without several common starts gives no interval: run more seeds."
+    common = f"{tested} common starts" if tested > 1 else "one start"
+    if found.seeds == 1:
+        return (
+            f"Start by start over {common} the gain is {found.gain}, of this training alone: "
+            "another seed may do otherwise."
+        )
+    return f"Seed by seed, each over {common}, the gain is {found.gain}."
+
+
+def _of_target(found: Evidence, target: float | None) -> list[str]:
+    """Whether the target was reached."""
+    seeds = " on every seed" if found.seeds > 1 else ""
+    if found.passed is None:
+        return []
+    if found.passed:
+        return [f"The target of {target:g} is passed{seeds}."]
+    return [
+        f"The target of {target:g} is not reached{seeds}: more samples, another update or another "
+        "estimator may close the rest; the accuracy below says where the model errs."
+    ]
+
+
+def _of_cause(found: Evidence, control: float | None) -> list[str]:
+    """What the control says; nothing where there is nothing to explain."""
+    if found.worth is not None:
+        by = "seed by seed" if found.seeds > 1 else "in pairs"
+        return [
+            f"As much training without a difference model ends at {control:.5g}; {by} the model is "
+            f"worth {found.worth}."
+        ]
+    if found.same or found.unchanged or found.gain.low <= 0:
+        return []
+    return [
+        "Whether that is the difference model's doing or that of longer training, a control shows: "
+        "give --budget.control_steps."
+    ]
+
+
+def _of_rest(found: Evidence, true: float | None, best: float | None) -> list[str]:
+    """What is left, and what would be possible."""
+    text = []
+    if found.same:
+        text.append("A difference model has nothing to learn there; what differs is training.")
+    elif found.error is not None and found.error >= _OPEN:
+        text.append(
+            f"One step of the corrected simulator still errs by {found.error:.2g} of the gap in "
+            f"{found.worst}: the gap is not closed, whatever the return."
+        )
+    if true is not None:
+        text.append(f"Learnt on the true system: {true:.5g}.")
+    if best is not None:
+        text.append(f"The best that is possible is {best:.0f}.")
+    return text
+
+
+def _value(rows: pd.DataFrame) -> float:
+    """The mean return on the true system over seeds."""
+    return float(rows.groupby("seed")["return_true"].mean().mean())
+
+
+def _control(kinds: Mapping[str, pd.DataFrame], update: int) -> pd.DataFrame | None:
+    """As much training without a difference model, if there is any."""
+    if "control" not in kinds:
+        return None
+    rows = kinds["control"][kinds["control"]["iteration"] == update]
+    return rows if len(rows) else None
+
+
+def _worst(seen: pd.DataFrame, about: About) -> tuple[str, float | None]:
+    """The worst group of channels, and its one-step error, mean over seeds."""
+    if seen.empty:
+        return "", None
+    errors = by_group(seen, "one_step", about).mean().dropna()
+    return (str(errors.idxmax()), float(errors.max())) if len(errors) else ("", None)
+
+
+def _chosen(learnt: pd.DataFrame, target: float | None) -> tuple[pd.DataFrame, bool]:
+    """The policies with the fewest samples that reach the target on every seed; or the last ones,
+    of several estimators those with the best mean. The best of all updates would be luck.
+
+    Returns:
+        One policy for each seed, and whether all reach the target.
+    """
+    found = learnt.groupby(_PLACE)["return_true"].agg(["min", "mean"])
+    works: Any = found.index[found["min"] >= target] if target is not None else []
+    samples = found.index.get_level_values("true_samples")
+    place: Any = works[0] if len(works) else found["mean"][samples == samples.max()].idxmax()
+    chosen = (learnt[_PLACE] == pd.Series(place, index=_PLACE)).all(axis=1)
+    return learnt[chosen], bool(len(works))
