@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 #: Forecast error of a rival, over that of the chosen set, that excludes it while a remainder is
 #: left: model imperfection of that size may favour either.
 CLEARLY = 1.5
+#: Of a rival of the same family, which differs in form alone.
+FORM = 1.2
 #: The same from which on it is, whatever part of the data forecasts start from.
 HOPELESS = 3.0
 #: How far a strength may lie off in a fold, or with other numerics, as a share of it.
@@ -185,7 +187,7 @@ def excluded(
     if not alike or len(search.fitter.blocks) < FEW:
         return False
     behind, error = search.currency.difference(its.squares, own.squares, group)
-    return behind > error and _ratio(search, its.half, own.half, group) > 1.0 and worse > 1.05
+    return behind > error and _ratio(search, its.half, own.half, group) > 1.0 and worse > FORM
 
 
 def in_plain_form(search: Search, key: Key, claims: Sequence[Claim]) -> Key | None:

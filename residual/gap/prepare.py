@@ -19,6 +19,7 @@ from residual.gap.samples import Samples
 from residual.gap.search import Effort
 from residual.gap.smooth import LEAD, SmoothFitter
 from residual.gap.windows import cut
+from residual.logs.faults import grain
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
@@ -26,8 +27,7 @@ Array = NDArray[np.float64]
 
 #: A window's loss counts by its logarithm beyond so many times the upper quartile of all.
 ROBUST = 4.0
-#: Smallest noise that is believed, as a share of each state's usual variation: below it
-#: integrators differ, not physics.
+#: Smallest noise that is believed, as a share of each state's usual variation.
 FINEST = 1e-5
 #: Windows that are fitted: where all rows advance at once, and row by row.
 AT_ONCE, BY_ROW = 120, 40
@@ -94,8 +94,7 @@ def _noise_around(
     nodes = paths.measured(corrected, samples, none)
     scale = corrected.scales(fitter.scale)
     found = noise.estimate(corrected, samples, nodes, none, floor.sigma, scale)
-    least = FINEST * fitter.scale[samples.measured]
-    sigma = np.maximum(found.sigma, least)
+    sigma = np.maximum(found.sigma, _least(samples, fitter.scale))
     return dataclasses.replace(
         found, sigma=noise.with_walks(fit.model.simulator, samples, sigma, seconds)
     )
@@ -114,9 +113,9 @@ def smooth_fitter(
     nodes = paths.measured(model, samples, np.zeros(0))
     scale = _scales(simulator, samples, nodes)
     floor = noise.estimate(model, samples, nodes, np.zeros(0), noise.local_noise(samples), scale)
-    least = FINEST * scale[samples.measured]
     seconds = horizon / (1 - LEAD)
-    sigma = noise.with_walks(simulator, samples, np.maximum(floor.sigma, least), seconds)
+    sigma = np.maximum(floor.sigma, _least(samples, scale))
+    sigma = noise.with_walks(simulator, samples, sigma, seconds)
     floor = dataclasses.replace(floor, sigma=sigma)
     windows = cut(samples, floor.slope.by_state, scale, seconds)
     moving = np.array(noise.driven_states(model))
@@ -127,6 +126,13 @@ def smooth_fitter(
     fitter = weighted(start, nominal, floor.sigma)
     few = enough_substeps(simulator, samples, nodes, fitter.sigma, finest)
     return fitter.with_substeps(few), floor
+
+
+def _least(samples: Samples, scale: Array) -> Array:
+    """Smallest noise that is believed of every measured channel, (m,): integrators differ by as
+    much, and what was rounded errs by as much however fine its steps are beside its range."""
+    steps = np.array([grain([samples.seen[:, column]]) for column in samples.measured])
+    return np.maximum(FINEST * scale[samples.measured], steps / np.sqrt(12))
 
 
 def _scales(simulator: HostSimulator, samples: Samples, nodes: Array) -> Array:

@@ -14,6 +14,8 @@ from residual.gap.search import Key, Search
 #: Families of which an effect may be one and still be worth a name, and one that forecasts do not
 #: clearly need: any of them makes a better simulator, and which it is may be asked of better data.
 MOST_FAMILIES, UNNEEDED = 5, 3
+#: Part of a strength below which an effect hardly acts.
+NEARLY_NONE = 0.1
 #: Part of what a parameter may change by that is a change.
 MOVED = 1e-3
 
@@ -29,6 +31,16 @@ def may_vanish(search: Search, claim: Claim) -> bool:
     strengths = [knob.field for knob in search.candidates[claim.number].knobs if knob.strength]
     numbers = [claim.numbers[field] for field in strengths if field in claim.numbers]
     return bool(numbers) and all(n.low <= 0 <= n.high and not n.at_bound for n in numbers)
+
+
+def hardly_known(search: Search, claim: Claim) -> bool:
+    """Whether every strength of an effect may be less than a part of what was found."""
+    strengths = [knob.field for knob in search.candidates[claim.number].knobs if knob.strength]
+    numbers = [claim.numbers[field] for field in strengths if field in claim.numbers]
+    nearest = [
+        min(n.low / n.value, n.high / n.value) for n in numbers if n.value and not n.at_bound
+    ]
+    return bool(nearest) and max(nearest) < NEARLY_NONE
 
 
 def families(search: Search, claim: Claim) -> set[str]:
@@ -60,7 +72,7 @@ def effect_verdict(
         together: Sets of effects that make the same motion in one exact proportion.
     """
     effect = search.candidates[claim.number].effect
-    vanishes = may_vanish(search, claim)
+    vanishes = may_vanish(search, claim) or hardly_known(search, claim)
     sure = claim.sure and blocks >= TOO_FEW and not vanishes
     kind: Kind = "confirmed" if sure else "ambiguous"
     family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""

@@ -34,7 +34,7 @@ DOUBTS: dict[Doubt, str] = {
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
-    "may_be_zero": "its interval holds zero",
+    "may_be_zero": "its interval holds zero, or nearly",
     "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
     "calibration": "parameters that are a few percent off would do nearly as well",
     "rivals": "an effect of another kind does nearly as well",
@@ -73,7 +73,7 @@ def headline(verdict: Verdict, result: GapResult) -> str:
     numbers = ", ".join(_named(field, number) for field, number in verdict.parameters.items())
     if verdict.family:
         return f"{capitalized(verdict.family)}, form undecided: as {_lower(name)}, {numbers}."
-    return f"{name}{shape(verdict)}: {numbers}."
+    return f"{name}{shape(verdict)}: {numbers}{_times(verdict)}."
 
 
 def _changes(verdict: Verdict) -> str:
@@ -90,6 +90,16 @@ def _changes(verdict: Verdict) -> str:
 
 def _named(field: str, number: Number) -> str:
     return f"{_spelt(field)} {number_text(number)}"
+
+
+#: Of what a share is one more: actuators receive, and sensors read.
+SHARES = {"gain": "the command", "scale": "what is there"}
+
+
+def _times(verdict: Verdict) -> str:
+    """``, so 1.62 times the command`` of a gain, which is a share more."""
+    found = [(f, n) for f, n in verdict.parameters.items() if f in SHARES and n.unit == "1"]
+    return "".join(f", so {1 + n.value:.3g} times {SHARES[f]}" for f, n in found)
 
 
 def _spelt(field: str) -> str:

@@ -67,6 +67,16 @@ def result(*verdicts, share=0.98, effects=None, blocks=20):
     )  # fmt: skip
 
 
+def test_a_gain_is_told_as_a_share_more_and_as_times():
+    gain = Verdict(
+        "confirmed", "actuator_gain", "voltage", {"gain": Number(0.62, 0.5, 0.7, "1")}, (), "",
+        "never parsed", Span(0.9, 0.8, 0.95),
+    )  # fmt: skip
+    assert headline(gain, result(gain)).endswith(
+        "gain 0.62 (0.50 to 0.70), so 1.62 times the command."
+    )
+
+
 @pytest.mark.parametrize(("after", "worse"), [(0.9, False), (1.2, True)])
 def test_the_first_sentence_says_where_the_corrected_simulator_is_worse(after, worse):
     found = result(MASS)

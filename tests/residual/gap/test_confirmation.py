@@ -83,7 +83,9 @@ def test_the_ratio_is_taken_at_the_joint_where_the_effect_matters():
 
 
 def test_forms_of_one_family_are_apart_if_the_same_wins_at_half_the_horizon_too():
-    errors = {(1,): 0.3, (2,): 0.36}
+    close = Toy({(1,): 0.3, (2,): 0.34})
+    assert near(close, (1,), 1, adequate=False) == (("coulomb_friction@pivot",), (), ())
+    errors = {(1,): 0.3, (2,): 0.38}
     assert near(Toy(errors), (1,), 1, adequate=False) == ((), (), ())
     other = near(Toy(errors, half={(1,): 0.3, (2,): 0.25}), (1,), 1, adequate=False)
     assert other == (("coulomb_friction@pivot",), (), ())
@@ -206,7 +208,9 @@ def test_minor_effects_carry_their_share_and_no_number():
     assert (verdict.share.low, verdict.share.value, verdict.share.high) == (0.01, 0.02, 0.03)
 
 
-@pytest.mark.parametrize(("low", "kind"), [(0.004, "confirmed"), (-0.001, "ambiguous")])
+@pytest.mark.parametrize(
+    ("low", "kind"), [(0.004, "confirmed"), (0.0005, "ambiguous"), (-0.001, "ambiguous")]
+)
 def test_what_may_be_zero_is_not_confirmed(low, kind):
     toy = Toy({(0,): 0.3})
     toy.family = lambda number: ""

@@ -118,3 +118,14 @@ def test_so_that_light_friction_is_found_in_a_noisy_log_and_none_where_there_is_
     named = [v for v in found.verdicts if v.kind in ("confirmed", "ambiguous")]
     assert {effect.family for effect in found.effects} == kinds
     assert bool(named) is bool(kinds)
+
+
+def test_noise_is_no_less_than_what_was_rounded():
+    """Whole counts of an encoder, that moves by thousands of them from sample to sample."""
+    run = swinging(0.0, 0.0)
+    counts = np.round(run.states * 1e6) / 1e6
+    fine = Trajectory("fine", run.times, counts, run.actions)
+    coarse = Trajectory("coarse", run.times, np.round(run.states * 2e3) / 2e3, run.actions)
+    for log, step in ((fine, 1e-6), (coarse, 5e-4)):
+        floor = prepare(Frame(), [log], 0.25).floor
+        assert floor.sigma[0] >= step / np.sqrt(12) * (1 - 1e-9)
