@@ -15,10 +15,11 @@ from residual.gap.explain import FOOTNOTE, Explanation
 from residual.gap.forecasts import gap, held_out, main_channel, noise_floor, rollouts
 from residual.gap.imitation import imitated
 from residual.gap.model import Model
-from residual.gap.numerics import other_numerics
+from residual.gap.numerics import other_numerics, own_substeps, with_enough_substeps
 from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import Blind, Gap, GapResult, Rival, Verdict
 from residual.gap.search import Key, Search
+from residual.gap.smooth import SmoothFitter
 from residual.gap.tolerance import KNOWN, allow_for_parameters
 from residual.gap.verdicts import (
     blind_verdict,
@@ -32,6 +33,7 @@ from residual.gap.verdicts import (
     remainder_verdict,
 )
 from residual.trajectories import Trajectory
+from sims.host import HostSimulator
 
 #: Sets listed as evidence.
 EVIDENCE = 40
@@ -128,11 +130,22 @@ def judged_apart(answer: Answer, prepared: Prepared, runs: Sequence[Trajectory],
     search = answer.found.search
     other = prepare(search.simulator, runs, prepared.horizon).fitter
     other = other.weighed_like(search.fitter)
+    corrected = corrected_by(answer)
+    if isinstance(other, SmoothFitter):
+        steps = own_substeps(corrected, runs, other.samples.stride)
+        faster = corrected.substeps > search.simulator.substeps
+        other = other.with_substeps(max(steps if faster else 1, other.samples.substeps))
     fits = []
     for fit in (search.nominal, search.tried[answer.key]):
         fits.append(other.fit(Model(fit.model.bind(fit.theta)), np.zeros(0)))
     floor = noise_floor(other, fits[1], answer.found.floor.sigma)
     return held_out(table, other, fits[0], fits[1], floor)
+
+
+def corrected_by(answer: Answer) -> HostSimulator:
+    """The simulator with what was found."""
+    search, fit = answer.found.search, answer.found.search.tried[answer.key]
+    return with_enough_substeps(fit.model.bind(fit.theta), search, answer.key)
 
 
 def told(
@@ -142,8 +155,14 @@ def told(
     """Everything as plain data."""
     found, search, key = answer.found, answer.found.search, answer.key
     fitter, simulator = search.fitter, search.simulator
-    fit = search.tried[key]
-    corrected = fit.model.bind(fit.theta)
+    corrected = corrected_by(answer)
+    finer = corrected.substeps > simulator.substeps
+    if finer:
+        quality = [
+            *quality,
+            f"what was found is faster than the nominal simulator: the corrected one takes "
+            f"{corrected.substeps} sub-steps in a control period, not {simulator.substeps}",
+        ]
     measured = [simulator.physical_channels[c] for c in fitter.samples.measured]
     blind: tuple[Blind, ...] = ()
     if found.adequate:
@@ -162,6 +181,7 @@ def told(
         rollouts=rollouts(search, search.before, search.validated[key]),
         effects=tuple(corrected.effects[len(simulator.effects) :]),
         corrected=corrected,
+        substeps=corrected.substeps if finer else None,
         channels=tuple((channel.name, channel.unit) for channel in measured),
         noise={
             channel.name: (float(s), float(e))

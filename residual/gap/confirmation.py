@@ -32,6 +32,8 @@ WORSE = 2.0
 #: Part of the time between samples below which a delay or lag is no more certain than the log's
 #: clock: time stamps, and filters in sensors, are as late.
 BRIEF = 0.5
+#: Part of an effect's share of the gap by which it may add to the gap where few blocks tell.
+HARDLY = 0.1
 #: Blocks below which forms within a family are not told apart, and below which nothing is sure.
 FEW, TOO_FEW = 8, 4
 
@@ -88,8 +90,9 @@ class Claim:
 
     @property
     def gains(self) -> bool:
-        """Whether it takes a part of the gap off, whichever blocks of data are drawn."""
-        return self.share[1] >= 0
+        """Whether it takes a part of the gap off, or hardly adds to it, whichever blocks of data
+        are drawn."""
+        return self.share[1] >= -HARDLY * self.share[0]
 
 
 def claims(

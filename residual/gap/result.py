@@ -266,6 +266,7 @@ class GapResult:
         adequate: True if what was found leaves no more than noise, so that chance decided;
             otherwise shares of the error did.
         seconds: Time spent, by stage.
+        substeps: Sub-steps per control period of ``corrected``, if it needs more than it had.
     """
 
     verdicts: tuple[Verdict, ...]
@@ -282,6 +283,7 @@ class GapResult:
     blind: tuple[Blind, ...]
     adequate: bool
     seconds: dict[str, float]
+    substeps: int | None = None
 
     def __repr__(self) -> str:
         kinds = "; ".join(f"{v.effect} {v.kind}".strip() for v in self.verdicts[:4])

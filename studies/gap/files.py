@@ -50,7 +50,9 @@ def write_gap(
     """
     record = gap_record(result, config, findings, seconds)
     with staged(Path(folder)) as stage:
-        corrected = corrected_settings(config["simulator"], result.effects, record["hold"])
+        corrected = corrected_settings(
+            config["simulator"], result.effects, record["hold"], result.substeps
+        )
         about = "# The simulator with what find_gap added; loadable as --simulator corrected.yaml\n"
         text = yaml.safe_dump(relative(corrected, folder), sort_keys=False)
         atomic_write_text(stage / CORRECTED, about + text)

@@ -1,6 +1,7 @@
 """Thinning and sub-steps lose nothing, and how inputs run is told by the data."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from residual.gap.numerics import ROWS, enough_substeps, held_as, own_substeps, 
 from residual.gap.samples import Samples
 from residual.trajectories import Trajectory
 from sims.effects import Delay, ParameterChange
+from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel, Parameter
 from studies.hidden.data import Truth, make_logs
 
 
@@ -132,3 +135,38 @@ def test_a_log_without_a_step_is_refused():
     )
     with pytest.raises(ValueError, match="at least one with a step"):
         Samples.join([short], 1)
+
+
+class Wheel(FirstOrderSystem):
+    """A wheel that is logged once a second."""
+
+    dt = 1.0
+    state_channels = (Channel("speed", "rad/s", "rate", scale=10.0),)
+    action_channels = (Channel("duty", "1", "input", low=-1.0, high=1.0),)
+    parameters: ClassVar = {
+        "gain": Parameter(20.0, "rad/s", "speed at full duty"),
+        "late": Parameter(0.4, "s", "time constant", low=0.02),
+    }
+
+    def derivative(self, x, u, p):
+        return ((p.gain * u[:, 0] - x[:, 0]) / p.late)[:, None]
+
+
+def test_a_corrected_simulator_that_is_faster_takes_finer_steps():
+    """Five steps of 0.2 s are unstable for a time constant of 0.06 s."""
+    rng = np.random.default_rng(0)
+    duty = rng.uniform(-1, 1, (200, 1))
+    x = np.zeros((201, 1))
+    for k in range(200):  # the exact solution
+        x[k + 1] = 20 * duty[k] + (x[k] - 20 * duty[k]) * np.exp(-1.0 / 0.06)
+    log = Trajectory("run", np.arange(201.0), x + rng.normal(0, 0.02, x.shape), duty)
+    half = Trajectory("rest", log.times[:101], log.states[100:], duty[100:])
+    first = Trajectory("first", log.times[:101], log.states[:101], duty[:100])
+    found = find_gap(Wheel(), [first], held=[half], effects=["late"], hold="zero")
+    (change,) = (v for v in found.verdicts if v.effect == "late")
+    assert change.parameters["change"].value < -0.2
+    assert found.substeps is not None and found.substeps > Wheel.substeps
+    assert any("sub-steps in a control period" in note for note in found.quality)
+    path = found.corrected.rollout(x[0], duty)
+    assert np.abs(path - x).max() < 1.0
+    assert found.held_out.after.value < 0.2 * found.held_out.before.value
