@@ -1,6 +1,7 @@
 """Thinning and sub-steps lose nothing, and how inputs run is told by the data."""
 
 import dataclasses
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -9,7 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from residual.gap import find_gap
-from residual.gap.numerics import ROWS, enough_substeps, held_as, own_substeps, stride_for
+from residual.gap.numerics import (
+    ROWS,
+    enough_substeps,
+    held_as,
+    own_substeps,
+    stride_for,
+    with_enough_substeps,
+)
 from residual.gap.samples import Samples
 from residual.trajectories import Trajectory
 from sims.effects import Delay, ParameterChange
@@ -152,21 +160,20 @@ class Wheel(FirstOrderSystem):
         return ((p.gain * u[:, 0] - x[:, 0]) / p.late)[:, None]
 
 
-def test_a_corrected_simulator_that_is_faster_takes_finer_steps():
+@pytest.mark.parametrize(("late", "stable"), [(0.4, True), (0.06, False)])
+def test_a_corrected_simulator_that_is_faster_takes_finer_steps(late, stable):
     """Five steps of 0.2 s are unstable for a time constant of 0.06 s."""
-    rng = np.random.default_rng(0)
-    duty = rng.uniform(-1, 1, (200, 1))
+    duty = np.random.default_rng(0).uniform(-1, 1, (200, 1))
     x = np.zeros((201, 1))
     for k in range(200):  # the exact solution
-        x[k + 1] = 20 * duty[k] + (x[k] - 20 * duty[k]) * np.exp(-1.0 / 0.06)
-    log = Trajectory("run", np.arange(201.0), x + rng.normal(0, 0.02, x.shape), duty)
-    half = Trajectory("rest", log.times[:101], log.states[100:], duty[100:])
-    first = Trajectory("first", log.times[:101], log.states[:101], duty[:100])
-    found = find_gap(Wheel(), [first], held=[half], effects=["late"], hold="zero")
-    (change,) = (v for v in found.verdicts if v.effect == "late")
-    assert change.parameters["change"].value < -0.2
-    assert found.substeps is not None and found.substeps > Wheel.substeps
-    assert any("sub-steps in a control period" in note for note in found.quality)
-    path = found.corrected.rollout(x[0], duty)
-    assert np.abs(path - x).max() < 1.0
-    assert found.held_out.after.value < 0.2 * found.held_out.before.value
+        x[k + 1] = 20 * duty[k] + (x[k] - 20 * duty[k]) * np.exp(-1.0 / late)
+    samples = Samples.join([Trajectory("run", np.arange(201.0), x, duty)], 5)
+    search = SimpleNamespace(
+        fitter=SimpleNamespace(samples=samples, sigma=np.array([0.1])),
+        tried={(0,): SimpleNamespace(inner=SimpleNamespace(nodes=x))},
+    )
+    coarse = Wheel().with_effects([ParameterChange("late", late - 0.4)])
+    fine = with_enough_substeps(coarse, search, (0,))
+    assert (fine.substeps == coarse.substeps) is stable
+    assert (np.abs(coarse.rollout(x[0], duty) - x).max() < 0.1) is stable
+    assert np.abs(fine.rollout(x[0], duty) - x).max() < 0.1
