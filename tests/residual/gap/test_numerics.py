@@ -169,11 +169,13 @@ def test_a_corrected_simulator_that_is_faster_takes_finer_steps(late, stable):
         x[k + 1] = 20 * duty[k] + (x[k] - 20 * duty[k]) * np.exp(-1.0 / late)
     samples = Samples.join([Trajectory("run", np.arange(201.0), x, duty)], 5)
     search = SimpleNamespace(
-        fitter=SimpleNamespace(samples=samples, sigma=np.array([0.1])),
+        fitter=SimpleNamespace(samples=samples, sigma=np.array([1.0])),
         tried={(0,): SimpleNamespace(inner=SimpleNamespace(nodes=x))},
     )
     coarse = Wheel().with_effects([ParameterChange("late", late - 0.4)])
     fine = with_enough_substeps(coarse, search, (0,))
     assert (fine.substeps == coarse.substeps) is stable
-    assert (np.abs(coarse.rollout(x[0], duty) - x).max() < 0.1) is stable
+    with np.errstate(all="ignore"):
+        strayed = np.abs(coarse.rollout(x[0], duty) - x).max()
+    assert bool(strayed < 0.1) is stable
     assert np.abs(fine.rollout(x[0], duty) - x).max() < 0.1
