@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from simgap_files import atomic_write_json, atomic_write_text, read_json
-from studies.running.command import Parser, check_output, fail, guarded
+from studies.running.command import Parser
+from studies.running.ending import check_output, fail, guarded
 from studies.timing.fit_scaling import write_figure
 from studies.timing.tables import SCALING, records, tables
 

@@ -39,7 +39,8 @@ from sims.trust import foreign
 from studies.gap.files import CORRECTED, REPORT, write_gap
 from studies.gap.progress import Heartbeat
 from studies.gap.summary import found_in_data, summary
-from studies.running.command import Parser, check_output, fail, guarded
+from studies.running.command import Parser
+from studies.running.ending import check_output, fail, guarded
 
 
 @dataclasses.dataclass(frozen=True)

@@ -45,7 +45,8 @@ from studies.hidden.report import summary, write_report
 from studies.hidden.rivals import one_step, regression, sparse
 from studies.hidden.scores import replaceable, score, score_names
 from studies.hidden.strengths import draw, truth
-from studies.running.command import Parser, check_output, fail, guarded
+from studies.running.command import Parser
+from studies.running.ending import check_output, fail, guarded
 from studies.running.progress import Progress
 from studies.running.trials import Execution, read_trials, run_trials, trial_folder
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from residual.logs.clocks import Signal
 from residual.logs.sources import signals_of
-from studies.running.command import Parser, fail, guarded
+from studies.running.command import Parser
+from studies.running.ending import fail, guarded
 
 
 def build_parser() -> Parser:

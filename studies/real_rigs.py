@@ -23,7 +23,8 @@ from simgap_files import atomic_write_json, atomic_write_text
 from studies.real.judge import Judged, ask
 from studies.real.rigs import RIGS
 from studies.reporting.markdown import frame_markdown
-from studies.running.command import Parser, check_output, fail, guarded
+from studies.running.command import Parser
+from studies.running.ending import check_output, fail, guarded
 
 #: What a corrected simulator's error may be, in errors of the repair by hand, and processor
 #: time in s.

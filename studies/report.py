@@ -19,7 +19,8 @@ from jinja2 import UndefinedError
 
 from simgap_files import read_sealed
 from studies.learning import command
-from studies.running.command import Parser, fail, guarded
+from studies.running.command import Parser
+from studies.running.ending import fail, guarded
 from studies.running.trials import PLAN
 
 

@@ -22,7 +22,8 @@ import numpy as np
 from jsonargparse.typing import NonNegativeInt, PositiveFloat, PositiveInt
 
 from studies.robots.cases import Answer, Case, ask, cases
-from studies.running.command import Parser, check_output, fail, guarded
+from studies.running.command import Parser
+from studies.running.ending import check_output, fail, guarded
 
 
 def build_parser() -> Parser:

@@ -32,7 +32,8 @@ from simgap_files import atomic_write_text
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
-from studies.running.command import Parser, check_output, guarded
+from studies.running.command import Parser
+from studies.running.ending import check_output, guarded
 from studies.running.progress import Progress
 from studies.running.trials import Execution, run_trials, trial_folder
 

@@ -20,8 +20,8 @@ from studies.learning.trial import code_of_trial, run_trial
 from studies.learnt.films import write_films
 from studies.learnt.report import read_episodes, write_report
 from studies.learnt.tables import write_tables
-from studies.running.command import check_output, fail, guarded, users_code
 from studies.running.curves import Curves
+from studies.running.ending import check_output, fail, guarded, users_code
 from studies.running.grids import expand_grid
 from studies.running.progress import Bars, Several
 from studies.running.trials import Execution, Failures, read_trials, run_trials, trial_folder

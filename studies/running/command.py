@@ -1,21 +1,14 @@
-"""What every study's command line shares: typed settings, one way to end."""
+"""What every study's command line shares: typed settings."""
 
 from __future__ import annotations
 
-import atexit
 import contextlib
-import functools
 import json
-import os
 import re
-import signal
 import sys
-import sysconfig
-import tempfile
-import traceback
 import typing
 from argparse import RawDescriptionHelpFormatter
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -26,17 +19,12 @@ import simgap_yaml
 from sims.loading import in_file, not_found
 from sims.model_files import located, model_settings, names_model
 from sims.trust import check_file, named_packages, trusting
-from sims.unsound import Unsound
+from studies.running.ending import DEBUG, DEBUG_VARIABLE, TRUST, typed
 
-_DEBUG, _DEBUG_VARIABLE, _TRUST = "--debug", "SIMGAP_DEBUG", "--trust"
 _SIMULATORS = ("--simulator", "--corrected")
 _CLASSES = (*_SIMULATORS, "--estimator")
-# What a check of a disk writes before the work: less would fit on a disk that is full.
-_PROBE = bytes(2**16)
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _IMPORT_PATH = re.compile(r"\w+(\.\w+)+")
-_HOME = Path(__file__).parents[2]
-_LIBRARIES = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "purelib", "platlib")]
 
 
 class HelpFormatter(jsonargparse.DefaultHelpFormatter, RawDescriptionHelpFormatter):
@@ -48,7 +36,7 @@ class Parser(jsonargparse.ArgumentParser):
 
     def __init__(self, *given: Any, **options: Any) -> None:
         says = (
-            f"{_DEBUG}, or {_DEBUG_VARIABLE}=1, shows where errors arise. {_TRUST} PACKAGE: files "
+            f"{DEBUG}, or {DEBUG_VARIABLE}=1, shows where errors arise. {TRUST} PACKAGE: files "
             "of simulators, such as corrected.yaml, may name classes of that package."
         )
         if Path(sys.argv[0]).stem == "simgap" and "prog" in options:
@@ -111,7 +99,7 @@ class Parser(jsonargparse.ArgumentParser):
         try:
             return super().instantiate(namespace, *rest, **options)
         except Exception as error:
-            said = str(error) if isinstance(error, ValueError) else _typed(error)
+            said = str(error) if isinstance(error, ValueError) else typed(error)
             self.error(f"the settings do not make what they name: {said}", error)
 
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
@@ -172,134 +160,3 @@ def _settings(source: str | Path) -> dict[str, Any] | None:
         if Path(source).is_file() and names_model(inside := check_file(source)):
             return dict(inside)
     return None
-
-
-def _trusted(arguments: list[str]) -> tuple[list[str], set[str]]:
-    """The arguments without ``--trust``, and the packages that the user trusts by naming them."""
-    given: list[str] = []
-    trusted: set[str] = set()
-    waiting = iter(arguments)
-    for text in waiting:
-        name, equals, value = text.partition("=")
-        if name == _TRUST:
-            trusted.update((value if equals else next(waiting, "")).split(","))
-        else:
-            given.append(text)
-    values = [text.partition("=")[2] if text.startswith("--") else text for text in given]
-    return given, trusted - {""} | named_packages(values)
-
-
-def fail(message: str) -> NoReturn:
-    """End the command with one line on stderr and exit code 2: the user can mend it."""
-    sys.stderr.write(f"error: {' '.join(message.split())}\n")
-    raise SystemExit(2)
-
-
-def guarded(
-    resumes: bool = True,
-) -> Callable[[Callable[[Sequence[str] | None], None]], Callable[..., None]]:
-    """Let a command end in one way, whatever happens.
-
-    Bad input and disks that fail end it with one line and exit code 2, Ctrl-C with 130, a fault
-    of ours with one line, a file that keeps the traceback, and exit code 1. ``--debug`` or
-    ``SIMGAP_DEBUG=1`` shows tracebacks. Files of simulators may name classes of ours, of packages
-    after ``--trust``, and of those whose classes stand beside it on the command line.
-
-    Args:
-        resumes: Whether the same command continues what was stopped.
-    """
-
-    def decorate(main: Callable[[Sequence[str] | None], None]) -> Callable[..., None]:
-        @functools.wraps(main)
-        def run(arguments: Sequence[str] | None = None) -> None:
-            given = list(sys.argv[1:] if arguments is None else arguments)
-            debug = _DEBUG in given or os.environ.get(_DEBUG_VARIABLE, "") not in ("", "0")
-            try:
-                rest, trusted = _trusted([argument for argument in given if argument != _DEBUG])
-                with trusting(trusted):
-                    main(rest)
-            except KeyboardInterrupt:
-                if debug:
-                    traceback.print_exc()
-                # Whoever presses twice shall not interrupt the end.
-                atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
-                then = "goes on" if resumes else "begins anew"
-                sys.stderr.write(f"\nstopped; the same command {then}\n")
-                raise SystemExit(130) from None
-            except SystemExit as ended:
-                if debug and isinstance(ended.__context__, Exception):
-                    traceback.print_exception(ended.__context__)
-                raise
-            except (OSError, Unsound) as error:
-                if debug:
-                    traceback.print_exc()
-                fail(str(error))
-            except Exception as error:
-                if debug:
-                    traceback.print_exc()
-                if place := users_code(error):
-                    fail(f"{place} raised {_typed(error)} (mend it, or see {_DEBUG})")
-                sys.stderr.write(_internal(error))
-                raise SystemExit(1) from error
-
-        return run
-
-    return decorate
-
-
-def users_code(error: BaseException) -> str:
-    """File, line and function of the user's that an error comes from; empty if it is ours.
-
-    Libraries in between, which only pass on what they were given, do not count. Where
-    ours made the error of another one, that one tells.
-    """
-    if isinstance(error, SyntaxError) and error.filename:
-        return f"{error.filename}, line {error.lineno},"
-    for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        path = Path(frame.filename)
-        if not path.is_file() or any(path.is_relative_to(place) for place in _LIBRARIES):
-            continue
-        ours = path.parent == _HOME or (path.is_relative_to(_HOME) and (
-            path.relative_to(_HOME).parts[0] in ("sims", "policy", "residual", "studies")
-        ))  # fmt: skip
-        if not ours:
-            return f"{path}, line {frame.lineno}, in {frame.name}"
-        break
-    return users_code(error.__cause__) if error.__cause__ else ""
-
-
-def _typed(error: BaseException) -> str:
-    return f"{type(error).__name__}: {error}"
-
-
-def _internal(error: Exception) -> str:
-    """Keep the traceback of a fault in a file, and say where."""
-    told = " ".join(_typed(error).split())[:200]
-    text = traceback.format_exc()
-    try:
-        handle, path = tempfile.mkstemp(prefix="simgap-error-", suffix=".txt")
-        with open(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-    except OSError:
-        return f"{text}error: internal fault: {told}\n"
-    return f"error: internal fault: {told} (please report it with {path}, or see {_DEBUG})\n"
-
-
-def check_output(output: str | Path) -> None:
-    """End the command now if results cannot be written into a folder later; nothing is left.
-
-    Args:
-        output: A folder, there already or not.
-    """
-    folder = Path(output)
-    try:
-        there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-        if not there.is_dir():
-            fail(f"--output {folder}: {there} is a file, expected a folder")
-        with tempfile.TemporaryFile(prefix=".partial-", dir=there) as file:
-            file.write(_PROBE)
-            file.flush()
-            os.fsync(file.fileno())
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        fail(f"--output {folder} cannot be written: {reason}")

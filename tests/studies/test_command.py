@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 from studies import learn
 from studies.learning.settings import build_parser
 from studies.pendulum_gap import STUDY
-from studies.running import command
-from studies.running.command import check_output, fail, guarded
+from studies.running import ending
+from studies.running.ending import check_output, fail, guarded
 from studies.running.grids import expand_grid
 
 BASE = {"seed": 0, "budget": {"true_samples": 3750, "iterations": 2}, "estimator": {}}
@@ -93,7 +93,7 @@ def test_a_stopped_command_says_how_to_go_on(capsys):
 
 def test_an_internal_fault_is_one_line_and_a_file(capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr(command, "users_code", lambda error: "")
+    monkeypatch.setattr(ending, "users_code", lambda error: "")
     code, said = ended(capsys, RuntimeError("deliberate"))
     (kept,) = tmp_path.iterdir()
     assert code == 1 and said.count("\n") == 1 and "deliberate" in said and str(kept) in said
