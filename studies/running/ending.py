@@ -17,7 +17,7 @@ from typing import NoReturn
 from sims.trust import named_packages, trusting
 from sims.unsound import Unsound
 
-DEBUG, DEBUG_VARIABLE, TRUST = "--debug", "SIMGAPDEBUG", "--trust"
+DEBUG, DEBUG_VARIABLE, TRUST = "--debug", "SIMGAP_DEBUG", "--trust"
 # What a check of a disk writes before the work: less would fit on a disk that is full.
 _PROBE = bytes(2**16)
 _HOME = Path(__file__).parents[2]
@@ -52,7 +52,7 @@ def guarded(
 
     Bad input and disks that fail end it with one line and exit code 2, Ctrl-C with 130, a fault
     of ours with one line, a file that keeps the traceback, and exit code 1. ``--debug`` or
-    ``SIMGAPDEBUG=1`` shows tracebacks. Files of simulators may name classes of ours, of packages
+    ``SIMGAP_DEBUG=1`` shows tracebacks. Files of simulators may name classes of ours, of packages
     after ``--trust``, and of those whose classes stand beside it on the command line.
 
     Args:
