@@ -21,6 +21,7 @@ QUICK = {
 }
 #: What fails today, and how.
 FAILS: dict[tuple[str, str], str] = {
+    ("heater", "copy"): "the lag goes from 17.3 s to 14.3 s, just outside each other's interval",
     (
         "heater",
         "half",
