@@ -17,7 +17,7 @@ from sims.simulator import Array, Simulator, physical, state_difference
 
 # In s; a slow system is forecast over at least so many periods, as a fast one is over more.
 _HORIZONS = (0.25, 1.0)
-_LEAST_STEPS = (5, 20)
+LEAST_STEPS = (5, 20)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Accuracy:
 
 def usual_steps(dt: float) -> tuple[int, ...]:
     """The usual horizons in steps: a quarter of a second and one, but at least 5 and 20 periods."""
-    pairs = zip(_HORIZONS, _LEAST_STEPS, strict=True)
+    pairs = zip(_HORIZONS, LEAST_STEPS, strict=True)
     return tuple(max(round(horizon / dt), least) for horizon, least in pairs)
 
 

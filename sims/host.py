@@ -24,7 +24,7 @@ from sims.effects.base import Effect, place
 from sims.effects.joint import JointEffect
 from sims.effects.parameter import ParameterChange
 from sims.effects.sensor import through_sensors
-from sims.simulator import Array, Channel, Hold, Simulator, random_values
+from sims.simulator import Array, Channel, Hold, Simulator, physical, random_values
 from sims.simulator import Joint as Joint
 
 
@@ -105,7 +105,7 @@ class HostSimulator(Simulator):
     @property
     def physical_channels(self) -> tuple[Channel, ...]:
         """State channels without the memory of effects."""
-        return tuple(c for c in self.state_channels if c.kind != "memory")
+        return physical(self.state_channels)
 
     @property
     def integrated_channels(self) -> tuple[Channel, ...]:

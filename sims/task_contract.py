@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sims.findings import draw
-from sims.simulator import Array, Simulator
+from sims.simulator import Array, Simulator, physical
 from sims.tasks import Task
 from sims.unsound import Unsound
 
@@ -28,7 +28,7 @@ def refuse_unsound_task(task: Task, simulator: Simulator) -> None:
             or terminations are not one for each row, depend on other rows or are not finite.
     """
     name = type(task).__name__
-    names = [channel.name for channel in simulator.state_channels if channel.kind != "memory"]
+    names = [channel.name for channel in physical(simulator.state_channels)]
     fits = f"{name} does not fit {simulator.name} ({', '.join(names)})"
     horizon = task.horizon
     whole = isinstance(horizon, int | np.integer) and not isinstance(horizon, bool)

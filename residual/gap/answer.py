@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -58,6 +59,12 @@ class Answer:
     key: Key
     claims: tuple[Claim, ...]
     leads: tuple[str, ...]
+
+    @functools.cached_property
+    def corrected(self) -> HostSimulator:
+        """The simulator with what was found."""
+        search, fit = self.found.search, self.found.search.tried[self.key]
+        return with_enough_substeps(fit.model.bind(fit.theta), search, self.key)
 
 
 def matters(found: Explanation, tolerance: float | None) -> bool:
@@ -130,22 +137,15 @@ def judged_apart(answer: Answer, prepared: Prepared, runs: Sequence[Trajectory],
     search = answer.found.search
     other = prepare(search.simulator, runs, prepared.horizon).fitter
     other = other.weighed_like(search.fitter)
-    corrected = corrected_by(answer)
-    if isinstance(other, SmoothFitter):
-        steps = own_substeps(corrected, runs, other.samples.stride)
-        faster = corrected.substeps > search.simulator.substeps
-        other = other.with_substeps(max(steps if faster else 1, other.samples.substeps))
+    if answer.corrected.substeps > search.simulator.substeps:
+        assert isinstance(other, SmoothFitter)
+        steps = own_substeps(answer.corrected, runs, other.samples.stride)
+        other = other.with_substeps(max(steps, other.samples.substeps))
     fits = []
     for fit in (search.nominal, search.tried[answer.key]):
         fits.append(other.fit(Model(fit.model.bind(fit.theta)), np.zeros(0)))
     floor = noise_floor(other, fits[1], answer.found.floor.sigma)
     return held_out(table, other, fits[0], fits[1], floor)
-
-
-def corrected_by(answer: Answer) -> HostSimulator:
-    """The simulator with what was found."""
-    search, fit = answer.found.search, answer.found.search.tried[answer.key]
-    return with_enough_substeps(fit.model.bind(fit.theta), search, answer.key)
 
 
 def told(
@@ -155,7 +155,7 @@ def told(
     """Everything as plain data."""
     found, search, key = answer.found, answer.found.search, answer.key
     fitter, simulator = search.fitter, search.simulator
-    corrected = corrected_by(answer)
+    corrected = answer.corrected
     finer = corrected.substeps > simulator.substeps
     if finer:
         quality = [

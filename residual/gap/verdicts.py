@@ -28,19 +28,21 @@ def nameable(search: Search, claim: Claim, blocks: int) -> bool:
 
 def may_vanish(search: Search, claim: Claim) -> bool:
     """Whether none of an effect's strengths is known to be other than zero."""
-    strengths = [knob.field for knob in search.candidates[claim.number].knobs if knob.strength]
-    numbers = [claim.numbers[field] for field in strengths if field in claim.numbers]
+    numbers = _strengths(search, claim)
     return bool(numbers) and all(n.low <= 0 <= n.high and not n.at_bound for n in numbers)
 
 
 def hardly_known(search: Search, claim: Claim) -> bool:
     """Whether every strength of an effect may be less than a part of what was found."""
-    strengths = [knob.field for knob in search.candidates[claim.number].knobs if knob.strength]
-    numbers = [claim.numbers[field] for field in strengths if field in claim.numbers]
-    nearest = [
-        min(n.low / n.value, n.high / n.value) for n in numbers if n.value and not n.at_bound
-    ]
-    return bool(nearest) and max(nearest) < NEARLY_NONE
+    told = [n for n in _strengths(search, claim) if n.value and not n.at_bound]
+    return bool(told) and max(min(n.low / n.value, n.high / n.value) for n in told) < NEARLY_NONE
+
+
+def _strengths(search: Search, claim: Claim) -> list[Number]:
+    """The numbers of an effect without which it is absent."""
+    knobs = search.candidates[claim.number].knobs
+    fields = [knob.field for knob in knobs if knob.strength]
+    return [claim.numbers[field] for field in fields if field in claim.numbers]
 
 
 def families(search: Search, claim: Claim) -> set[str]:

@@ -6,14 +6,11 @@ import numpy as np
 
 from policy.evaluate import Policy, rollout
 from policy.learner import Algorithm
-from residual.accuracy import Accuracy, accuracy_along, uniform_rollouts
+from residual.accuracy import LEAST_STEPS, Accuracy, accuracy_along, uniform_rollouts
 from residual.corrected import CorrectedSimulator
 from sims.simulator import Simulator
 from sims.system import System
 from studies.learning.training import exploration, visited
-
-# Control periods that rollouts last at least: the longest of the usual horizons.
-_LEAST_STEPS = 20
 
 
 def where_it_goes(
@@ -30,7 +27,8 @@ def where_it_goes(
     """
     protocol = system.evaluation
     env = system.true_environment(corrected)
-    steps = max(_LEAST_STEPS, round(protocol.visited_seconds / corrected.dt))
+    # Long enough for the longest of the usual horizons.
+    steps = max(*LEAST_STEPS, round(protocol.visited_seconds / corrected.dt))
     runs = [rollout(policy, env, seed, max_steps=steps)]
     runs += [
         rollout(policy, env, seed + k, exploration(system, algorithm, seed + k), steps)
