@@ -10,7 +10,8 @@ import numpy as np
 
 from residual.gap.aliases import hidden
 from residual.gap.choice import helps, material
-from residual.gap.confirmation import Claim, claims, in_plain_form, share
+from residual.gap.claim import Claim
+from residual.gap.confirmation import claims, in_plain_form, share
 from residual.gap.exchange import add_exchanged
 from residual.gap.explain import FOOTNOTE, Explanation
 from residual.gap.forecasts import gap, held_out, main_channel, noise_floor, rollouts

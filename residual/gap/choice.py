@@ -81,8 +81,8 @@ def _better_fit(search: Search, keys: list[Key]) -> Key:
 
 
 def _smaller(search: Search, key: Key, among: list[Key]) -> list[Key]:
-    """The best set of fewer effects, and the set without each member, best first."""
-    fewer = [k for k in among if len(k) < len(key)]
+    """The best set of fewer free numbers, and the set without each member, best first."""
+    fewer = [k for k in among if search.numbers(k) < search.numbers(key)]
     best = min(fewer, key=search.error)
     nested = [k for k in among if len(k) == len(key) - 1 and set(k) < set(key)]
     return sorted({best, *nested}, key=search.error)

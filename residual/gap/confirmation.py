@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.choice import AT_ONE
+from residual.gap.claim import Claim
 from residual.gap.exchange import exchanged, split
 from residual.gap.intervals import at_bound, bounded, deviations
 from residual.gap.numerics import at_half_step
-from residual.gap.result import Meant, Number
 from residual.gap.search import Key, Search, all_but
 from residual.gap.significance import score
 
@@ -32,67 +31,8 @@ WORSE = 2.0
 #: Part of the time between samples below which a delay or lag is no more certain than the log's
 #: clock: time stamps, and filters in sensors, are as late.
 BRIEF = 0.5
-#: Part of an effect's share of the gap by which it may add to the gap where few blocks tell.
-HARDLY = 0.1
 #: Blocks below which forms within a family are not told apart, and below which nothing is sure.
 FEW, TOO_FEW = 8, 4
-
-
-@dataclasses.dataclass(frozen=True)
-class Claim:
-    """One chosen effect with everything that bears on its verdict.
-
-    Attributes:
-        number: The candidate.
-        numbers: Fitted numbers.
-        form: Effects of the same family and place that do nearly as well.
-        alike: Effects of other families that do, with the same motion in these data.
-        rivals: Effects of other families that do, with another motion.
-        twins: Effects that make the same motion in any data.
-        needed: Whether forecasts are clearly worse without it; where chance decides, also whether
-            its share is above zero in its interval.
-        steady: Whether its strength is about the same in every fold.
-        sound: Whether it survives other numerics.
-        bounded: Whether a strength lies at its bound.
-        share: Part of the nominal squared error that it takes off, with a 95 % interval.
-        calibration: Whether parameters of the simulator, all within their tolerance, do as well.
-        brief: Whether it is a time too short for the log's own clock.
-        meant: Numbers of its twins in its place.
-        beside: Its own numbers beside twins of the others, where they differ.
-    """
-
-    number: int
-    numbers: dict[str, Number]
-    form: tuple[str, ...]
-    alike: tuple[str, ...]
-    rivals: tuple[str, ...]
-    twins: tuple[str, ...]
-    needed: bool
-    steady: bool
-    sound: bool
-    bounded: bool
-    share: tuple[float, float, float]
-    calibration: bool = False
-    brief: bool = False
-    meant: tuple[Meant, ...] = ()
-    beside: tuple[Meant, ...] = ()
-
-    @property
-    def stand_ins(self) -> tuple[str, ...]:
-        """Effects that could be meant in its place."""
-        return (*self.twins, *self.form, *self.alike, *self.rivals)
-
-    @property
-    def sure(self) -> bool:
-        """Whether nothing speaks against it."""
-        against = (self.bounded, self.calibration, self.brief, self.rivals, self.alike)
-        return self.needed and self.gains and self.steady and self.sound and not any(against)
-
-    @property
-    def gains(self) -> bool:
-        """Whether it takes a part of the gap off, or hardly adds to it, whichever blocks of data
-        are drawn."""
-        return self.share[1] >= -HARDLY * self.share[0]
 
 
 def claims(
@@ -161,8 +101,12 @@ def near(
             others.append(label)
     for rival, fresh in split(search, key, number):
         if not excluded(search, key, rival, number, adequate, alike=False):
-            others += [search.candidates[other].label for other in fresh]
-    return tuple(form), tuple(same), tuple(dict.fromkeys(others))
+            family = search.family(number)
+            akin = [other for other in fresh if family and search.family(other) == family]
+            # A set with one of the family says how it acts, not whether.
+            form += [search.candidates[other].label for other in akin]
+            others += [] if akin else [search.candidates[other].label for other in fresh]
+    return tuple(dict.fromkeys(form)), tuple(same), tuple(dict.fromkeys(others))
 
 
 def excluded(

@@ -49,7 +49,7 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
             if number in key or number in taken or hopeless or not near:
                 continue
             taken.append(number)
-            fresh, theta = search.merged(rest, [(number, gain.values[0])])
+            fresh, theta = search.merged(key, [(number, gain.values[0])], drop=(gone,))
             search.add({fresh: theta})
         if len(search.candidates[gone].knobs) == 2:
             _add_split(search, rest, gone)

@@ -104,7 +104,7 @@ def explain(
     seeds: Proposals = {}
     key: Key = ()
     for _ in range(ROUNDS):
-        search = Search(simulator, pool, fitter, effort, tell, until, beside, twins)
+        search = Search(simulator, pool, fitter, effort, tell, until, beside, twins, floor.sigma)
         if len(search.currency.groups) > 1 and not simulator.has_contacts:
             alone = noise_floor(fitter, search.nominal, floor.sigma)
             search.currency = search.currency.only_where_wrong(alone)
@@ -114,7 +114,9 @@ def explain(
         key = choose(search).key
         fresh, floor = weigh(fitter, search.tried[key])
         ratio = fresh.sigma / fitter.sigma
-        if search.late or ((ratio > 1 / WORTH).all() and (ratio < WORTH).all()):
+        alike = (ratio > 1 / WORTH).all() and (ratio < WORTH).all()
+        finer = fresh.samples.substeps > fitter.samples.substeps
+        if search.late or (alike and not finer):
             break
         seeds = {k: search.own(k) for k in {*near_best(search), key} if k}
         fitter = fresh

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from residual.gap.aliases import aliases, representatives
 from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
 from residual.gap.candidates import Candidate, candidates
+from residual.gap.confirmation import CLEARLY
 from residual.gap.data import examine
 from residual.gap.excerpt import excerpt
 from residual.gap.explain import Explanation, explain
@@ -150,7 +151,7 @@ def find_gap(
             tell("inputs held the other way fit better: once more so")
             ready = prepare(other, runs, horizon)
             again = explained(other, ready)
-            if forecast_error(again.search, again.key) < forecast_error(found.search, found.key):
+            if clearly_better(again, found):
                 prepared, found = ready, again
                 quality.append(
                     f"inputs were taken to {how_held(other)}: the data fit better so; set hold to "
@@ -183,6 +184,12 @@ def find_gap(
             apart = judged_apart(answer, prepared, others, table)
         clock.lap("forecast")
     return told(answer, table, apart, sets, tolerance, quality, clock.laps)
+
+
+def clearly_better(one: Explanation, other: Explanation) -> bool:
+    """Whether one explanation's forecasts are so much better that the other's are excluded."""
+    errors = [forecast_error(found.search, found.key) for found in (one, other)]
+    return CLEARLY**2 * errors[0] < errors[1]
 
 
 def beyond_noise(

@@ -79,7 +79,11 @@ def prepare(
             better = _noise_around(fit, fitter, floor, horizon / (1 - LEAD))
             around = better if (better.sigma < floor.sigma).all() else floor
         again = weighted(now, fit, around.sigma)
-        few = enough_substeps(simulator, now.samples, now.nodes, again.sigma, finest)
+        # What was found may need finer steps than the nominal simulator: friction that holds.
+        corrected = fit.model.bind(fit.theta)
+        plain = Model(corrected).width == len(corrected.physical_channels)
+        stepped = corrected if plain else simulator
+        few = enough_substeps(stepped, now.samples, now.nodes, again.sigma, finest)
         return again.with_substeps(max(few, now.samples.substeps)), around
 
     effort = Effort() if simulator.advances_rows_at_once else Effort(5, 1, 1, 3, 4)

@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 from residual.gap.candidates import Candidate
 from residual.gap.currency import Currency, groups
 from residual.gap.fitting import Fit, Fitter
+from residual.gap.global_search import begins_elsewhere
 from residual.gap.model import Model
 from residual.gap.plausible import absurd
 from residual.gap.screening import Signatures, signatures, trials
+from residual.gap.smooth import SmoothFitter
 from residual.gap.validation import Validated, validate
 from sims.host import HostSimulator
 
@@ -67,6 +69,7 @@ class Search:
         twins: Exact twins of candidates by label, that are tried where those would be absurd.
         beside: Candidates that are free beside every set, the empty one included, and that no set
             is charged for: parameters within their tolerance.
+        noise: Of every measured channel, (m,): sets that leave much more may be sought globally.
         nominal: The simulator as it was given; ``before``: its forecasts.
         tried: Every fitted set: sorted candidate numbers -> fit.
         unfit: Sets that did not converge.
@@ -86,9 +89,10 @@ class Search:
         until: float = np.inf,
         beside: Sequence[Candidate] = (),
         twins: Twins | None = None,
+        noise: Array | None = None,
     ) -> None:
         self.simulator, self.fitter = simulator, fitter
-        self.twins = twins or {}
+        self.twins, self.noise = twins or {}, noise
         self.screened = len(candidates)
         others = {twin.effect: twin for found in self.twins.values() for twin in found}
         known = {candidate.effect for candidate in candidates}
@@ -235,6 +239,7 @@ class Search:
                 start = self._from_nested(key, near, theta)
                 again = self.fitter.fit(self.model(key), start, self.tried[near])
                 found = again if again.merit < found.merit else found
+            found = self._from_elsewhere(key, found)
             if found.merit > 1.001 * floor:
                 self.unfit.add(key)
         self.tried[key] = found
@@ -244,6 +249,16 @@ class Search:
             self.refused[key] = reason
             if number < len(key):
                 self._with_twins(key, key[number])
+
+    def _from_elsewhere(self, key: Key, found: Fit) -> Fit:
+        """The same set from numbers that were sought globally, where that is better."""
+        if self.noise is None or self.late or not isinstance(self.fitter, SmoothFitter):
+            return found
+        start = begins_elsewhere(self.fitter, found, self.noise, self.numbers(key))
+        if start is None:
+            return found
+        again = self.fitter.fit(found.model, start, found)
+        return again if again.merit < found.merit else found
 
     def _with_twins(self, key: Key, gone: int) -> None:
         """Fit a set with each exact twin of a member in its place."""

@@ -146,7 +146,7 @@ class SmoothFitter:
         start = fit.inner.nodes[first]
         which = np.zeros(len(windows), np.int64)
         length = windows.index.shape[1]
-        clean = self._shown(fit.model, first, start, length - 1, fit.theta[None], which)
+        clean = self.shown(fit.model, first, start, length - 1, fit.theta[None], which)
         noisy = clean + sigma * rng.standard_normal(clean.shape)
         seen = np.full_like(samples.seen, np.nan)
         for i, column in enumerate(samples.measured):
@@ -230,7 +230,7 @@ class SmoothFitter:
             for row, column in enumerate(free):
                 variants[1 + row, :, column] += moves[row]
             count = len(variants)
-            path = self._shown(
+            path = self.shown(
                 model, np.tile(first, count), variants.reshape(-1, states.shape[1]), length - 1,
                 thetas, np.tile(which, count),
             ).reshape(count, len(windows), length, len(measured))  # fmt: skip
@@ -255,7 +255,7 @@ class SmoothFitter:
             limit = 3 * self.scale[free]
             states = states.copy()
             states[:, free] += np.clip(step, -limit, limit)
-        full = self._shown(model, first, best, windows.index.shape[1] - 1, thetas, which)
+        full = self.shown(model, first, best, windows.index.shape[1] - 1, thetas, which)
         spread = np.nanstd(samples.seen[:, measured], axis=0)
         square = np.clip(seen - full, -LOST * spread, LOST * spread) ** 2
         # What happens within the lead-in counts too: a lag shows just after a record's start.
@@ -265,7 +265,7 @@ class SmoothFitter:
             _mean(square, self.valid), _mean(square, self.valid & near[..., None]), full
         )
 
-    def _shown(
+    def shown(
         self, model: Model, rows: NDArray[np.int64], states: Array, steps: int, thetas: Array,
         which: NDArray[np.int64],
     ) -> Array:  # fmt: skip

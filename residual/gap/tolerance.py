@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from residual.gap.bounded import bounded_step
 from residual.gap.candidates import Candidate, candidates
-from residual.gap.confirmation import CLEARLY, Claim, tie, where_it_matters
+from residual.gap.claim import Claim
+from residual.gap.confirmation import CLEARLY, tie, where_it_matters
 from residual.gap.exchange import add_without_each, exchanged
 from residual.gap.fitting import Fit
 from residual.gap.intervals import deviations

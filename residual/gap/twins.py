@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.candidates import Candidate, candidates
-from residual.gap.confirmation import Claim
+from residual.gap.claim import Claim
 from residual.gap.fitting import Fit
 from residual.gap.model import Model
 from residual.gap.plausible import absurd

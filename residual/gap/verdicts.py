@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from residual.gap.confirmation import FEW, TOO_FEW, Claim
+from residual.gap.claim import Claim
+from residual.gap.confirmation import FEW, TOO_FEW
 from residual.gap.fitting import Left
 from residual.gap.result import Blind, Doubt, Gap, Kind, Number, Span, Verdict
 from residual.gap.search import Key, Search
@@ -73,6 +74,7 @@ def effect_verdict(
         stand_ins: Effects that could stand in its place beside the other chosen ones, exactly.
         together: Sets of effects that make the same motion in one exact proportion.
     """
+    claim = claim.less(stand_ins)
     effect = search.candidates[claim.number].effect
     vanishes = may_vanish(search, claim) or hardly_known(search, claim)
     sure = claim.sure and blocks >= TOO_FEW and not vanishes

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.bounded import bounded_step
-from residual.gap.confirmation import HOPELESS, Claim, ratio, where_it_matters
+from residual.gap.claim import Claim
+from residual.gap.confirmation import HOPELESS, ratio, where_it_matters
 from residual.gap.exchange import exchanged
 from residual.gap.fitting import Fit
 from residual.gap.intervals import deviations

@@ -115,6 +115,7 @@ class DeadZone(StaticActuatorEffect):
     sentence: ClassVar[str] = "Small commands do nothing, larger ones lose the same amount."
     needs: ClassVar[str] = "small and large inputs"
     upstream_of_sensor: ClassVar[bool] = True
+    holds_still: ClassVar[bool] = True
     stage: ClassVar[int] = 2
 
     def shape(self, u: Value) -> Value:

@@ -122,6 +122,7 @@ class Effect(abc.ABC):
             friction with equal levels is Coulomb's: data that show one of these fit it as well.
         upstream_of_sensor: True if it acts before an input that was measured at the actuator's
             output, so that such a record holds its consequence already.
+        holds_still: True if up to a size of its own nothing moves: forces of friction, or inputs.
     """
 
     name: ClassVar[str]
@@ -132,6 +133,7 @@ class Effect(abc.ABC):
     subfamily: ClassVar[str] = ""
     special_cases: ClassVar[tuple[str, ...]] = ()
     upstream_of_sensor: ClassVar[bool] = False
+    holds_still: ClassVar[bool] = False
 
     @property
     def where(self) -> str:

@@ -22,6 +22,7 @@ class DryFriction(JointEffect):
 
     family: ClassVar[str] = "dissipation"
     subfamily: ClassVar[str] = "dry friction"
+    holds_still: ClassVar[bool] = True
 
     @abc.abstractmethod
     def limit(self, v: Value) -> Value:

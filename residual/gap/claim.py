@@ -1,0 +1,76 @@
+"""A chosen effect with everything that bears on its verdict."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from residual.gap.result import Meant, Number
+
+#: Part of an effect's share of the gap by which it may add to the gap where few blocks tell.
+HARDLY = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class Claim:
+    """One chosen effect with everything that bears on its verdict.
+
+    Attributes:
+        number: The candidate.
+        numbers: Fitted numbers.
+        form: Effects of the same family and place that do nearly as well.
+        alike: Effects of other families that do, with the same motion in these data.
+        rivals: Effects of other families that do, with another motion.
+        twins: Effects that make the same motion in any data.
+        needed: Whether forecasts are clearly worse without it; where chance decides, also whether
+            its share is above zero in its interval.
+        steady: Whether its strength is about the same in every fold.
+        sound: Whether it survives other numerics.
+        bounded: Whether a strength lies at its bound.
+        share: Part of the nominal squared error that it takes off, with a 95 % interval.
+        calibration: Whether parameters of the simulator, all within their tolerance, do as well.
+        brief: Whether it is a time too short for the log's own clock.
+        meant: Numbers of its twins in its place.
+        beside: Its own numbers beside twins of the others, where they differ.
+    """
+
+    number: int
+    numbers: dict[str, Number]
+    form: tuple[str, ...]
+    alike: tuple[str, ...]
+    rivals: tuple[str, ...]
+    twins: tuple[str, ...]
+    needed: bool
+    steady: bool
+    sound: bool
+    bounded: bool
+    share: tuple[float, float, float]
+    calibration: bool = False
+    brief: bool = False
+    meant: tuple[Meant, ...] = ()
+    beside: tuple[Meant, ...] = ()
+
+    @property
+    def stand_ins(self) -> tuple[str, ...]:
+        """Effects that could be meant in its place."""
+        return (*self.twins, *self.form, *self.alike, *self.rivals)
+
+    def less(self, exact: Sequence[str]) -> Claim:
+        """The same if some could stand in its place exactly: they are no other answer."""
+        rivals, alike = (
+            tuple(name for name in names if name not in exact)
+            for names in (self.rivals, self.alike)
+        )
+        return dataclasses.replace(self, rivals=rivals, alike=alike)
+
+    @property
+    def sure(self) -> bool:
+        """Whether nothing speaks against it."""
+        against = (self.bounded, self.calibration, self.brief, self.rivals, self.alike)
+        return self.needed and self.gains and self.steady and self.sound and not any(against)
+
+    @property
+    def gains(self) -> bool:
+        """Whether it takes a part of the gap off, or hardly adds to it, whichever blocks of data
+        are drawn."""
+        return self.share[1] >= -HARDLY * self.share[0]

@@ -1,0 +1,121 @@
+"""Numbers of effects that hold still what hardly moves: sought globally, since slopes mislead.
+
+Where friction holds a joint or a dead zone an input, the times at which motion begins and stops
+jump with the numbers, and where nothing moves no number matters: the method of Gauss and Newton
+ends in one of many local minima. Differential evolution on forecasts of whole windows finds where
+to begin. Source: Storn and Price, "Differential evolution", J. Global Optimization 11 (1997).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import differential_evolution
+
+from residual.gap.fitting import Fit
+from residual.gap.model import Model
+from residual.gap.smooth import LOST, SmoothFitter
+
+Array = NDArray[np.float64]
+
+#: Residual over noise from which on a fit may have ended in a wrong minimum.
+FAR = 3.0
+#: Vectors of numbers in a generation, and generations, for every number.
+POPULATION, GENERATIONS = 12, 5
+#: Windows that are foretold, at most: what is found is only where a fit begins.
+WINDOWS = 16
+#: Most numbers that are sought at once.
+MOST = 8
+#: Reach of a size that is not negative: parts and multiples of its scale.
+SMALLEST, LARGEST = 0.03, 100.0
+#: Reach of what has a sign, in scales: of what cannot fall below some value, and of other numbers.
+LESS, MORE, EITHER = 0.7, 2.5, 10.0
+
+
+def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) -> Array | None:
+    """Numbers from which a fit may do better; None if there is no reason to look.
+
+    Args:
+        fitter: Holds the windows.
+        fit: The fit by slopes.
+        noise: Noise of every measured channel, (m,).
+        free: How many of its numbers, from the first on, are sought; the others stay.
+    """
+    model = fit.model
+    holds = any(candidate.effect.holds_still for candidate in model.chosen)
+    own_step = model.batched and not model.simulator.own_files()
+    if not (holds and own_step and 0 < free <= MOST and _far(fitter, fit, noise)):
+        return None
+    forecasts = _Forecasts(fitter, model)
+    low, high, log = _box(model, fit.theta, free)
+
+    def numbers(points: Array) -> Array:
+        """(V, free) in the space of the search -> (V, p)."""
+        found = np.repeat(fit.theta[None], len(points), axis=0)
+        found[:, :free] = np.where(log, np.exp(points), points)
+        return np.clip(found, model.low, model.high)
+
+    begin = fit.theta[:free]
+    result = differential_evolution(
+        lambda points: forecasts.misses(numbers(points.T)), list(zip(low, high, strict=True)),
+        vectorized=True, updating="deferred", polish=False, tol=0.0, rng=0,
+        popsize=POPULATION, maxiter=GENERATIONS * free,
+        x0=np.clip(np.where(log, np.log(np.maximum(begin, 1e-300)), begin), low, high),
+    )  # fmt: skip
+    return numbers(result.x[None])[0]
+
+
+def _far(fitter: SmoothFitter, fit: Fit, noise: Array) -> bool:
+    """Whether a fit leaves much more than noise."""
+    windows = fitter.blocks.windows
+    square = fit.projected.reshape(*windows.index.shape, -1) ** 2
+    count = np.maximum(fitter.valid.sum(axis=(0, 1)), 1)
+    left = np.sqrt(square.sum(axis=(0, 1)) / count) * fitter.sigma
+    return bool((left > FAR * noise).any())
+
+
+def _box(model: Model, theta: Array, free: int) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Least and greatest of every number, and which are sought by their logarithm, (free,) each."""
+    scale, low, high = 10 * model.step[:free], model.low[:free], model.high[:free]
+    begin = theta[:free]
+    log = low >= 0
+    least = np.maximum(np.maximum(low, SMALLEST * scale), 1e-300)
+    most = np.minimum(high, LARGEST * scale)
+    one_sided = np.isfinite(low)
+    down = np.where(one_sided, -LESS, -EITHER) * scale
+    up = np.where(one_sided, MORE, EITHER) * scale
+    down = np.maximum(np.minimum(down, begin), low)
+    up = np.minimum(np.maximum(up, begin), high)
+    most = np.maximum(most, least * (1 + 1e-6))
+    return np.where(log, np.log(least), down), np.where(log, np.log(most), up), log
+
+
+class _Forecasts:
+    """Forecasts of windows from the measured path's own states."""
+
+    def __init__(self, fitter: SmoothFitter, model: Model) -> None:
+        windows, samples = fitter.blocks.windows, fitter.samples
+        places = np.linspace(0, len(windows) - 1, min(len(windows), WINDOWS))
+        chosen = np.unique(places.round().astype(int))
+        self.fitter, self.model = fitter, model
+        self.rows = windows.index[chosen, 0]
+        self.steps = windows.index.shape[1] - 1
+        self.seen = samples.seen[windows.index[chosen]][..., samples.measured]
+        self.valid = fitter.valid[chosen]
+        self.limit = LOST * np.nanstd(samples.seen[:, samples.measured], axis=0)
+
+    def misses(self, thetas: Array) -> Array:
+        """Logarithm of the squared error of forecasts by each vector of numbers, (V,)."""
+        model, samples, count = self.model, self.fitter.samples, len(self.rows)
+        nodes = self.fitter.nodes
+        if model.width == model.physical:
+            states = np.tile(nodes[self.rows], (len(thetas), 1))
+        else:
+            states = np.vstack([model.widen(samples, nodes, t)[self.rows] for t in thetas])
+        path = self.fitter.shown(
+            model, np.tile(self.rows, len(thetas)), states, self.steps, thetas,
+            np.repeat(np.arange(len(thetas)), count),
+        ).reshape(len(thetas), *self.seen.shape)  # fmt: skip
+        gap = np.where(np.isfinite(path), self.seen - path, self.limit)
+        gap = np.where(self.valid, np.clip(gap, -self.limit, self.limit) / self.fitter.sigma, 0.0)
+        return np.asarray(np.log((gap**2).sum(axis=(1, 2, 3)) + 1e-300))
