@@ -57,6 +57,15 @@ def run(
     return search.best()
 
 
+def extend(search: Search, key: Key) -> None:
+    """Grow one set for as long as one more effect pays."""
+    while not search.late:
+        fresh = min(grow(search, key), key=search.error, default=key)
+        if search.error(fresh) >= (1 - search.effort.stale) * search.error(key):
+            return
+        key = fresh
+
+
 def _alone(search: Search, quiet: Callable[[Key], bool]) -> list[Key]:
     """The likeliest set, if it leaves noise alone: no other is worth growing then."""
     likeliest = min(search.usable(), key=lambda key: score(search, key))

@@ -9,14 +9,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.beam import run
+from residual.gap.beam import extend, run
 from residual.gap.candidates import Candidate
 from residual.gap.choice import Choice, choose, reasons
+from residual.gap.effort import Effort
 from residual.gap.exchange import add_exchanged
 from residual.gap.fitting import Fit, Fitter, Left
 from residual.gap.forecasts import noise_floor
 from residual.gap.noise import Noise
-from residual.gap.search import Effort, Key, Proposals, Search, Twins
+from residual.gap.search import Key, Proposals, Search, Twins
 from residual.gap.significance import score, significant
 from sims.host import HostSimulator
 
@@ -169,7 +170,10 @@ def settle(search: Search, floor: Noise) -> Explanation:
             key = choice.key
         before = len(search.tried)
         most = LEAST if search.late else max(LEAST, RIVALS // max(len(key), 1))
+        reached = search.error(search.best())
         add_exchanged(search, key, most)
+        if not quiet and search.error(search.best()) < (1 - search.effort.stale) * reached:
+            extend(search, search.best())
         if len(search.tried) == before or search.late:
             break
         if not quiet and choose(search, enough).key == key:

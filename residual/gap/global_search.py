@@ -56,11 +56,13 @@ def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) ->
         return np.clip(found, model.low, model.high)
 
     begin = fit.theta[:free]
+    inside = 1e-6 * (high - low)  # a bound itself may be outside by rounding
+    begin = np.where(log, np.log(np.maximum(begin, 1e-300)), begin)
     result = differential_evolution(
         lambda points: forecasts.misses(numbers(points.T)), list(zip(low, high, strict=True)),
         vectorized=True, updating="deferred", polish=False, tol=0.0, rng=0,
         popsize=POPULATION, maxiter=GENERATIONS * free,
-        x0=np.clip(np.where(log, np.log(np.maximum(begin, 1e-300)), begin), low, high),
+        x0=np.clip(begin, low + inside, high - inside),
     )  # fmt: skip
     return numbers(result.x[None])[0]
 

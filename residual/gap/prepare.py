@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from residual.gap import noise, paths
 from residual.gap.blocks import blocks, drive
 from residual.gap.candidates import Candidate
+from residual.gap.effort import Effort
 from residual.gap.fitting import Fit, Fitter
 from residual.gap.impacts.prepare import impact_fitter, simple, weigh_impacts
 from residual.gap.model import Model
 from residual.gap.numerics import enough_substeps, own_substeps, stride_for
 from residual.gap.samples import Samples
-from residual.gap.search import Effort
 from residual.gap.smooth import LEAD, SmoothFitter
 from residual.gap.windows import cut
 from residual.logs.faults import grain

@@ -7,7 +7,6 @@ that does not help.
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from residual.gap.candidates import Candidate
 from residual.gap.currency import Currency, groups
+from residual.gap.effort import Effort
 from residual.gap.fitting import Fit, Fitter
 from residual.gap.global_search import begins_elsewhere
 from residual.gap.model import Model
@@ -33,27 +33,8 @@ Twins = Mapping[str, Sequence[Candidate]]
 
 #: Cosine of what two effects do, start states allowed for, beyond which it is one motion.
 SAME_MOTION = 0.995
-
-
-@dataclasses.dataclass(frozen=True)
-class Effort:
-    """How hard to search.
-
-    Args:
-        singles: Effects of the screen that are fitted alone.
-        pairs: Pairs of the screen that are fitted.
-        beam: Sets that are grown further, beside the one that forecasts best.
-        grown: Effects that each of these is grown by, one at a time.
-        most: Largest number of effects in a set.
-        stale: Share of the error that one more effect must take off for the search to go on.
-    """
-
-    singles: int = 8
-    pairs: int = 2
-    beam: int = 2
-    grown: int = 4
-    most: int = 8
-    stale: float = 0.05
+#: Part of the time for searching that numbers are sought globally, at most.
+GLOBALLY = 0.3
 
 
 def all_but(key: Key, number: int) -> Key:
@@ -107,6 +88,7 @@ class Search:
         self.unfit: set[Key] = set()
         self.refused: dict[Key, str] = {}
         self.halved: dict[Key, Fit] = {}
+        self._begun, self._globally = time.process_time(), 0.0
         self._from_longer_leads: dict[Key, Array] = {}
         self._signatures: dict[Key, Signatures] = {}
         channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
@@ -252,9 +234,14 @@ class Search:
 
     def _from_elsewhere(self, key: Key, found: Fit) -> Fit:
         """The same set from numbers that were sought globally, where that is better."""
-        if self.noise is None or self.late or not isinstance(self.fitter, SmoothFitter):
+        fitter, noise = self.fitter, self.noise
+        if noise is None or not isinstance(fitter, SmoothFitter) or self.late:
             return found
-        start = begins_elsewhere(self.fitter, found, self.noise, self.numbers(key))
+        if self._globally > GLOBALLY * (self.until - self._begun):
+            return found
+        begun = time.process_time()
+        start = begins_elsewhere(fitter, found, noise, self.numbers(key))
+        self._globally += time.process_time() - begun
         if start is None:
             return found
         again = self.fitter.fit(found.model, start, found)

@@ -201,7 +201,7 @@ def grain(runs: Sequence[Array]) -> float:
     gaps = gaps[gaps > 1e-9 * max(abs(values[0]), abs(values[-1]))]
     if not gaps.size:
         return 0.0
-    grain = float(gaps.min())
     # Numbers printed with few digits are nearly, not exactly, multiples of their last digit.
+    grain = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
     whole = np.abs(gaps / grain - np.round(gaps / grain)) < 0.02
     return grain if whole.all() else 0.0

@@ -1,0 +1,26 @@
+"""How hard to search."""
+
+from __future__ import annotations
+
+import dataclasses
+
+
+@dataclasses.dataclass(frozen=True)
+class Effort:
+    """How hard to search.
+
+    Args:
+        singles: Effects of the screen that are fitted alone.
+        pairs: Pairs of the screen that are fitted.
+        beam: Sets that are grown further, beside the one that forecasts best.
+        grown: Effects that each of these is grown by, one at a time.
+        most: Largest number of effects in a set.
+        stale: Share of the error that one more effect must take off for the search to go on.
+    """
+
+    singles: int = 8
+    pairs: int = 2
+    beam: int = 2
+    grown: int = 4
+    most: int = 8
+    stale: float = 0.05

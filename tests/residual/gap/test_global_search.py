@@ -1,0 +1,71 @@
+"""A motor that starts and stops: slopes end in wrong minima, so numbers are sought globally."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from residual.gap.find import find_gap
+from residual.gap.result import GapResult
+from residual.trajectories import Trajectory
+from sims.equations import FirstOrderSystem
+from sims.simulator import Channel, Parameter
+
+#: Truth: speed of a count, time constant, and friction in counts of the command and rad/s.
+GAIN, LAG, SLIDING, BREAKAWAY, SPEED = 0.42, 0.2, 60.0, 110.0, 3.0
+DT, SECONDS, TOP = 0.02, 16.0, 255.0
+
+
+class Motor(FirstOrderSystem):
+    dt = DT
+    state_channels = (Channel("speed", "rad/s", "rate", scale=10.0),)
+    action_channels = (Channel("pwm", "1", "input", scale=100.0, low=-TOP, high=TOP),)
+    parameters: ClassVar = {
+        "gain": Parameter(0.2, "rad/s", "speed of a count"),
+        "time_constant": Parameter(0.15, "s", "time constant"),
+    }
+
+    def derivative(self, x, u, p):
+        return ((p.gain * u[:, 0] - x[:, 0]) / p.time_constant)[:, None]
+
+
+def ramps(fine: int = 100) -> Trajectory:
+    """A log to full speed, to full speed backwards, to rest: explicit Euler, sticking by cases."""
+    times = DT * np.arange(round(SECONDS / DT))
+    commands = TOP * np.interp(times / SECONDS, [0, 0.25, 0.75, 1], [0, 1, -1, 0])
+    speed, speeds = 0.0, []
+    for command in commands:
+        speeds.append(speed)
+        for _ in range(fine):
+            if speed == 0 and abs(command) <= BREAKAWAY:
+                continue
+            way = np.sign(speed) if speed else np.sign(command)
+            friction = SLIDING + (BREAKAWAY - SLIDING) * np.exp(-((speed / SPEED) ** 2))
+            after = speed + DT / fine * (GAIN * (command - way * friction) - speed) / LAG
+            speed = 0.0 if speed * after < 0 else after
+    noise = 0.1 * np.random.default_rng(3).standard_normal(len(speeds))
+    states = (np.array(speeds) + noise)[:, None]
+    return Trajectory("ramps", times, states, commands[:-1, None])
+
+
+@pytest.fixture(scope="module")
+def motor() -> GapResult:
+    return find_gap(Motor(), [ramps()])
+
+
+def test_a_motor_has_stribeck_friction_and_another_gain(motor: GapResult) -> None:
+    named = {v.effect for v in motor.verdicts if v.kind in ("confirmed", "ambiguous")}
+    assert "stribeck_friction" in named
+    assert named & {"actuator_gain", "gain", "sensor_scale"}
+
+
+def test_nothing_else_is_certain(motor: GapResult) -> None:
+    certain = {v.effect for v in motor.verdicts if v.kind == "confirmed"}
+    assert certain <= {"stribeck_friction", "actuator_gain", "gain", "time_constant"}
+
+
+def test_forecasts_err_by_less_than_slopes_alone_reach(motor: GapResult) -> None:
+    # Coulomb friction and a gain, where slopes end, leave a third.
+    assert motor.gap.after.value < 0.2 * motor.gap.before.value
