@@ -24,8 +24,8 @@ FAR = 3.0
 POPULATION, GENERATIONS = 12, 5
 #: Windows that are foretold, at most: what is found is only where a fit begins.
 WINDOWS = 16
-#: Most numbers that are sought at once.
-MOST = 8
+#: Most numbers that are sought at once: larger sets grow from smaller ones.
+MOST = 5
 #: Reach of a size that is not negative: parts and multiples of its scale.
 SMALLEST, LARGEST = 0.03, 100.0
 #: Reach of what has a sign, in scales: of what cannot fall below some value, and of other numbers.

@@ -34,7 +34,7 @@ Twins = Mapping[str, Sequence[Candidate]]
 #: Cosine of what two effects do, start states allowed for, beyond which it is one motion.
 SAME_MOTION = 0.995
 #: Part of the time for searching that numbers are sought globally, at most.
-GLOBALLY = 0.3
+GLOBALLY = 0.2
 
 
 def all_but(key: Key, number: int) -> Key:
