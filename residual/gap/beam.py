@@ -61,9 +61,14 @@ def extend(search: Search, key: Key) -> None:
     """Grow one set for as long as one more effect pays."""
     while not search.late:
         fresh = min(grow(search, key), key=search.error, default=key)
-        if search.error(fresh) >= (1 - search.effort.stale) * search.error(key):
+        if not improves(search, fresh, search.error(key)):
             return
         key = fresh
+
+
+def improves(search: Search, key: Key, reached: float) -> bool:
+    """Whether a set's error is so much less than what was reached that the search goes on."""
+    return search.error(key) < (1 - search.effort.stale) * reached
 
 
 def _alone(search: Search, quiet: Callable[[Key], bool]) -> list[Key]:
@@ -82,7 +87,7 @@ def _best(search: Search, keys: list[Key]) -> list[Key]:
 
 def _pays(search: Search, key: Key, reached: float) -> bool:
     """Whether a set is clearly better than what was reached, in all or in one joint."""
-    if search.error(key) < (1 - search.effort.stale) * reached:
+    if improves(search, key, reached):
         return True
     before = min((k for k in search.usable() if len(k) < len(key)), key=search.error)
     own = search.currency.by_group(search.validated[key].squares)

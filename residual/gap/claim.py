@@ -11,6 +11,11 @@ from residual.gap.result import Meant, Number
 HARDLY = 0.1
 
 
+def other_than(exact: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Names of effects less those that move exactly alike."""
+    return tuple(name for name in names if name not in exact)
+
+
 @dataclasses.dataclass(frozen=True)
 class Claim:
     """One chosen effect with everything that bears on its verdict.
@@ -57,10 +62,7 @@ class Claim:
 
     def less(self, exact: Sequence[str]) -> Claim:
         """The same if some could stand in its place exactly: they are no other answer."""
-        rivals, alike = (
-            tuple(name for name in names if name not in exact)
-            for names in (self.rivals, self.alike)
-        )
+        rivals, alike = other_than(exact, self.rivals), other_than(exact, self.alike)
         return dataclasses.replace(self, rivals=rivals, alike=alike)
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.choice import AT_ONE
-from residual.gap.claim import Claim
+from residual.gap.claim import Claim, other_than
 from residual.gap.exchange import exchanged, split
 from residual.gap.intervals import at_bound, bounded, deviations
 from residual.gap.numerics import at_half_step
@@ -65,9 +65,9 @@ def claims(
             Claim(
                 number,
                 {fit.model.knobs[j].field: bounded(fit, j, half[j], numerics) for j in own},
-                tuple(name for name in form if name not in twins),
-                tuple(name for name in alike if name not in twins),
-                tuple(name for name in rivals if name not in twins),
+                other_than(twins, form),
+                other_than(twins, alike),
+                other_than(twins, rivals),
                 twins,
                 needed(search, key, number, adequate) and not (adequate and taken[1] < 0),
                 all(steady(search, key, j) for j in strengths),
@@ -84,12 +84,11 @@ def near(
     search: Search, key: Key, number: int, adequate: bool
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Effects that do nearly as well in place of a chosen one, see ``Claim``."""
-    rest = all_but(key, number)
+    rest, family = all_but(key, number), search.family(number)
     form: list[str] = []
     same: list[str] = []
     others: list[str] = []
     for other, rival in exchanged(search, key, number):
-        family = search.family(number)
         alike = bool(family) and search.family(other) == family
         label = search.candidates[other].label
         out = excluded(search, key, rival, number, adequate, alike)
@@ -101,7 +100,6 @@ def near(
             others.append(label)
     for rival, fresh in split(search, key, number):
         if not excluded(search, key, rival, number, adequate, alike=False):
-            family = search.family(number)
             akin = [other for other in fresh if family and search.family(other) == family]
             # A set with one of the family says how it acts, not whether.
             form += [search.candidates[other].label for other in akin]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.beam import extend, run
+from residual.gap.beam import extend, improves, run
 from residual.gap.candidates import Candidate
 from residual.gap.choice import Choice, choose, reasons
 from residual.gap.effort import Effort
@@ -172,7 +172,7 @@ def settle(search: Search, floor: Noise) -> Explanation:
         most = LEAST if search.late else max(LEAST, RIVALS // max(len(key), 1))
         reached = search.error(search.best())
         add_exchanged(search, key, most)
-        if not quiet and search.error(search.best()) < (1 - search.effort.stale) * reached:
+        if not quiet and improves(search, search.best(), reached):
             extend(search, search.best())
         if len(search.tried) == before or search.late:
             break

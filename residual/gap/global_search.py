@@ -55,9 +55,8 @@ def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) ->
         found[:, :free] = np.where(log, np.exp(points), points)
         return np.clip(found, model.low, model.high)
 
-    begin = fit.theta[:free]
+    begin = np.where(log, np.log(np.maximum(fit.theta[:free], 1e-300)), fit.theta[:free])
     inside = 1e-6 * (high - low)  # a bound itself may be outside by rounding
-    begin = np.where(log, np.log(np.maximum(begin, 1e-300)), begin)
     result = differential_evolution(
         lambda points: forecasts.misses(numbers(points.T)), list(zip(low, high, strict=True)),
         vectorized=True, updating="deferred", polish=False, tol=0.0, rng=0,

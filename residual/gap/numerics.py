@@ -53,11 +53,11 @@ def enough_substeps(
 ) -> int:
     """As few sub-steps as change nothing that could be seen, at most ``most``.
 
-    The nominal simulator is advanced from rows of the table with so many sub-steps and twice as
+    The simulator is advanced from rows of the table with so many sub-steps and twice as
     many; the worst twentieth of the rows decides.
 
     Args:
-        simulator: The nominal simulator.
+        simulator: The nominal simulator, or with what was found.
         samples: The table.
         nodes: States at its rows, (n, n_s).
         sigma: Error of every measured channel that counts one, (m,).
