@@ -23,7 +23,7 @@ def column(value: float | Array) -> float | Array:
 
 
 def shaped(samples: Array, effects: Iterable[ActuatorEffect]) -> Array:
-    """Samples (rows, T) of one input after gain, bias, dead zone and saturation."""
+    """Samples (rows, T) of one input after bias, dead zone, gain and saturation."""
     for effect in sorted(effects, key=lambda effect: effect.stage):
         if isinstance(effect, StaticActuatorEffect):
             columns = effect.with_values(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from residual.gap.screening import gains, pair_gains
 from residual.gap.search import Key, Search, all_but
 
@@ -51,8 +53,26 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
             taken.append(number)
             fresh, theta = search.merged(key, [(number, gain.values[0])], drop=(gone,))
             search.add({fresh: theta})
+        _add_plainer(search, key, gone)
         if len(search.candidates[gone].knobs) == 2:
             _add_split(search, rest, gone)
+
+
+def _add_plainer(search: Search, key: Key, gone: int) -> None:
+    """Fit special cases of a member in its place, from the mean of its strengths.
+
+    Also those that were fitted before: they may have ended elsewhere than the law that holds them.
+    """
+    model = search.tried[key].model
+    own = [j for j in range(len(model)) if model.owner[j] == key.index(gone)]
+    strengths = [search.tried[key].theta[j] for j in own if model.knobs[j].strength]
+    for number, case in enumerate(search.candidates[: search.screened]):
+        if number in key or not search.contains(gone, number) or len(case.knobs) != 1:
+            continue
+        fresh, theta = search.merged(key, [(number, np.mean(strengths, keepdims=True))], (gone,))
+        if fresh in search.tried:
+            search.fit(fresh, theta)
+        search.add({fresh: theta})
 
 
 def _add_split(search: Search, rest: Key, gone: int) -> None:

@@ -31,8 +31,6 @@ Proposals = dict[Key, Array]
 Twins = Mapping[str, Sequence[Candidate]]
 
 
-#: Cosine of what two effects do, start states allowed for, beyond which it is one motion.
-SAME_MOTION = 0.995
 #: Part of the time for searching that numbers are sought globally, at most.
 GLOBALLY = 0.2
 
@@ -206,6 +204,8 @@ class Search:
     def fit(self, key: Key, theta: Array) -> None:
         """Fit a set from start values, and from its nested sets if it ends worse than one.
 
+        If it was fitted before, the better fit stays.
+
         Args:
             key: The set.
             theta: Start values of its own numbers.
@@ -222,8 +222,11 @@ class Search:
                 again = self.fitter.fit(self.model(key), start, self.tried[near])
                 found = again if again.merit < found.merit else found
             found = self._from_elsewhere(key, found)
-            if found.merit > 1.001 * floor:
-                self.unfit.add(key)
+        if key in self.tried and found.merit >= self.tried[key].merit:
+            return
+        self._forget(key)
+        if nested and found.merit > 1.001 * self.tried[near].merit:
+            self.unfit.add(key)
         self.tried[key] = found
         self.validated[key] = validate(self.fitter, found)
         number, reason = absurd(found.model, found.theta, self.fitter.samples)
@@ -231,6 +234,14 @@ class Search:
             self.refused[key] = reason
             if number < len(key):
                 self._with_twins(key, key[number])
+
+    def _forget(self, key: Key) -> None:
+        """Forget what was worked out from an earlier fit of a set."""
+        self.unfit.discard(key)
+        self.refused.pop(key, None)
+        self.halved.pop(key, None)
+        self._from_longer_leads.pop(key, None)
+        self._signatures.pop(key, None)
 
     def _from_elsewhere(self, key: Key, found: Fit) -> Fit:
         """The same set from numbers that were sought globally, where that is better."""
@@ -283,16 +294,6 @@ class Search:
         effect = self.candidates[number].effect
         family = effect.family_in(self.simulator)
         return f"{family}@{self.place(number)}" if family else ""
-
-    def same_motion(self, rest: Key, one: int, other: int) -> bool:
-        """Whether two effects make the same motion in these data beside some others."""
-        around = self.signatures(rest)
-        columns = {v.candidate: v.columns for v in around.variants}
-        if any(len(columns[number]) != 1 for number in (one, other)):
-            return False
-        a, b = (around.matrix[:, columns[number][0]] for number in (one, other))
-        lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
-        return lengths > 0 and abs(float(a @ b)) > SAME_MOTION * lengths
 
     def place(self, number: int) -> str:
         """The joint, actuator, channel or parameter of a candidate."""

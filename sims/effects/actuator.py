@@ -27,8 +27,8 @@ AND = " and "
 class ActuatorEffect(Effect):
     """A change of one input on its way to the actuator.
 
-    Whatever their order in a list, effects act in the order of the classes below: gain,
-    bias, dead zone, saturation (an amplifier and its output stage), then delay, then lag.
+    Whatever their order in a list, effects act in the order of the classes below: bias and
+    dead zone, in units of the command, gain, saturation of what comes out, then delay, then lag.
 
     Attributes:
         actuator: The input, or several of one unit on which it acts alike, ``"left and right"``.
@@ -73,22 +73,6 @@ class StaticActuatorEffect(ActuatorEffect):
 
 
 @dataclasses.dataclass(frozen=True)
-class ActuatorGain(StaticActuatorEffect):
-    """The actuator receives ``(1 + gain) u``."""
-
-    gain: Value = number(low=-0.99, share=1.0, input=0)
-
-    name: ClassVar[str] = "actuator_gain"
-    sentence: ClassVar[str] = "The actuator is stronger or weaker than commanded, by a share."
-    needs: ClassVar[str] = "a varied input"
-    stage: ClassVar[int] = 0
-
-    def shape(self, u: Value) -> Value:
-        """Scaled command."""
-        return (1.0 + self.gain) * u
-
-
-@dataclasses.dataclass(frozen=True)
 class ActuatorBias(StaticActuatorEffect):
     """The actuator receives ``u + bias``."""
 
@@ -98,7 +82,7 @@ class ActuatorBias(StaticActuatorEffect):
     sentence: ClassVar[str] = "The actuator adds a constant to every command."
     needs: ClassVar[str] = "motion in both directions"
     family: ClassVar[str] = "constant push"
-    stage: ClassVar[int] = 1
+    stage: ClassVar[int] = 0
 
     def shape(self, u: Value) -> Value:
         """Shifted command."""
@@ -116,11 +100,27 @@ class DeadZone(StaticActuatorEffect):
     needs: ClassVar[str] = "small and large inputs"
     upstream_of_sensor: ClassVar[bool] = True
     holds_still: ClassVar[bool] = True
-    stage: ClassVar[int] = 2
+    stage: ClassVar[int] = 1
 
     def shape(self, u: Value) -> Value:
         """What is left of the command."""
         return u - np.clip(u, -self.width, self.width)
+
+
+@dataclasses.dataclass(frozen=True)
+class ActuatorGain(StaticActuatorEffect):
+    """The actuator receives ``(1 + gain) u``."""
+
+    gain: Value = number(low=-0.99, share=1.0, input=0)
+
+    name: ClassVar[str] = "actuator_gain"
+    sentence: ClassVar[str] = "The actuator is stronger or weaker than commanded, by a share."
+    needs: ClassVar[str] = "a varied input"
+    stage: ClassVar[int] = 2
+
+    def shape(self, u: Value) -> Value:
+        """Scaled command."""
+        return (1.0 + self.gain) * u
 
 
 @dataclasses.dataclass(frozen=True)

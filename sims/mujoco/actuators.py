@@ -61,6 +61,7 @@ class Circuit:
         )
         self.bounded = bool(model.actuator_ctrllimited[a])
         self._force = float(self.gain[0])
+        self._shift = 0.0  # force that comes of a shifted command: it grows with the gain
         self._shaped = False
         self._general = False
         self.plain: dict[str, str | None] = {}
@@ -81,6 +82,7 @@ class Circuit:
         if self.kind != int(mujoco.mjtGain.mjGAIN_FIXED):
             return "its gain is no constant"
         self.gain[0] *= 1 + share
+        self._shift_by(share * self._shift)
         self._shaped = self._general = True
         return ""
 
@@ -89,7 +91,11 @@ class Circuit:
         if self.kind != int(mujoco.mjtGain.mjGAIN_FIXED) or self.dynamics:
             return "its gain is no constant, or it has a state"
         self._shaped = True
-        return self._push(self._force * amount)
+        return self._shift_by(self._force * amount)
+
+    def _shift_by(self, force: float) -> str:
+        self._shift += force
+        return self._push(force) if force else ""
 
     def push(self, force: float) -> str:
         """A constant force acts on its joint."""

@@ -68,7 +68,7 @@ def test_static_effects_act_in_the_order_of_the_chain():
         ActuatorGain("voltage", 0.5),
     ]
     found = drive(chain, [1.0, -0.3, 2.9], substeps=1).ravel()
-    assert found == pytest.approx([1.5 + 0.2 - 0.5, 0.0, 2.0])
+    assert found == pytest.approx([1.5 * (1.0 + 0.2 - 0.5), 0.0, 2.0])
 
 
 def test_input_before_the_log_can_be_given():
