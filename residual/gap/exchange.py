@@ -50,9 +50,10 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
                 continue
             if number in key or number in taken or hopeless or not near:
                 continue
-            taken.append(number)
             fresh, theta = search.merged(key, [(number, gain.values[0])], drop=(gone,))
-            search.add({fresh: theta})
+            if not search.doubles(fresh):
+                taken.append(number)
+                search.add({fresh: theta})
         _add_plainer(search, key, gone)
         if len(search.candidates[gone].knobs) == 2:
             _add_split(search, rest, gone)

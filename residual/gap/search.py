@@ -122,10 +122,13 @@ class Search:
         A law beside its own special case is one law too many, and so is a delay of two inputs
         beside that of one of them.
         """
+        few = len(key) <= self.effort.most and self.numbers(key) <= self.most_numbers
+        return few and not self.doubles(key)
+
+    def doubles(self, key: Key) -> bool:
+        """Whether a set holds an effect twice."""
         effects = [self.candidates[i].effect for i in key]
-        if any(one.covers(other) for one in effects for other in effects):
-            return False
-        return len(key) <= self.effort.most and self.numbers(key) <= self.most_numbers
+        return any(one.covers(other) for one in effects for other in effects)
 
     @property
     def most_numbers(self) -> int:
