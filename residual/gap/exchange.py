@@ -13,6 +13,8 @@ from residual.gap.search import Key, Search, all_but
 HOPELESS = 0.5
 #: Spellings of one effect, as cogging has one for every order, that are tried for one place.
 SPELLINGS = 2
+#: Effects that hold still tried in place of one that does, whatever the linear screen says.
+STILL = 3
 #: Pairs that are tried in place of one effect with as many numbers.
 SPLITS = 2
 
@@ -27,7 +29,9 @@ def add_without_each(search: Search, key: Key) -> None:
 def add_exchanged(search: Search, key: Key, most: int) -> None:
     """Fit sets in which one member of a set has been exchanged for what may do its work.
 
-    These are the effects that gain most where the member is missing, and its whole family.
+    These are the effects that gain most where the member is missing, and its whole family; in
+    place of what holds still, such as a dead zone, all that does, such as dry friction: of these
+    a linear screen tells little.
 
     Args:
         search: What is tried goes there.
@@ -41,16 +45,23 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
             continue
         around, family = search.signatures(rest), search.family(gone)
         taken: list[int] = []
+        still: list[int] = []
         ranked = gains(around)
         for gain in ranked:
             number = around.variants[gain.variants[0]].candidate
             near = len(taken) < most or (family and search.family(number) == family)
             hopeless = gain.value < HOPELESS * ranked[0].value
+            fresh_one = number not in (*still, *key)
+            if fresh_one and both_hold_still(search, gone, number) and len(still) < STILL:
+                near, hopeless = True, False
+                still.append(number)
             if number not in taken and spelt_out(search, number, taken):
                 continue
             if number in key or number in taken or hopeless or not near:
                 continue
-            fresh, theta = search.merged(key, [(number, gain.values[0])], drop=(gone,))
+            bold = search.candidates[number].bold
+            start = gain.values[0] if gain.value > 0 or bold is None else bold
+            fresh, theta = search.merged(key, [(number, start)], drop=(gone,))
             if not search.doubles(fresh):
                 taken.append(number)
                 search.add({fresh: theta})
@@ -84,6 +95,11 @@ def _add_split(search: Search, rest: Key, gone: int) -> None:
         numbers = [around.variants[v].candidate for v in pair.variants]
         fresh, theta = search.merged(rest, zip(numbers, pair.values, strict=True))
         search.add({fresh: theta} if search.fits_in(fresh) else {})
+
+
+def both_hold_still(search: Search, one: int, other: int) -> bool:
+    """Whether two effects keep from moving what hardly moves."""
+    return all(search.candidates[number].effect.holds_still for number in (one, other))
 
 
 def spelt_out(search: Search, number: int, taken: Sequence[int]) -> bool:

@@ -68,11 +68,6 @@ class Explanation:
         return self.choice.key
 
     @property
-    def nothing(self) -> bool:
-        """Whether the nominal simulator leaves no more than noise."""
-        return not self.key and self.adequate
-
-    @property
     def adequate(self) -> bool:
         """Whether chance decided."""
         return bool(np.isfinite(self.needed))

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from residual.gap.blocks import Blocks
 from residual.gap.fitting import Fit, Fitter
+from residual.gap.model import Model
 from residual.gap.result import ChannelGap, Gap, Rollout, Span, Step
 from residual.gap.search import Key, Search
-from residual.gap.validation import Validated, by_block
+from residual.gap.validation import Validated, by_block, validate
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -117,6 +118,15 @@ def main_channel(
     places = [i for i, kind in enumerate(kinds) if kind in ("position", "other")] or [0]
     times = np.nanmean(before, axis=0) / np.maximum(np.nanmean(floor, axis=0), 1e-300)
     return max(places, key=lambda i: times[i])
+
+
+def beside_noise(simulator: HostSimulator, fitter: Fitter, sigma: Array) -> float:
+    """Forecast error of a simulator over that by noise alone, of the channel that shows it most."""
+    fit = fitter.fit(Model(simulator), np.zeros(0))
+    squares, floor = validate(fitter, fit).squares, noise_floor(fitter, fit, sigma)
+    main = main_channel(simulator, fitter.samples.measured, squares, floor)
+    by_noise = max(float(np.nanmean(floor[:, main])), 1e-300)
+    return float(np.sqrt(np.nanmean(squares[:, main]) / by_noise))
 
 
 def rollouts(search: Search, before: Validated, after: Validated) -> tuple[Rollout, ...]:

@@ -24,6 +24,8 @@ FEW_RIVALS = 2
 TRIFLE = 0.05
 #: Error on records set aside, over that of the nominal simulator, from which on it is worse.
 WORSE = 1.05
+#: The same over that by noise, from which on there is a gap.
+OFF = 1.5
 
 
 def lead(result: GapResult, tolerance: float | None = None) -> str:
@@ -46,7 +48,23 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
     if "unexplained" in kinds:
         return f"The gap has no name: the {ahead(gap)} is {before}."
     floor = quantity_text(gap.noise_floor.value, gap.unit)
-    return f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
+    none = f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
+    return none + _but_off_apart(result)
+
+
+def _but_off_apart(result: GapResult) -> str:
+    """That records set aside do have a gap, if they do."""
+    apart = result.held_out
+    if apart is None:
+        return ""
+    error, noise = apart.before, apart.noise_floor
+    if error.value <= OFF * noise.value or error.low <= noise.high:
+        return ""
+    before, alone = (quantity_text(s.value, apart.unit) for s in (error, noise))
+    return (
+        f" But the records set aside have one: there the {ahead(apart)} is {before}, and noise "
+        f"alone makes {alone}. Search them, too."
+    )
 
 
 def _but_worse_apart(result: GapResult) -> str:

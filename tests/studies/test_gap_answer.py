@@ -89,6 +89,17 @@ def test_the_first_sentence_says_where_the_corrected_simulator_is_worse(after, w
     ) is worse
 
 
+@pytest.mark.parametrize(("error", "said"), [(1.2, False), (2.0, True)])
+def test_the_first_sentence_says_where_only_records_set_aside_have_a_gap(error, said):
+    found = result(NO_GAP, effects=[])
+    noise = Span(1.0, 0.9, 1.1)
+    before = Span(error, 0.9 * error, 1.1 * error)
+    apart = dataclasses.replace(found.gap, before=before, noise_floor=noise)
+    says = lead(dataclasses.replace(found, held_out=apart))
+    assert says.startswith("No gap above the noise: ")
+    assert ("But the records set aside have one: there the 1 s error of angle is 2 rad" in says) is said
+
+
 @pytest.mark.parametrize(
     ("verdicts", "first"),
     [
