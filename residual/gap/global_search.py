@@ -8,16 +8,20 @@ to begin. Source: Storn and Price, "Differential evolution", J. Global Optimizat
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from residual.gap.fitting import Fit
+from residual.gap.fitting import Fit, Fitter
 from residual.gap.model import Model
 from residual.gap.smooth import LOST, SmoothFitter
 
 Array = NDArray[np.float64]
 
+#: Part of the time for searching, at most.
+GLOBALLY = 0.2
 #: Residual over noise from which on a fit may have ended in a wrong minimum.
 FAR = 3.0
 #: Vectors of numbers in a generation, and generations, for every number.
@@ -30,6 +34,40 @@ MOST = 5
 SMALLEST, LARGEST = 0.03, 100.0
 #: Reach of what has a sign, in scales: of what cannot fall below some value, and of other numbers.
 LESS, MORE, EITHER = 0.7, 2.5, 10.0
+
+
+class GlobalSearch:
+    """Fits from numbers that were sought globally, for a part of the time.
+
+    Args:
+        noise: Of every measured channel, (m,): what leaves much more may be sought globally; None
+            to seek nothing.
+        until: When searching ends, on the clock of ``time.process_time``.
+    """
+
+    def __init__(self, noise: Array | None, until: float) -> None:
+        self.noise, self.until = noise, until
+        self._left = GLOBALLY * (until - time.process_time())
+
+    def better(self, fitter: Fitter, found: Fit, free: int) -> Fit:
+        """A fit, or the same set's from elsewhere where that is better.
+
+        Args:
+            fitter: Holds the windows.
+            found: The fit by slopes.
+            free: How many of its numbers, from the first on, are sought; the others stay.
+        """
+        if self.noise is None or not isinstance(fitter, SmoothFitter):
+            return found
+        begun = time.process_time()
+        if begun > self.until or self._left < 0:
+            return found
+        start = begins_elsewhere(fitter, found, self.noise, free)
+        self._left -= time.process_time() - begun
+        if start is None:
+            return found
+        again = fitter.fit(found.model, start, found)
+        return again if again.merit < found.merit else found
 
 
 def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) -> Array | None:

@@ -17,11 +17,10 @@ from residual.gap.candidates import Candidate
 from residual.gap.currency import Currency, groups
 from residual.gap.effort import Effort
 from residual.gap.fitting import Fit, Fitter
-from residual.gap.global_search import begins_elsewhere
+from residual.gap.global_search import GlobalSearch
 from residual.gap.model import Model
 from residual.gap.plausible import absurd
 from residual.gap.screening import Signatures, signatures, trials
-from residual.gap.smooth import SmoothFitter
 from residual.gap.validation import Validated, validate
 from sims.host import HostSimulator
 
@@ -29,10 +28,6 @@ Array = NDArray[np.float64]
 Key = tuple[int, ...]
 Proposals = dict[Key, Array]
 Twins = Mapping[str, Sequence[Candidate]]
-
-
-#: Part of the time for searching that numbers are sought globally, at most.
-GLOBALLY = 0.2
 
 
 def all_but(key: Key, number: int) -> Key:
@@ -48,7 +43,6 @@ class Search:
         twins: Exact twins of candidates by label, that are tried where those would be absurd.
         beside: Candidates that are free beside every set, the empty one included, and that no set
             is charged for: parameters within their tolerance.
-        noise: Of every measured channel, (m,): sets that leave much more may be sought globally.
         nominal: The simulator as it was given; ``before``: its forecasts.
         tried: Every fitted set: sorted candidate numbers -> fit.
         unfit: Sets that did not converge.
@@ -71,7 +65,7 @@ class Search:
         noise: Array | None = None,
     ) -> None:
         self.simulator, self.fitter = simulator, fitter
-        self.twins, self.noise = twins or {}, noise
+        self.twins = twins or {}
         self.screened = len(candidates)
         others = {twin.effect: twin for found in self.twins.values() for twin in found}
         known = {candidate.effect for candidate in candidates}
@@ -86,7 +80,7 @@ class Search:
         self.unfit: set[Key] = set()
         self.refused: dict[Key, str] = {}
         self.halved: dict[Key, Fit] = {}
-        self._begun, self._globally = time.process_time(), 0.0
+        self._globally = GlobalSearch(noise, until)
         self._from_longer_leads: dict[Key, Array] = {}
         self._signatures: dict[Key, Signatures] = {}
         channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
@@ -224,7 +218,7 @@ class Search:
                 start = self._from_nested(key, near, theta)
                 again = self.fitter.fit(self.model(key), start, self.tried[near])
                 found = again if again.merit < found.merit else found
-            found = self._from_elsewhere(key, found)
+            found = self._globally.better(self.fitter, found, self.numbers(key))
         if key in self.tried and found.merit >= self.tried[key].merit:
             return
         self._forget(key)
@@ -245,21 +239,6 @@ class Search:
         self.halved.pop(key, None)
         self._from_longer_leads.pop(key, None)
         self._signatures.pop(key, None)
-
-    def _from_elsewhere(self, key: Key, found: Fit) -> Fit:
-        """The same set from numbers that were sought globally, where that is better."""
-        fitter, noise = self.fitter, self.noise
-        if noise is None or not isinstance(fitter, SmoothFitter) or self.late:
-            return found
-        if self._globally > GLOBALLY * (self.until - self._begun):
-            return found
-        begun = time.process_time()
-        start = begins_elsewhere(fitter, found, noise, self.numbers(key))
-        self._globally += time.process_time() - begun
-        if start is None:
-            return found
-        again = self.fitter.fit(found.model, start, found)
-        return again if again.merit < found.merit else found
 
     def _with_twins(self, key: Key, gone: int) -> None:
         """Fit a set with each exact twin of a member in its place."""

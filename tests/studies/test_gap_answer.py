@@ -97,7 +97,9 @@ def test_the_first_sentence_says_where_only_records_set_aside_have_a_gap(error, 
     apart = dataclasses.replace(found.gap, before=before, noise_floor=noise)
     says = lead(dataclasses.replace(found, held_out=apart))
     assert says.startswith("No gap above the noise: ")
-    assert ("But the records set aside have one: there the 1 s error of angle is 2 rad" in says) is said
+    assert (
+        "But the records set aside have one: there the 1 s error of angle is 2 rad" in says
+    ) is said
 
 
 @pytest.mark.parametrize(
