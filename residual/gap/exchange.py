@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from residual.gap.screening import gains, pair_gains
 from residual.gap.search import Key, Search, all_but
+
+Array = NDArray[np.float64]
 
 #: Part of the best gain by the linear screen below which no rival is worth a fit.
 HOPELESS = 0.5
@@ -43,31 +46,35 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
         rest = all_but(key, gone)
         if rest not in search.tried:
             continue
-        around, family = search.signatures(rest), search.family(gone)
-        taken: list[int] = []
-        still: list[int] = []
-        ranked = gains(around)
-        for gain in ranked:
-            number = around.variants[gain.variants[0]].candidate
-            near = len(taken) < most or (family and search.family(number) == family)
-            hopeless = gain.value < HOPELESS * ranked[0].value
-            fresh_one = number not in (*still, *key)
-            if fresh_one and both_hold_still(search, gone, number) and len(still) < STILL:
-                near, hopeless = True, False
-                still.append(number)
-            if number not in taken and spelt_out(search, number, taken):
-                continue
-            if number in key or number in taken or hopeless or not near:
-                continue
-            bold = search.candidates[number].bold
-            start = gain.values[0] if gain.value > 0 or bold is None else bold
+        for number, start in _rivals(search, key, gone, most):
             fresh, theta = search.merged(key, [(number, start)], drop=(gone,))
-            if not search.doubles(fresh):
-                taken.append(number)
-                search.add({fresh: theta})
+            search.add({fresh: theta})
         _add_plainer(search, key, gone)
         if len(search.candidates[gone].knobs) == 2:
             _add_split(search, rest, gone)
+
+
+def _rivals(search: Search, key: Key, gone: int, most: int) -> list[tuple[int, Array]]:
+    """What may do a member's work, and numbers from which it is fitted."""
+    rest, family = all_but(key, gone), search.family(gone)
+    around = search.signatures(rest)
+    ranked = gains(around)
+    found: dict[int, Array] = {}
+    still: set[int] = set()
+    for gain in ranked:
+        number = around.variants[gain.variants[0]].candidate
+        if number in key or number in found or spelt_out(search, number, list(found)):
+            continue
+        if search.doubles((*rest, number)):
+            continue
+        bold = search.candidates[number].bold
+        near = len(found) < most or (family and search.family(number) == family)
+        if both_hold_still(search, gone, number) and len(still) < STILL:
+            still.add(number)
+        elif not near or gain.value < HOPELESS * ranked[0].value:
+            continue
+        found[number] = gain.values[0] if gain.value > 0 or bold is None else bold
+    return list(found.items())
 
 
 def _add_plainer(search: Search, key: Key, gone: int) -> None:

@@ -90,7 +90,7 @@ def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) ->
     def numbers(points: Array) -> Array:
         """(V, free) in the space of the search -> (V, p)."""
         found = np.repeat(fit.theta[None], len(points), axis=0)
-        found[:, :free] = np.where(log, np.exp(points), points)
+        found[:, :free] = np.where(log, np.exp(np.where(log, points, 0.0)), points)
         return np.clip(found, model.low, model.high)
 
     begin = np.where(log, np.log(np.maximum(fit.theta[:free], 1e-300)), fit.theta[:free])
