@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 #: Residual over noise below which a remainder is a footnote.
 FOOTNOTE = 1.1
+#: Forecast error over that by noise below which residuals are believed.
+WELL = 1.5
 #: Times that channels are weighed anew by what the best set leaves of them.
 ROUNDS = 3
 #: Change of a weight that is worth another search.
@@ -153,7 +155,9 @@ def settle(search: Search, floor: Noise) -> Explanation:
     needed = np.inf
 
     def enough(key: Key) -> bool:
-        return fitter.left(search.tried[key], floor).ratio < FOOTNOTE
+        return fitter.left(search.tried[key], floor).ratio < FOOTNOTE and forecasts_well(
+            search, floor, key
+        )
 
     choice = choose(search, enough)
     for _ in range(EXCHANGES):
@@ -180,6 +184,17 @@ def settle(search: Search, floor: Noise) -> Explanation:
             break
     left = fitter.left(search.tried[choice.key], floor)
     return Explanation(search, choice, left, nominal_left, floor, needed)
+
+
+def forecasts_well(search: Search, floor: Noise, key: Key) -> bool:
+    """Whether forecasts err by little more than noise makes of them.
+
+    Residuals are a mean over all samples, so that a long rest hides what a short motion leaves.
+    """
+    alone = noise_floor(search.fitter, search.tried[key], floor.sigma)
+    squares = search.validated[key].squares
+    times = np.nanmean(squares, axis=0) / np.maximum(np.nanmean(alone, axis=0), 1e-300)
+    return bool((times < WELL**2).all())
 
 
 def _quiet(search: Search, floor: Noise, key: Key) -> bool:

@@ -31,6 +31,8 @@ _SPEEDS = {
 }  # fmt: skip
 # An input is in another unit if it goes beyond its bounds by this factor, or if it mostly does so.
 _FAR_BEYOND = 3.0
+# No more than this share of them are accidents.
+_FEW_WILD = 0.01
 
 
 def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
@@ -69,9 +71,12 @@ def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list
         reaches = f"reaches {most:.4g} {channel.unit}, beyond the actuator's bounds of {bounds}"
         size = max(abs(bound) for bound in (low, high) if np.isfinite(bound))
         if abs(most) > _FAR_BEYOND * size or beyond > 0.5 * total:
-            says = (
-                f"{reaches}, in {beyond} of {total} samples: another unit (mV for V), or bounds "
-                f"of the simulator's channel {channel.name!r} that are not the actuator's"
+            few = beyond <= max(1, _FEW_WILD * total)
+            says = f"{reaches}, in {beyond} of {total} samples{_first(rows)}: " + (
+                "no such command can have been meant; leave those cells empty"
+                if few
+                else "another unit (mV for V), or bounds of the simulator's channel "
+                f"{channel.name!r} that are not the actuator's"
             )
             found.append(refusal("bounds", channel.name, says))
             continue
@@ -207,7 +212,7 @@ def measured(
 
 #: What the samples marked by each test are, in words.
 _WORDS = {
-    "dropped": "are exact zeros amid other values, as if the sensor had dropped out",
+    "dropped": "are one and the same value far from all others, as if the sensor had dropped out",
     "wild": "stand alone far from both neighbours",
     "frozen": "repeat the one before in full motion, as if the sensor had frozen",
 }

@@ -59,28 +59,58 @@ def wild_samples(runs: Sequence[Array]) -> list[Mask]:
 
 
 def dropped_samples(runs: Sequence[Array], turn: float = 0.0) -> list[Mask]:
-    """Exact zeros in the middle of values far from zero.
+    """What stands in a log for a reading that was not received: exact zeros in the middle of values
+    far from zero, or one other value beyond all that was measured, exactly the same each time.
 
     Args:
         runs: As for ``wild_samples``.
         turn: What one turn measures, for an angle that was unwrapped; multiples of it are zeros.
 
     Returns:
-        True where a sample is an exact zero that was jumped to and jumped from.
+        True where a sample is such a value that was jumped to and jumped from.
     """
-    usual = max(_usual_change(runs), rounding(runs))
+    rest = [v - turn * np.round(v / turn) if turn else v for v in runs]
+    zeros = [np.abs(own) <= 1e-12 * max(1.0, turn) for own in rest]
+    found = [mask for mask, _ in _jumped_to(runs, rest, zeros)]
+    known = np.concatenate([values[np.isfinite(values)] for values in runs] or [np.zeros(0)])
+    if turn or not known.size:
+        return found
+    for end in {float(known.min()), float(known.max())} - {0.0}:
+        masks = _jumped_to(runs, [v - end for v in runs], [v == end for v in runs])
+        # A peak may be reached twice; nothing but a stand-in is always jumped to.
+        if sum(times for _, times in masks) > 1 and all(
+            mask.sum() == (values == end).sum()
+            for (mask, _), values in zip(masks, runs, strict=True)
+        ):
+            found = [mask | its for mask, (its, _) in zip(found, masks, strict=True)]
+    return found
+
+
+def _jumped_to(
+    runs: Sequence[Array], rest: Sequence[Array], there: Sequence[Mask]
+) -> list[tuple[Mask, int]]:
+    """Samples at a value that was jumped to and from, and how often, by run.
+
+    Args:
+        runs: As for ``wild_samples``.
+        rest: Distances from the value.
+        there: Where samples are at it.
+    """
+    # Jumps to and from it are not what is usual.
+    others = [values[~mask] for values, mask in zip(runs, there, strict=True)]
+    usual = max(_usual_change(others), rounding(others))
     found = []
-    for values in runs:
-        rest = values - turn * np.round(values / turn) if turn else values
-        mask = np.zeros(len(values), bool)
-        for a, b in _stretches(np.abs(rest) <= 1e-12 * max(1.0, turn)):
+    for values, far, at in zip(runs, rest, there, strict=True):
+        mask, times = np.zeros(len(values), bool), 0
+        for a, b in _stretches(at):
             if a == 0 or b == len(values) or b - a > _LONGEST_DROP:
                 continue
-            least = min(abs(rest[a - 1]), abs(rest[b]))
-            # What comes back elsewhere, or crosses zero on its way, is motion.
+            least = min(abs(far[a - 1]), abs(far[b]))
+            # What comes back elsewhere, or crosses it on its way, is motion.
             same = abs(values[a - 1] - values[b]) < 0.5 * least
             mask[a:b] = same and least > _WILD * usual
-        found.append(mask)
+            times += bool(mask[a])
+        found.append((mask, times))
     return found
 
 

@@ -5,15 +5,20 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import difflib
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+_DATE = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}")
+_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
 
 
@@ -132,6 +137,12 @@ class Table:
         with contextlib.suppress(ValueError):
             if decimal == "." and not any("_" in text for text in texts):
                 return np.array(texts, dtype=float)
+        if texts and _DATE.match(texts[0]):
+            with contextlib.suppress(ValueError):
+                dates = pd.to_datetime(list(texts), format="ISO8601", utc=True)
+                return self._from_array(dates.tz_localize(None).to_numpy(), column)
+        if decimal == "." and _commas(texts):
+            decimal = ","
         numbers = np.empty(len(texts))
         for index, text in enumerate(texts):
             try:
@@ -151,6 +162,17 @@ class Table:
                     ) from None
                 numbers[index] = np.nan
         return numbers
+
+
+def _commas(texts: Sequence[str]) -> bool:
+    """Whether numbers have decimal commas for sure: not one point, and no thousands."""
+    commas = [text for text in texts if "," in text]
+    return (
+        bool(commas)
+        and not any("." in text for text in texts)
+        and all(_COMMA.fullmatch(text) for text in commas)
+        and any(not _THOUSANDS.fullmatch(text) for text in commas)
+    )
 
 
 def shortened(text: str, length: int = 40) -> str:

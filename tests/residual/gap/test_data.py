@@ -125,6 +125,37 @@ def test_zeros_amid_motion_are_drop_outs(row, count):
     assert np.isnan(done.trajectories[0].states[rows, 0]).all()
 
 
+@given(seed=st.integers(0, 50))
+@settings(max_examples=20, deadline=None)
+def test_many_zeros_are_drop_outs_too(seed):
+    """As of a camera that loses a ball on a fifth of its pictures."""
+    rng = np.random.default_rng(seed)
+    run = noisy()
+    away = dataclasses.replace(run, states=run.states + np.array([0.0, 8.0]))
+    rows = np.sort(rng.choice(np.arange(2, 390), 80, replace=False))
+    done = examine(PendulumEquation(), [changed(away, 1, rows, 0.0)])
+    lost = np.isnan(done.trajectories[0].states[:, 1])
+    assert lost[rows].mean() > 0.9
+    assert not lost[np.setdiff1d(np.arange(len(lost)), rows)].any()
+
+
+@pytest.mark.parametrize("value", [-20.0, 25.235])
+def test_one_value_far_from_all_others_stands_for_what_was_not_read(value):
+    rows = [50, 51, 52, 120, 121, 300]
+    done = examine(PendulumEquation(), [changed(noisy(), 1, rows, value)])
+    (found,) = [one for one in done.findings if one.kind == "dropped"]
+    assert "6 " in found.says
+    lost = np.isnan(done.trajectories[0].states[:, 1])
+    assert np.flatnonzero(lost).tolist() == rows
+
+
+@pytest.mark.parametrize("step", [0.01, 0.1, 0.3])
+def test_a_rounded_peak_that_is_reached_again_is_a_peak(step):
+    run = noisy()
+    rounded = step * np.round(np.array(run.states) / step)
+    assert "dropped" not in {kind for kind, _ in kinds(dataclasses.replace(run, states=rounded))}
+
+
 def turning():
     """Whole turns at a changing speed."""
     run = noisy()

@@ -45,9 +45,11 @@ def test_text_in_a_number_is_found_in_its_row(csv):
     assert message.startswith(f"{path}, row {row}, column 'voltage': found 'oops', expected a num")
 
 
-def test_decimal_comma_is_recognised(csv):
-    path = csv(lambda lines: [line.replace(",", ";").replace(".", ",") for line in lines])
-    assert "set decimal: ','" in error(path)
+def test_a_comma_that_may_part_thousands_is_asked_for(csv):
+    def change(lines):
+        return [lines[0].replace(",", ";"), *(f"{i};0.1;1;1,50{i % 10}" for i in range(200))]
+
+    assert "set decimal: ','" in error(csv(change))
 
 
 @pytest.mark.parametrize("word", ["inf", "-Infinity", "1e999"])

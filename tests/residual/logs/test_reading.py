@@ -1,5 +1,7 @@
 """Measured logs: what is good is read exactly."""
 
+import datetime
+
 import jsonargparse
 import numpy as np
 import pytest
@@ -200,3 +202,22 @@ def test_config_comes_from_yaml_and_command_line(tmp_path):
         only={"kind": ["fall"]},
         stop=3.0,
     )
+
+
+def test_decimal_commas_are_read_where_they_cannot_be_thousands(csv):
+    plain = read(csv(lambda lines: lines))
+    comma = read(csv(lambda lines: [line.replace(",", ";").replace(".", ",") for line in lines]))
+    assert np.array_equal(comma.trajectories[0].states, plain.trajectories[0].states)
+
+
+@pytest.mark.parametrize(
+    "form", ["%Y-%m-%dT%H:%M:%S.%f", "%Y-%m-%d %H:%M:%S.%fZ", "%Y-%m-%dT%H:%M:%S.%f+02:00"]
+)
+def test_times_may_be_dates(tmp_path, form):
+    columns = swing()
+    begun = datetime.datetime(2026, 10, 25, 1, 59, 55)
+    when = [begun + datetime.timedelta(seconds=float(t)) for t in columns["time"]]
+    dated = columns | {"time": np.array([moment.strftime(form) for moment in when])}
+    (run,) = read(write(tmp_path / "log.csv", dated)).trajectories
+    assert np.allclose(np.diff(run.times), 0.05, atol=1e-6)
+    assert len(run.times) == 200
