@@ -24,8 +24,6 @@ CLEARLY = 1.5
 FORM = 1.2
 #: The same from which on it is, whatever part of the data forecasts start from.
 HOPELESS = 3.0
-#: Cosine of what two effects do, start states allowed for, beyond which it is one motion.
-SAME_MOTION = 0.995
 #: How far a strength may lie off in a fold, or with other numerics, as a share of it.
 STEADY = 0.5
 #: Standard errors by which forecasts must be worse without the effect.
@@ -93,12 +91,13 @@ def near(
     for other, rival in exchanged(search, key, number):
         alike = bool(family) and search.family(other) == family
         label = search.candidates[other].label
-        out = excluded(search, key, rival, number, adequate, alike)
-        if alike and not out:
+        if excluded(search, key, rival, number, adequate, alike):
+            continue
+        if alike:
             form.append(label)
-        elif not adequate and same_motion(search, rest, number, other):
+        elif not adequate and search.same_motion(rest, number, other):
             same.append(label)
-        elif not out:
+        else:
             others.append(label)
     for rival, fresh in split(search, key, number):
         if not excluded(search, key, rival, number, adequate, alike=False):
@@ -107,17 +106,6 @@ def near(
             form += [search.candidates[other].label for other in akin]
             others += [] if akin else [search.candidates[other].label for other in fresh]
     return tuple(dict.fromkeys(form)), tuple(same), tuple(dict.fromkeys(others))
-
-
-def same_motion(search: Search, rest: Key, one: int, other: int) -> bool:
-    """Whether two effects make the same motion in these data beside some others."""
-    around = search.signatures(rest)
-    columns = {v.candidate: v.columns for v in around.variants}
-    if any(len(columns[number]) != 1 for number in (one, other)):
-        return False
-    a, b = (around.matrix[:, columns[number][0]] for number in (one, other))
-    lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
-    return lengths > 0 and abs(float(a @ b)) > SAME_MOTION * lengths
 
 
 def excluded(

@@ -29,6 +29,9 @@ Key = tuple[int, ...]
 Proposals = dict[Key, Array]
 Twins = Mapping[str, Sequence[Candidate]]
 
+#: Cosine of what two effects do, start states allowed for, beyond which it is one motion.
+SAME_MOTION = 0.995
+
 
 def all_but(key: Key, number: int) -> Key:
     """A set without one of its members."""
@@ -276,6 +279,16 @@ class Search:
         effect = self.candidates[number].effect
         family = effect.family_in(self.simulator)
         return f"{family}@{self.place(number)}" if family else ""
+
+    def same_motion(self, rest: Key, one: int, other: int) -> bool:
+        """Whether two effects make the same motion in these data beside some others."""
+        around = self.signatures(rest)
+        columns = {v.candidate: v.columns for v in around.variants}
+        if any(len(columns[number]) != 1 for number in (one, other)):
+            return False
+        a, b = (around.matrix[:, columns[number][0]] for number in (one, other))
+        lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
+        return lengths > 0 and abs(float(a @ b)) > SAME_MOTION * lengths
 
     def place(self, number: int) -> str:
         """The joint, actuator, channel or parameter of a candidate."""
