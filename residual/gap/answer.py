@@ -104,7 +104,7 @@ def confirm(
             alone = imitated(search, key)
             made = [dataclasses.replace(c, rivals=(*c.rivals, *alone)) for c in made]
         blocks = len(search.fitter.blocks)
-        lost = [claim for claim in made if not nameable(search, claim, blocks)]
+        lost = [c for c in made if not nameable(search, c, blocks) or _worsens(found, c)]
         if not lost:
             made = allow_for_parameters(search, key, made, found.adequate, parameter_tolerance)
             # Now that intervals allow for the parameters, too.
@@ -122,6 +122,11 @@ def confirm(
         key, theta = search.merged(key, (), drop=(gone,))
         search.add({key: theta})
         add_exchanged(search, key, 3)
+
+
+def _worsens(found: Explanation, claim: Claim) -> bool:
+    """Whether forecasts err more with an effect than without it, where chance does not decide."""
+    return not found.adequate and claim.share[0] <= 0
 
 
 def summed_up(answer: Answer) -> Gap:

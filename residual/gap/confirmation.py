@@ -205,7 +205,7 @@ def needed(search: Search, key: Key, number: int, adequate: bool) -> bool:
     if adequate:
         return score(search, rest) - score(search, key) > tie(search) and lost > 0
     gone = 1 - 1 / max(_ratio(search, without, own, group), 1e-12)
-    return gone > 0.5 * AT_ONE and search.currency.clearly(without, own, group) > WORSE
+    return gone > 0.5 * AT_ONE and search.currency.clearly(without, own, group, True) > WORSE
 
 
 def steady(search: Search, key: Key, j: int) -> bool:

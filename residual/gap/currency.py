@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 #: Squared error over that by noise alone, below which a joint shows no gap.
 NOISY = 1.3
+#: Blocks, counted by what is at stake in them, below which one of them decides alone.
+ALONE = 2.0
 
 
 def groups(channels: Sequence[Channel]) -> tuple[tuple[int, ...], ...]:
@@ -75,11 +77,16 @@ class Currency:
         spread = float(per_block.std(ddof=1) * np.sqrt(n)) if n > 1 else np.inf
         return float(per_block.sum()), spread
 
-    def clearly(self, one: Array, other: Array, group: int) -> float:
+    def clearly(self, one: Array, other: Array, group: int, by_stake: bool = False) -> float:
         """Standard errors by which one set is worse than another, block by block.
 
         Ratios of the blocks' errors are compared, weighed by what is at stake: blocks are driven
         unequally hard, so that differences would have the spread of the drive.
+
+        Args:
+            one, other: Mean squared errors of blocks, (B, m).
+            group: The joint that is looked at.
+            by_stake: Count blocks by what is at stake in them, so that no single one decides.
         """
         a, b = (self.by_block(squares)[:, group] for squares in (one, other))
         there = (a > 0) & (b > 0)
@@ -87,7 +94,9 @@ class Currency:
             return 0.0
         ratios, weights = np.log(a[there] / b[there]), a[there] / a[there].sum()
         mean = float(weights @ ratios)
-        n = int(there.sum())
+        n = 1 / float((weights**2).sum()) if by_stake else float(there.sum())
+        if n < ALONE:
+            return 0.0
         error = float(np.sqrt((weights**2) @ (ratios - mean) ** 2 * n / (n - 1)))
         return mean / max(error, 1e-12)
 

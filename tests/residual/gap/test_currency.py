@@ -95,3 +95,17 @@ def test_span_brackets_the_root_mean_square():
     found = span(squares)
     assert found.low < found.value < found.high
     assert found.low < 1 < found.high
+
+
+def test_one_block_that_decides_alone_is_no_evidence():
+    nominal = np.full((8, 1), 0.01)
+    nominal[0] = 100.0
+    better = nominal * np.linspace(0.2, 0.3, 8)[:, None]
+    one = Currency(nominal, ((0,),))
+    assert one.clearly(nominal, better, 0) > 2
+    assert one.clearly(nominal, better, 0, by_stake=True) == 0
+    alike = np.full((8, 1), 1.0)
+    even = Currency(alike, ((0,),))
+    worse = alike * np.linspace(1.5, 2.5, 8)[:, None]
+    plain, by_stake = even.clearly(worse, alike, 0), even.clearly(worse, alike, 0, by_stake=True)
+    assert plain == pytest.approx(by_stake, rel=0.1)

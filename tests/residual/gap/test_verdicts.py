@@ -1,7 +1,11 @@
 """What is said of effects that exactly dependent sets could imitate."""
 
-import numpy as np
+from types import SimpleNamespace
 
+import numpy as np
+import pytest
+
+from residual.gap.answer import _worsens
 from residual.gap.forecasts import no_better
 from residual.gap.verdicts import dependent
 from sims.effects.library import near_combinations
@@ -40,3 +44,14 @@ def test_blocks_in_which_nothing_was_gained_are_counted():
     before, floor = np.array([4.0, 4.0, 4.0, 1.2]), np.ones(4)
     # Better, worse, as bad as before, and worse within what noise alone does.
     assert no_better(before, np.array([1.0, 5.0, 4.0, 1.5]), floor) == 2
+
+
+@pytest.mark.parametrize(("adequate", "share", "gone"), [
+    (False, -0.1, True), (False, 0.1, False), (True, -0.1, False),
+])  # fmt: skip
+def test_what_makes_forecasts_worse_is_not_named_where_chance_does_not_decide(
+    adequate, share, gone
+):
+    found = SimpleNamespace(adequate=adequate)
+    claim = SimpleNamespace(share=(share, share - 0.1, share + 0.1))
+    assert _worsens(found, claim) is gone
