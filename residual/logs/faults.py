@@ -27,6 +27,8 @@ _CLIPPED = 4
 _STEPPED = 0.9
 # Share of the range of values above which a step of rounding is worth a word.
 _COARSE = 3e-4
+# Values of a channel that may as well be all that it has.
+_FEW_VALUES = 8
 # Zeros in a row that are a drop-out rather than a time at which nothing happened.
 _LONGEST_DROP = 50
 
@@ -69,11 +71,14 @@ def dropped_samples(runs: Sequence[Array], turn: float = 0.0) -> list[Mask]:
     Returns:
         True where a sample is such a value that was jumped to and jumped from.
     """
+    known = np.concatenate([values[np.isfinite(values)] for values in runs] or [np.zeros(0)])
+    if len(np.unique(known)) < _FEW_VALUES:
+        # What knows few values, such as a valve that is open or closed, jumps between them.
+        return [np.zeros(len(values), bool) for values in runs]
     rest = [v - turn * np.round(v / turn) if turn else v for v in runs]
     zeros = [np.abs(own) <= 1e-12 * max(1.0, turn) for own in rest]
     found = [mask for mask, _ in _jumped_to(runs, rest, zeros)]
-    known = np.concatenate([values[np.isfinite(values)] for values in runs] or [np.zeros(0)])
-    if turn or not known.size:
+    if turn:
         return found
     for end in {float(known.min()), float(known.max())} - {0.0}:
         masks = _jumped_to(runs, [v - end for v in runs], [v == end for v in runs])

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from residual.gap import find_gap
 from residual.gap.data import examine, findings
 from residual.gap.kinematics import kinematics
+from residual.logs.faults import dropped_samples
 from residual.trajectories import Trajectory
 from sims.leo import Leo
 from sims.pendulum_equation import PendulumEquation
@@ -154,6 +155,12 @@ def test_a_rounded_peak_that_is_reached_again_is_a_peak(step):
     run = noisy()
     rounded = step * np.round(np.array(run.states) / step)
     assert "dropped" not in {kind for kind, _ in kinds(dataclasses.replace(run, states=rounded))}
+
+
+def test_a_valve_that_opens_now_and_then_is_no_stand_in():
+    pulses = np.zeros(400)
+    pulses[[*range(50, 60), *range(100, 115), *range(300, 320)]] = 1.0
+    assert not any(mask.any() for mask in dropped_samples([pulses]))
 
 
 def turning():
