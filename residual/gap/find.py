@@ -107,6 +107,7 @@ def find_gap(
         offered = tuple(e for e in offered if not e.upstream_of_sensor)
     examined = examine(simulator, trajectories)
     runs = examined.trajectories
+    simulator = simulator.for_motion([run.states for run in [*runs, *held]])
     quality = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
     chosen_by_user = horizon is not None
     horizon = horizon or usual_horizon(simulator, runs)

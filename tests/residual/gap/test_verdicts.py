@@ -4,7 +4,7 @@ import numpy as np
 
 from residual.gap.forecasts import no_better
 from residual.gap.verdicts import dependent
-from sims.effects.library import near_combinations
+from sims.effects.aliases import near_combinations
 from sims.pendulum_equation import PendulumEquation
 
 SETS = (
