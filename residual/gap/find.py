@@ -115,6 +115,7 @@ def find_gap(
     quality += [left_out] if left_out else []
     for says in quality:
         tell(says)
+    tell("looking for effects that move alike")
     groups, sets = aliases(simulator, offered)
     kept = representatives(simulator, offered, groups)
     named = {str(effect): effect for effect in offered}
@@ -134,6 +135,7 @@ def find_gap(
             f"{len(ready.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s, "
             f"{len(pool)} candidate effects"
         )
+        tell("screening them")
         return explain(
             simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, tell, until,
             beside, earlier, twins,
@@ -142,6 +144,7 @@ def find_gap(
     with workers(n_jobs):
         simulator = held_as(simulator, hold)
         clock.lap("read")
+        tell("fitting the nominal simulator")
         prepared = prepare(simulator, runs, horizon)
         if not chosen_by_user and not simulator.has_contacts:
             prepared = beyond_noise(simulator, runs, prepared)
