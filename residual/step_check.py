@@ -70,6 +70,7 @@ def check_step(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> 
     Raises:
         ValueError: No window of the log has a measured start.
     """
+    simulator = simulator.for_motion([run.states for run in trajectories])
     measured = np.flatnonzero(
         np.any([np.isfinite(run.states).any(axis=0) for run in trajectories], axis=0)
     )
@@ -109,6 +110,7 @@ def fine_enough(
     Returns:
         Such as ``("--simulator.integrator RK4", simulator)``; None if none is fine enough.
     """
+    simulator = simulator.for_motion([run.states for run in trajectories])
     # No usual step times a strike of the ground as finely as encoders see it.
     if simulator.has_contacts or not isinstance(simulator, Refinable):
         return None
@@ -125,6 +127,7 @@ def advice(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list
     """
     if not isinstance(simulator, Refinable):
         return []
+    simulator = simulator.for_motion([run.states for run in trajectories])
     check = check_step(simulator, trajectories)
     if not check.visible:
         return []

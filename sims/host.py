@@ -41,7 +41,7 @@ class HostSimulator(Simulator):
         substeps: Sub-steps in one control period.
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
         has_contacts: True if motion jumps at impacts, so that it can be compared with logs over
-            short windows only (``residual.gap.contact``).
+            short windows only (``residual.gap.impacts``); see ``for_motion``.
         advances_rows_at_once: True if ``integrate`` advances all rows together, each with its own
             values of effects and parameters, so that a batch costs little more than a row.
         lagged: How an input with a lag acts in sub-steps, see ``sims.drive.lagged``.
@@ -87,6 +87,14 @@ class HostSimulator(Simulator):
         keeps away from them.
         """
         return np.stack([random_values(c, n, rng) for c in self.physical_channels], axis=1)
+
+    def for_motion(self, paths: Sequence[Array]) -> Self:
+        """It, without ``has_contacts`` if nothing touches along such motion; it steps the same.
+
+        Args:
+            paths: Measured physical states of every run, (n, n_physical), NaN where unknown.
+        """
+        return self
 
     def offered_effects(self) -> tuple[Effect, ...] | None:
         """What may be missing by default (``sims.effects.library``); None for all it can host."""

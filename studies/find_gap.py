@@ -155,6 +155,7 @@ def run(
     tell(f"{count} {'trajectory' if count == 1 else 'trajectories'}, {rows} samples")
     for line in found_in_data([*data.findings, *(held.findings if held else ())]):
         tell(f"data: {line}")
+    tell("checking the integration step")
     for line in advice(simulator, data.trajectories):
         tell(line)
     result = find_gap(

@@ -9,8 +9,8 @@ import numpy as np
 from residual.gap.candidates import Candidate
 from residual.gap.result import Blind
 from residual.gap.screening import Signatures
+from sims.effects.aliases import exact_aliases
 from sims.effects.base import Effect
-from sims.effects.library import exact_aliases
 from sims.host import HostSimulator
 
 

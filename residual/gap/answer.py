@@ -14,7 +14,7 @@ from residual.gap.claim import Claim
 from residual.gap.confirmation import claims, in_plain_form, share
 from residual.gap.exchange import add_exchanged
 from residual.gap.explain import FOOTNOTE, Explanation
-from residual.gap.forecasts import gap, held_out, main_channel, noise_floor, rollouts
+from residual.gap.forecasts import fitted_floor, gap, held_out, main_channel, noise_floor, rollouts
 from residual.gap.imitation import imitated
 from residual.gap.model import Model
 from residual.gap.numerics import other_numerics, own_substeps, with_enough_substeps
@@ -32,6 +32,7 @@ from residual.gap.verdicts import (
     minor_verdict,
     nameable,
     no_gap_verdict,
+    parted_verdict,
     remainder_verdict,
 )
 from residual.trajectories import Trajectory
@@ -41,6 +42,9 @@ from sims.host import HostSimulator
 EVIDENCE = 40
 #: Forecast error over that by noise alone up to which there may be no gap.
 NEAR_NOISE = 1.5
+#: Forecast error over that by noise alone beyond which something is missing although impacts hide
+#: it from the fit: the integration step makes some of it.
+PARTED = 2.0
 #: Rise of the loss with inputs held the other way, as a share of it, that rules that out.
 OTHER_HOLD = 0.5
 
@@ -132,7 +136,9 @@ def _worsens(found: Explanation, claim: Claim) -> bool:
 def summed_up(answer: Answer) -> Gap:
     """The table of errors."""
     found, search = answer.found, answer.found.search
-    floor = noise_floor(search.fitter, search.tried[answer.key], found.floor.sigma)
+    alone = search.simulator.has_contacts and not answer.key
+    by_noise = fitted_floor if alone else noise_floor
+    floor = by_noise(search.fitter, search.tried[answer.key], found.floor.sigma)
     left = search.fitter.left(search.tried[answer.key], found.floor)
     order = [claim.number for claim in answer.claims]
     return gap(search, answer.key, order, floor, (found.nominal_left.ratio, left.ratio))
@@ -227,6 +233,8 @@ def verdicts(
                 f"{table.before.value:.3g} {table.unit}, within the tolerance of {tolerance:.3g}"
             ),
         )
+    elif not answer.key and search.simulator.has_contacts and beyond_noise(table):
+        made.append(parted_verdict(table, answer.leads))
     elif not answer.key and left.adequate and not search.beside:
         made.append(no_gap_verdict("no gap above noise"))
     elif not answer.key and not search.beside and within_noise(table):
@@ -248,6 +256,12 @@ def within_noise(table: Gap) -> bool:
     """Whether forecasts of the nominal simulator err by no more than noise may."""
     near = table.before.value <= NEAR_NOISE * table.noise_floor.value
     return near and table.before.low <= table.noise_floor.high
+
+
+def beyond_noise(table: Gap) -> bool:
+    """Whether forecasts of the nominal simulator err by clearly more than noise makes."""
+    far = table.before.value > PARTED * table.noise_floor.value
+    return far and table.before.low > table.noise_floor.high
 
 
 def minor(answer: Answer) -> dict[int, tuple[float, float, float]]:

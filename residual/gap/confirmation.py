@@ -13,7 +13,7 @@ from residual.gap.exchange import exchanged, split
 from residual.gap.intervals import at_bound, bounded, deviations
 from residual.gap.numerics import at_half_step
 from residual.gap.search import Key, Search, all_but
-from residual.gap.significance import score
+from residual.gap.significance import BETTER, score
 
 Array = NDArray[np.float64]
 
@@ -114,12 +114,15 @@ def excluded(
     """Whether a rival with one effect exchanged is out.
 
     Down to the noise, chance decides, at half the step, too, where that matters: a delay may fit
-    what a lag did only because steps are coarse. While a remainder is left, a rival has to be
-    clearly worse, also from starts that are better known: errors of the start fade in a sluggish
-    model otherwise than in a late one. One that differs in form alone has to lose at the horizon
-    and at half of it.
+    what a lag did only because steps are coarse. Of what strikes the ground forecasts have to be
+    worse as well, since fits hang on luck in finding start states there. While a remainder is
+    left, a rival has to be clearly worse, also from starts that are better known: errors of the
+    start fade in a sluggish model otherwise than in a late one. One that differs in form alone
+    has to lose at the horizon and at half of it.
     """
     if adequate:
+        if search.simulator.has_contacts and search.error(key) >= BETTER * search.error(rival):
+            return False
         behind = score(search, rival) - score(search, key)
         return behind > tie(search) and not _by_numerics(search, key, rival, behind)
     group = where_it_matters(search, key, number)

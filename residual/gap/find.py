@@ -107,6 +107,7 @@ def find_gap(
         offered = tuple(e for e in offered if not e.upstream_of_sensor)
     examined = examine(simulator, trajectories)
     runs = examined.trajectories
+    simulator = simulator.for_motion([run.states for run in [*runs, *held]])
     quality = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
     chosen_by_user = horizon is not None
     horizon = horizon or usual_horizon(simulator, runs)
@@ -114,6 +115,7 @@ def find_gap(
     quality += [left_out] if left_out else []
     for says in quality:
         tell(says)
+    tell("looking for effects that move alike")
     groups, sets = aliases(simulator, offered)
     kept = representatives(simulator, offered, groups)
     named = {str(effect): effect for effect in offered}
@@ -133,6 +135,7 @@ def find_gap(
             f"{len(ready.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s, "
             f"{len(pool)} candidate effects"
         )
+        tell("screening them")
         return explain(
             simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, tell, until,
             beside, earlier, twins,
@@ -141,6 +144,7 @@ def find_gap(
     with workers(n_jobs):
         simulator = held_as(simulator, hold)
         clock.lap("read")
+        tell("fitting the nominal simulator")
         prepared = prepare(simulator, runs, horizon)
         if not chosen_by_user and not simulator.has_contacts:
             prepared = beyond_noise(simulator, runs, prepared)

@@ -50,6 +50,17 @@ def noise_floor(fitter: Fitter, fit: Fit, sigma: Array, draws: int = 4) -> Array
     return np.mean(found, axis=0)
 
 
+def fitted_floor(fitter: Fitter, fit: Fit, sigma: Array) -> Array:
+    """The same, (B, m), from start states that are fitted to the drawn data, as to a log.
+
+    Where motion parts at impacts, most of the error comes from the little that is wrong there.
+    """
+    thetas, which = fit.theta[None], np.zeros(len(fitter.blocks.windows), np.int64)
+    drawn = fitter.redrawn(fit, sigma, np.random.default_rng(0))
+    again = drawn.fit(fit.model, fit.theta)
+    return by_block(drawn.foretell(fit.model, thetas, which, again).squares, fitter.blocks)
+
+
 def gap(
     search: Search, key: Key, order: Sequence[int], floor: Array, ratios: tuple[float, float]
 ) -> Gap:

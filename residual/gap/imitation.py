@@ -9,7 +9,8 @@ from residual.gap.model import Model
 from residual.gap.screening import gains, signatures, trials
 from residual.gap.search import Key, Search
 from residual.gap.significance import score, size
-from sims.effects.library import library, near_combinations
+from sims.effects.aliases import near_combinations
+from sims.effects.library import library
 
 
 def imitated(search: Search, key: Key) -> tuple[str, ...]:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
+from sims.effects.aliases import probes, shortly_after
 from sims.effects.base import Effect
-from sims.effects.library import probes, shortly_after
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
 

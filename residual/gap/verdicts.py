@@ -181,6 +181,15 @@ def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdic
     return Verdict("unexplained", "", "", {}, tuple(leads), "", says, share, follows=left.force)
 
 
+def parted_verdict(gap: Gap, leads: Sequence[str] = ()) -> Verdict:
+    """Forecasts past impacts that err by more than noise makes, where no effect earns a name."""
+    times = gap.before.value / gap.noise_floor.value
+    says = f"nothing of the library explains forecasts that err {times:.3g} times as by noise"
+    if leads:
+        says += f"; {', '.join(leads)} would take some of it, and so would many others"
+    return Verdict("unexplained", "", "", {}, tuple(leads), "", says, Span(1.0, 1.0, 1.0))
+
+
 def minor_verdict(search: Search, number: int, share: tuple[float, float, float]) -> Verdict:
     """An effect that helps too little to be added."""
     effect = search.candidates[number].effect

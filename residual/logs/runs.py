@@ -54,7 +54,7 @@ def runs_of(
         wanted = ", ".join(repr(channel.name) for channel in states)
         raise LogError(
             f"no column is named like a state of the simulator ({wanted}), the file has "
-            f"{table.listed}; say under states which column is which",
+            f"{table.listed}; say under states which column is which, with --columns FILE",
             table.path,
         )
     lacking = [channel.name for channel in actions if channel.name not in inputs]
@@ -62,7 +62,7 @@ def runs_of(
         raise LogError(
             f"no column for action {lacking[0]!r}, the file has "
             f"{table.listed}; say under actions which column it is, or "
-            "give it a constant value",
+            "give it a constant value, with --columns FILE",
             table.path,
         )
     time = named_column(columns.time, "time")

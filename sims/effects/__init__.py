@@ -8,6 +8,8 @@ from sims.effects.actuator import DeadZone as DeadZone
 from sims.effects.actuator import Delay as Delay
 from sims.effects.actuator import Saturation as Saturation
 from sims.effects.actuator import StaticActuatorEffect as StaticActuatorEffect
+from sims.effects.aliases import Alias as Alias
+from sims.effects.aliases import exact_aliases as exact_aliases
 from sims.effects.backlash import Backlash as Backlash
 from sims.effects.base import Effect as Effect
 from sims.effects.base import Quantity as Quantity
@@ -23,8 +25,6 @@ from sims.effects.joint import JointEffect as JointEffect
 from sims.effects.joint import LinearSpring as LinearSpring
 from sims.effects.joint import QuadraticDrag as QuadraticDrag
 from sims.effects.joint import ViscousFriction as ViscousFriction
-from sims.effects.library import Alias as Alias
-from sims.effects.library import exact_aliases as exact_aliases
 from sims.effects.library import library as library
 from sims.effects.library import typical as typical
 from sims.effects.parameter import ParameterChange as ParameterChange

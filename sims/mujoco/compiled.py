@@ -20,6 +20,7 @@ except ImportError as missing:  # pragma: no cover - depends on what is installe
     ) from missing
 
 from sims.mujoco.contacts import touching_geoms
+from sims.mujoco.missing import missing_asset, missing_include
 
 #: Dry friction in MuJoCo is soft: held, a joint creeps. With these impedances it creeps ten times
 #: less than by default; they count only where frictionloss is above zero.
@@ -114,7 +115,7 @@ def _read(path: Path) -> Any:
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except ValueError as error:
-        raise ValueError(f"{path}: {_one_line(error)}") from None
+        raise ValueError(f"{path}: {_one_line(error)}{missing_include(path)}") from None
     for mesh in spec.meshes:
         mesh.file = _in_package(mesh.file, path)
     return spec
@@ -181,22 +182,7 @@ def _compile(spec: Any, path: Path) -> Any:
     try:
         return spec.compile()
     except ValueError as error:
-        raise ValueError(f"{path}: {_one_line(error)}{_missing_asset(spec, path)}") from None
-
-
-def _missing_asset(spec: Any, path: Path) -> str:
-    """Where the first file that a model lacks was expected; nothing if all are there."""
-    beside = path.parent.resolve()
-    meshes, pictures = beside / spec.compiler.meshdir, beside / spec.compiler.texturedir
-    for folder, assets in ((meshes, spec.meshes), (pictures, (*spec.textures, *spec.hfields))):
-        for asset in assets:
-            name = Path(asset.file).name if spec.strippath else asset.file
-            if name.startswith("package://"):
-                package, _, rest = name.removeprefix("package://").partition("/")
-                return f": expected {package}/{rest} in a folder above {beside}"
-            if name and not (folder / name).is_file():
-                return f": expected it at {folder / name}"
-    return ""
+        raise ValueError(f"{path}: {_one_line(error)}{missing_asset(spec, path)}") from None
 
 
 def _without_delays(spec: Any, path: Path) -> dict[int, float]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Self
 
-import mujoco
 import numpy as np
 
 from sims.drive import lagged
@@ -24,17 +24,24 @@ from sims.host import HostSimulator
 from sims.mujoco import elements
 from sims.mujoco.attributes import Attribute, attributes, row_fields
 from sims.mujoco.compiled import INTEGRATORS, Source, compiled, control_period
-from sims.mujoco.contacts import touching_geoms
+from sims.mujoco.contacts import touches, touching_geoms
 from sims.mujoco.corrected import corrected_files
 from sims.mujoco.effects import AttributeChange
 from sims.mujoco.forces import Placed, place
 from sims.mujoco.lag import lagged_at_ends
+from sims.mujoco.poses import any_states, free_states
 from sims.mujoco.render import MujocoRenderer
 from sims.mujoco.rows import BLOCK, Rows
 from sims.simulator import Array, random_values
 
 #: A sub-step this near to the model's own is the model's own: times in logs are rounded.
 SAME = 1e-6
+#: Part of a log's rows with every position from which on it shows whether anything touches.
+KNOWN = 0.9
+#: Part of a motion that is more than what a solver of contacts leaves undone.
+SOLVED = 1e-6
+#: Seconds in which what is left alone comes to hang or lie.
+FALL = 1.0
 
 
 class MujocoSimulator(HostSimulator):
@@ -157,16 +164,29 @@ class MujocoSimulator(HostSimulator):
             fields["opt.timestep"] = h
         return self._rows.advance(states, controls, fields, applied, law)
 
+    def for_motion(self, paths: Sequence[Array]) -> Self:
+        """See ``HostSimulator.for_motion``: most arms could touch themselves, few logs show it.
+
+        Where too few rows hold every position, nothing is known of what touches.
+        """
+        nq = self.model.nq
+        known = [path[np.isfinite(path[:, :nq]).all(axis=1), :nq] for path in paths]
+        enough = sum(map(len, known)) >= KNOWN * max(sum(map(len, paths)), 1)
+        if not self.has_contacts or not enough or any(touches(self.model, q) for q in known):
+            return self
+        apart = copy.copy(self)
+        apart.has_contacts = False
+        return apart
+
     def _forget_what_shows_nowhere(self) -> None:
         """Attributes that no motion depends on are no parameters.
 
-        Such as the centre of mass along the axis of a single joint. Friction of contacts stays:
-        random poses have none.
+        Such as the centre of mass along the axis of a single joint. What hangs or lies shows its
+        mass only where it is held. Friction of contacts stays: random poses have few.
         """
-        rng, n = np.random.default_rng(0), 12
         names = [name for name in self.attributes if "friction of" not in name]
-        poses = self.smooth_states(n, rng)
-        inputs = np.empty((n, len(self.action_channels)))
+        rng, n = np.random.default_rng(0), 12
+        poses, inputs = self.smooth_states(n, rng), np.empty((n, len(self.action_channels)))
         for column, channel in enumerate(self.action_channels):
             inputs[:, column] = random_values(channel, n, rng)
         # Half of the rows stay near the reference pose, where servos are within their forces.
@@ -174,6 +194,15 @@ class MujocoSimulator(HostSimulator):
         poses[::2, :nq] = self.model.qpos0 + 0.05 * (poses[::2, :nq] - self.model.qpos0)
         poses[::2, nq:] *= 0.05
         inputs[::2] *= 0.05
+        held = [any_states(self.model, self.physical_channels, n, rng), self._fall(n)]
+        shown = self._shown(names, poses, inputs, 1e-12)
+        shown |= self._shown(names, np.concatenate(held), np.tile(inputs, (2, 1)), SOLVED)
+        for name in set(names) - shown:
+            del self.attributes[name], self.parameters[name]
+
+    def _shown(self, names: Sequence[str], poses: Array, inputs: Array, least: float) -> set[str]:
+        """Attributes that change motion from these poses by so much of its size."""
+        n = len(poses)
         states = np.tile(poses, (len(names) + 1, 1))
         controls = np.repeat(np.tile(inputs, (len(names) + 1, 1))[:, None], 2, axis=1)
         values = {}
@@ -184,11 +213,23 @@ class MujocoSimulator(HostSimulator):
         changed = self.with_parameters(**values)
         durations = np.full(len(states), 2 * float(self.model.opt.timestep))
         after = changed.integrate(states, controls, durations).reshape(len(names) + 1, n, -1)
-        size = np.maximum(np.nanmax(np.abs(after[0]), axis=0, initial=0.0), 1e-9)
-        for name, moved in zip(names, after[1:], strict=True):
-            # A row that diverges with an attribute and not without it shows it, too.
-            if (np.abs(moved - after[0]) < 1e-12 * size).all():
-                del self.attributes[name], self.parameters[name]
+        after = after[:, np.isfinite(after[0]).all(axis=1)]
+        size = np.maximum(np.max(np.abs(after[0]), axis=0, initial=0.0), 1e-9)
+        # A row that diverges with an attribute and not without it shows it, too.
+        alike = [(np.abs(moved - after[0]) < least * size).all() for moved in after[1:]]
+        return {name for name, same in zip(names, alike, strict=True) if not same}
+
+    def _fall(self, n: int) -> Array:
+        """States on the way from the reference pose, left alone for a second, (n, n_physical)."""
+        steps = max(1, round(FALL / n / float(self.model.opt.timestep)))
+        state = np.zeros((1, len(self.physical_channels)))
+        state[:, : self.model.nq] = self.model.qpos0
+        controls = np.zeros((1, steps, len(self.action_channels)))
+        path = []
+        for _ in range(n):
+            state = self.integrate(state, controls, np.full(1, FALL / n))
+            path.append(state)
+        return np.concatenate(path)
 
     @property
     def timestep(self) -> float:
@@ -210,17 +251,10 @@ class MujocoSimulator(HostSimulator):
             option = "--simulator.integrator RK4"
             if parts > 1:
                 option += f" --simulator.timestep {step:g}"
-            yield (
-                option,
-                type(self)(
-                    str(settings.path),
-                    self.dt,
-                    step,
-                    "RK4",
-                    None if settings.motors is None else list(settings.motors),
-                    self._added,
-                ),
-            )
+            motors = None if settings.motors is None else list(settings.motors)
+            finer = type(self)(str(settings.path), self.dt, step, "RK4", motors, self._added)
+            finer.has_contacts = self.has_contacts
+            yield option, finer
 
     @property
     def runge_kutta(self) -> bool:
@@ -255,34 +289,4 @@ class MujocoSimulator(HostSimulator):
 
     def smooth_states(self, n: int, rng: np.random.Generator) -> Array:
         """Random physical states without contact, (n, n_physical), about the reference pose."""
-        data = mujoco.MjData(self.model)
-        found = np.empty((n, len(self.physical_channels)))
-        nq, nv = self.model.nq, self.model.nv
-        for i in range(n):
-            for reach in (1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.0):
-                mujoco.mj_resetData(self.model, data)
-                data.qvel[:] = [
-                    reach * c.scale * rng.uniform(-1, 1)
-                    for c in self.physical_channels[nq : nq + nv]
-                ]
-                self._pose(data, reach, rng)
-                mujoco.mj_fwdPosition(self.model, data)
-                if data.nefc == 0 or not reach:
-                    break
-            found[i, :nq], found[i, nq : nq + nv] = data.qpos, data.qvel
-            found[i, nq + nv :] = data.act
-        return found
-
-    def _pose(self, data: Any, reach: float, rng: np.random.Generator) -> None:
-        for j in range(self.model.njnt):
-            at = int(self.model.jnt_qposadr[j])
-            kind = int(self.model.jnt_type[j])
-            if kind not in (elements.HINGE, elements.SLIDE):
-                continue
-            if self.model.jnt_limited[j]:
-                low, high = self.model.jnt_range[j]
-                middle = 0.5 * (low + high)
-                data.qpos[at] = middle + 0.45 * reach * (high - low) * rng.uniform(-1, 1)
-            else:
-                wide = np.pi if kind == elements.HINGE else 1.0
-                data.qpos[at] += reach * wide * rng.uniform(-1, 1)
+        return free_states(self.model, self.physical_channels, n, rng)

@@ -192,8 +192,11 @@ def span(number: Number) -> str:
 
 
 def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
-    found = [f"{result.gap.windows_after:.3g} times the noise is left"]
     gap = result.gap
+    found = [f"{gap.windows_after:.3g} times the noise is left"]
+    if result.adequate:
+        times = gap.after.value / max(gap.noise_floor.value, 1e-300)
+        found = [f"nothing of the library explains it: forecasts err {times:.3g} times as by noise"]
     if gap.blocks < TOO_FEW and not result.effects:
         more = quantity_text((TOO_FEW - gap.blocks) * gap.horizon_s, "s")
         found.append(

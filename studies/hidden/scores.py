@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from residual.gap import GapResult
-from sims.effects.library import exact_aliases
+from sims.effects.aliases import exact_aliases
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.strengths import HIDDEN
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
-from sims.effects.library import exact_aliases
+from sims.effects.aliases import exact_aliases
 from sims.mujoco import MujocoSimulator
 from studies.robots.drives import MODELS, measure
 

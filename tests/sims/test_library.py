@@ -16,6 +16,7 @@ from sims.effects import (
     library,
     typical,
 )
+from sims.effects.aliases import _columns, _perhaps_dependent
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 
@@ -121,3 +122,26 @@ def test_a_spring_may_rest_anywhere_and_is_absent_without_stiffness():
         assert kind("pivot", 0.0, 0.4).absent
         assert not np.any(kind("pivot", np.zeros(3), np.ones(3)).present())
         assert next(e for e in library(Pendulum()) if isinstance(e, kind)) == kind("pivot")
+
+
+def test_an_effect_that_is_rough_everywhere_hides_no_aliases_of_others():
+    rng = np.random.default_rng(0)
+    load, drag = rng.standard_normal((2, 96, 2))
+    near = {"load": load, "bias": 2 * load, "drag": drag, "lost": 1e-9 * drag}
+    far = near | {"lost": 1e-9 * rng.standard_normal((96, 2))}
+    columns, _ = _columns(near, far)
+    assert set(columns) == {"load", "bias", "drag"}
+    assert columns["load"] == pytest.approx(columns["bias"])
+    few = {f"effect {i}": rng.standard_normal((2, 2)) for i in range(3)}
+    assert _columns(few, few) == ({}, {})
+
+
+def test_dependent_sets_of_many_effects_are_found_in_a_bounded_time():
+    rng = np.random.default_rng(0)
+    columns = {f"effect {i}": rng.standard_normal(300) for i in range(90)}
+    columns["effect 7"] = columns["effect 3"] - 2 * columns["effect 50"]
+    columns = {name: column / np.linalg.norm(column) for name, column in columns.items()}
+    blurs = dict.fromkeys(columns, 1e-9)
+    sets = _perhaps_dependent(list(columns), 3, columns, blurs)
+    assert sets == [("effect 3", "effect 7", "effect 50")]
+    assert _perhaps_dependent(list(columns), 4, columns, blurs) == []

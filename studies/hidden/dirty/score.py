@@ -11,8 +11,9 @@ import numpy as np
 from residual.gap import GapResult, find_gap
 from residual.gap.result import Verdict
 from residual.trajectories import Trajectory
+from sims.effects.aliases import exact_aliases
 from sims.effects.base import Effect
-from sims.effects.library import exact_aliases, library
+from sims.effects.library import library
 from sims.host import HostSimulator
 from studies.hidden.dirty.sets import LEAD, Dirty, make_set, oracle_effect
 from studies.judging.forecasts import Forecasts, plan, relative_error, root_mean_squares

@@ -217,3 +217,15 @@ def test_what_may_be_zero_is_not_confirmed(low, kind):
     verdict = effect_verdict(toy, claim(numbers={"change": Number(0.01, low, 0.02, "kg")}), 20)
     assert verdict.kind == kind
     assert ("may_be_zero" in verdict.doubts) is (kind == "ambiguous")
+
+
+@pytest.mark.parametrize(
+    ("contacts", "error", "left"),
+    [(False, 0.51, ()), (True, 0.51, ("constant_load@pivot",)), (True, 0.56, ())],
+)
+def test_of_what_strikes_the_ground_a_rival_has_to_forecast_worse(contacts, error, left):
+    toy = Toy({(0,): 0.50, (3,): error}, merits={(): 1e6, (0,): 10.0, (3,): 1e5})
+    toy.fitter.samples.seen, toy.fitter.samples.measured = np.zeros((80, 1)), [0]
+    toy.halved = {(0,): toy.tried[0,]}
+    toy.simulator.has_contacts = contacts
+    assert near(toy, (0,), 0, adequate=True)[2] == left

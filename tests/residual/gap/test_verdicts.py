@@ -8,7 +8,7 @@ import pytest
 from residual.gap.answer import _worsens
 from residual.gap.forecasts import no_better
 from residual.gap.verdicts import dependent
-from sims.effects.library import near_combinations
+from sims.effects.aliases import near_combinations
 from sims.pendulum_equation import PendulumEquation
 
 SETS = (

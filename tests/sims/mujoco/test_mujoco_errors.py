@@ -44,6 +44,15 @@ def test_files_that_are_missing_broken_or_lack_a_mesh(tmp_path):
     assert "'drive' drives joint 'elbw', which is not there; expected one of elbow" in refused(lost)
 
 
+def test_an_include_that_is_missing_is_said_with_its_place(tmp_path):
+    whole = '<mujoco><include file="{}"/></mujoco>'
+    main = written(tmp_path, whole.format("parts/arm.xml"))
+    (tmp_path / "parts").mkdir()
+    assert f"expected it at {tmp_path / 'parts/arm.xml'}" in refused(main)
+    written(tmp_path, whole.format("hand.xml").replace("mujoco", "mujocoinclude"), "parts/arm.xml")
+    assert f"expected it at {tmp_path / 'hand.xml'}" in refused(main)
+
+
 def test_meshes_of_a_ros_package_are_found_around_the_urdf(tmp_path):
     urdf = tmp_path / "my_arm" / "urdf" / "arm.urdf"
     urdf.parent.mkdir(parents=True)

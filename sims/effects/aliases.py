@@ -1,0 +1,242 @@
+"""Effects of a simulator that no data could ever tell apart, found by probing its equations."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sims.effects.actuator import AND, ActuatorBias, ActuatorGain
+from sims.effects.base import Effect
+from sims.effects.friction import DryFriction
+from sims.effects.joint import JointEffect
+from sims.effects.library import library
+from sims.effects.parameter import ParameterChange
+from sims.simulator import Array, random_values
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
+
+#: Part of the states in which an effect's response is not proportional, from which on nothing is
+#: known of it: of a change that drowns in a solver's tolerance, nowhere.
+ROUGH = 0.25
+#: Numbers that have to be left for each effect: in as many as there are effects, everything
+#: depends on everything.
+NUMBERS = 2
+#: Most sets of one size that are looked at; larger sets are then left out.
+SETS = 400_000
+#: Sets looked at in one go.
+AT_ONCE = 20_000
+
+
+@dataclasses.dataclass(frozen=True)
+class Alias:
+    """Effects of which each can be replaced by the others, in any data.
+
+    Args:
+        effects: Two that have the same consequence, or three or four of which any one
+            equals a combination of the rest; written ``name@where``.
+        says: The same in words.
+        combination: True if one equals a combination of the rest, False if each equals any other.
+    """
+
+    effects: tuple[str, ...]
+    says: str
+    combination: bool = False
+
+
+def exact_aliases(
+    simulator: HostSimulator, rng: np.random.Generator | None = None, most: int = 4
+) -> tuple[Alias, ...]:
+    """Sets of effects that are exactly dependent in the simulator's own equations.
+
+    Found by probing: the change of the motion per strength is compared over random states and
+    inputs. It covers changes of parameters, gains, biases and the forces that are linear in
+    one strength; pairs first, then one representative of each pair in larger sets. Of effects
+    whose response is not proportional to their strength nothing is said, nor of large sets where
+    there are too many of them.
+
+    Args:
+        simulator: A host, with or without effects.
+        rng: Source of the random states; a fixed seed by default.
+        most: Largest set that is looked for.
+    """
+    columns, blurs = _linear(simulator, rng or np.random.default_rng(0))
+    found: list[Alias] = []
+    alike: dict[str, list[str]] = {}
+    for name in columns:
+        twin = next((n for n in alike if _dependent([n, name], columns, blurs)), None)
+        alike.setdefault(twin or name, []).append(name)
+    for twins in alike.values():
+        if len(twins) > 1:
+            says = f"{', '.join(twins)}: the same motion, no data tells which"
+            found.append(Alias(tuple(twins), says))
+    sets: list[set[str]] = []
+    # What acts on several inputs alike is no news as the sum of what acts on each.
+    single = [name for name in alike if AND not in name]
+    involved = _in_null_space({name: columns[name] for name in single}, blurs)
+    for size in range(3, most + 1):
+        for names in _perhaps_dependent(involved, size, columns, blurs):
+            if any(known <= set(names) for known in sets):
+                continue
+            if _dependent(names, columns, blurs):
+                sets.append(set(names))
+                rest = ", ".join(names)
+                found.append(Alias(names, f"{rest}: any one is a combination of the others", True))
+    return tuple(found)
+
+
+def near_combinations(
+    simulator: HostSimulator,
+    names: Sequence[str],
+    share: float = 0.03,
+    rng: np.random.Generator | None = None,
+) -> tuple[str, ...]:
+    """Single effects that some effects imitate together, all but a small share of the motion.
+
+    A pendulum's mass, for example, is its inertia and its motor's resistance but for the
+    damping of the bearing, which is little beside the motor's.
+
+    Args:
+        simulator: A host, with or without effects.
+        names: The effects that act together, ``name@where``.
+        share: Part of the motion that may differ.
+        rng: As for ``exact_aliases``, like the effects that are compared.
+    """
+    columns, _ = _linear(simulator, rng or np.random.default_rng(0))
+    if not all(name in columns for name in names):
+        return ()
+    size = min(len(column) for column in columns.values())
+    matrix = np.stack([columns[name][:size] for name in names], axis=1)
+    found = []
+    for name, column in columns.items():
+        rest = column - matrix @ np.linalg.lstsq(matrix, column, rcond=None)[0]
+        if name not in names and np.linalg.norm(rest) < share:
+            found.append(name)
+    return tuple(found)
+
+
+def probes(simulator: HostSimulator, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Random states (96, n_s) and inputs (96, n_a) where a small change has a small effect."""
+    states = simulator.smooth_states(96, rng)
+    inputs = np.empty((96, len(simulator.action_channels)))  # a system may have none
+    for column, channel in enumerate(simulator.action_channels):
+        inputs[:, column] = random_values(channel, 96, rng)
+    return states, inputs
+
+
+def shortly_after(simulator: HostSimulator, states: Array, inputs: Array) -> Array:
+    """States a tenth of a control period later, (n, n_s)."""
+    # The actuator path is applied to the input here, where it has no memory.
+    commands = simulator.drive(inputs, np.ones(len(inputs)), 2, hold="zero")
+    return simulator.integrate(states, commands, np.full(len(states), 0.1 * simulator.dt))
+
+
+def _linear(
+    simulator: HostSimulator, rng: np.random.Generator
+) -> tuple[dict[str, Array], dict[str, float]]:
+    """Change of the motion per strength of every effect that is linear in one, of unit length."""
+    plain = simulator.with_effects(())
+    states, inputs = probes(plain, rng)
+    near: dict[str, Array] = {}
+    far: dict[str, Array] = {}
+    for effect in library(plain):
+        linear = isinstance(effect, JointEffect) and not isinstance(effect, DryFriction)
+        if linear or isinstance(effect, ParameterChange | ActuatorGain | ActuatorBias):
+            if len(effect.strengths()) != 1:
+                continue
+            response = _response(plain, effect, states, inputs, 1e-4)
+            if np.any(response):
+                near[str(effect)] = response
+                far[str(effect)] = _response(plain, effect, states, inputs, 3e-4)
+    return _columns(near, far)
+
+
+def _columns(
+    near: dict[str, Array], far: dict[str, Array]
+) -> tuple[dict[str, Array], dict[str, float]]:
+    """Responses as vectors of unit length, and how far each is known.
+
+    A response to a change three times as large tells: states in which they differ, such as one
+    where a motor in a solver is just about to saturate, are left out, and so are effects that
+    would leave hardly any.
+    """
+    rough = {}
+    for name, response in near.items():
+        off = np.linalg.norm(response - far[name], axis=1)
+        rough[name] = off >= 1e-3 * np.sqrt(np.mean(response**2) * response.shape[1])
+    known = [name for name, where in rough.items() if where.mean() <= ROUGH]
+    columns: dict[str, Array] = {}
+    blurs: dict[str, float] = {}
+    if not known:
+        return columns, blurs
+    smooth = ~np.any([rough[name] for name in known], axis=0)
+    if near[known[0]][smooth].size < NUMBERS * len(known):
+        return columns, blurs
+    for name in known:
+        size = np.linalg.norm(near[name][smooth])
+        if size > 0:
+            columns[name] = near[name][smooth].ravel() / size
+            blurs[name] = float(np.linalg.norm((near[name] - far[name])[smooth]) / size)
+    return columns, blurs
+
+
+def _in_null_space(columns: dict[str, Array], blurs: dict[str, float]) -> list[str]:
+    """Those that can be part of a dependent set: they have a share in some null vector of all."""
+    if not columns:
+        return []
+    matrix = np.stack(list(columns.values()), axis=1)
+    _, sizes, vectors = np.linalg.svd(matrix, full_matrices=False)
+    shares = np.abs(vectors[sizes < max(1e-3, 10 * max(blurs.values()))])
+    return [name for name, share in zip(columns, shares.T, strict=True) if (share > 1e-2).any()]
+
+
+def _perhaps_dependent(
+    names: Sequence[str], size: int, columns: dict[str, Array], blurs: dict[str, float]
+) -> list[tuple[str, ...]]:
+    """The sets of a size that may be dependent, by the products of their responses.
+
+    None if there are more than ``SETS`` to look at.
+    """
+    if not math.comb(len(names), size) <= SETS or len(names) < size:
+        return []
+    matrix = np.stack([columns[name] for name in names])
+    products, blur = matrix @ matrix.T, np.array([blurs[name] for name in names])
+    every = np.array(list(itertools.combinations(range(len(names)), size)))
+    found: list[tuple[str, ...]] = []
+    for first in range(0, len(every), AT_ONCE):
+        sets = every[first : first + AT_ONCE]
+        least = np.linalg.eigvalsh(products[sets[:, :, None], sets[:, None, :]])[:, 0]
+        # Products are rounded in their last digits, and these are squares.
+        limit = _limit(blur[sets].max(axis=1)) ** 2 + 1e-13
+        found += [tuple(names[i] for i in numbers) for numbers in sets[least < limit]]
+    return found
+
+
+def _dependent(names: Sequence[str], columns: dict[str, Array], blurs: dict[str, float]) -> bool:
+    matrix = np.stack([columns[name] for name in names])
+    limit = _limit(np.array([blurs[name] for name in names]).max())
+    return bool(np.linalg.svd(matrix, compute_uv=False)[-1] < limit)
+
+
+def _limit(blur: Array) -> Array:
+    """Length of a combination below which it is none, by the blur of the least known response."""
+    return np.maximum(1e-6, 2 * blur)
+
+
+def _response(
+    simulator: HostSimulator, effect: Effect, states: Array, inputs: Array, share: float
+) -> Array:
+    """Change of the motion over a tenth of a control period per strength, (n, n_s)."""
+    (name,) = effect.strengths()
+    change = share * effect.quantities(simulator)[name].scale
+    ends = []
+    for value in (change, -change):
+        changed = simulator.with_effects([effect.with_values(**{name: value})])
+        ends.append(shortly_after(changed, states, inputs))
+    scale = np.array([channel.scale for channel in simulator.physical_channels])
+    return (ends[0] - ends[1]) / (scale * change)
