@@ -83,8 +83,7 @@ class HostSimulator(Simulator):
     def smooth_states(self, n: int, rng: np.random.Generator) -> Array:
         """Random physical states where a small change has a small effect, (n, n_physical).
 
-        By default within the scales of the channels, angles anywhere; a simulator with contacts
-        keeps away from them.
+        By default within the scales of the channels, angles anywhere; away from contacts.
         """
         return np.stack([random_values(c, n, rng) for c in self.physical_channels], axis=1)
 
