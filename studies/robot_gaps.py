@@ -12,6 +12,7 @@ each answer and a table. Answers are kept in a file and not asked again.
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import json
 import sys
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ from typing import Literal
 import numpy as np
 from jsonargparse.typing import NonNegativeInt, PositiveFloat, PositiveInt
 
-from studies.robots.cases import Answer, Case, ask, cases
+from studies.robots.cases import Answer, Case, ask, cases, nominal
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
 
@@ -50,6 +51,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     check_output(given.output.parent)
     seeds = range(given.first, given.first + given.seeds)
     if given.hidden:
+        known = [str(effect) for effect in nominal(given.robot).offered_effects()]
+        for name in set(given.hidden) - set(known):
+            near = difflib.get_close_matches(name, known, 3, 0.0)
+            fail(f"--hidden {name!r}: {given.robot} has no such effect; nearest: {', '.join(near)}")
         wanted = [Case(given.robot, tuple(given.hidden), seed) for seed in seeds]
     else:
         wanted = list(cases(given.robot, given.kind, seeds))

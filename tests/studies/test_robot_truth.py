@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from studies.robot_gaps import main
 from studies.robots.cases import Case, nominal, strengths
 from studies.robots.drives import MODELS
 from studies.robots.truth import Sensors, Truth
@@ -51,3 +52,11 @@ def differs(one, other):
     own += [getattr(one.model, name) for name in names] + [one.model.opt.gravity]
     its += [getattr(other.model, name) for name in names] + [other.model.opt.gravity]
     return not all(np.array_equal(a, b) for a, b in zip(own, its, strict=True))
+
+
+def test_an_effect_that_a_robot_lacks_is_told_with_the_nearest(capsys, tmp_path):
+    with pytest.raises(SystemExit) as ended:
+        main(["--robot", "arm2", "--hidden", "damping of elbow", "--output", str(tmp_path / "r")])
+    assert ended.value.code == 2
+    assert "arm2 has no such effect; nearest: damping of joint elbow" in capsys.readouterr().err
+    assert not (tmp_path / "r").exists()
