@@ -51,9 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     check_output(given.output.parent)
     seeds = range(given.first, given.first + given.seeds)
     if given.hidden:
-        known = [str(effect) for effect in nominal(given.robot).offered_effects()]
-        for name in set(given.hidden) - set(known):
-            near = difflib.get_close_matches(name, known, 3, 0.0)
+        offered = [str(effect) for effect in nominal(given.robot).offered_effects()]
+        for name in set(given.hidden) - set(offered):
+            near = difflib.get_close_matches(name, offered, 3, 0.0)
             fail(f"--hidden {name!r}: {given.robot} has no such effect; nearest: {', '.join(near)}")
         wanted = [Case(given.robot, tuple(given.hidden), seed) for seed in seeds]
     else:

@@ -64,6 +64,8 @@ def choose(search: Search, enough: Callable[[Key], bool] = lambda _: False) -> C
         if helps(search, short, key):
             minor += sorted(set(key) - set(short))
         key = short
+    if key:
+        key = _plainer(search, key, open_)
     if key and not helps(search, (), key):
         key = ()
     kept = tuple(number for number in dict.fromkeys(minor) if number not in key)
@@ -78,6 +80,19 @@ def _better_fit(search: Search, keys: list[Key]) -> Key:
         k for k in keys if as_good(search, k, best) and search.error(k) < NEAR * search.error(best)
     ]
     return min(near or [best], key=lambda key: (search.surprises(key), search.tried[key].merit))
+
+
+def _plainer(search: Search, key: Key, among: list[Key]) -> Key:
+    """A set of as few numbers that forecasts as well and has sizes that surprise less, if any."""
+    near = [
+        k
+        for k in among
+        if search.numbers(k) <= search.numbers(key)
+        and search.surprises(k) < search.surprises(key)
+        and as_good(search, k, key)
+        and search.error(k) < NEAR * search.error(key)
+    ]
+    return _better_fit(search, near) if near else key
 
 
 def _smaller(search: Search, key: Key, among: list[Key]) -> list[Key]:

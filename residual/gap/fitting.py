@@ -123,6 +123,9 @@ class Fitter(Protocol):
             near: A fit whose start states are worth starting from.
         """
 
+    def resumed(self, model: Model, theta: Array, near: Fit) -> Fit:
+        """The same from where a fit ended, of which ``model`` is an extension."""
+
     def columns(self, fit: Fit, candidates: Sequence[Candidate]) -> Array:
         """Change of the whitened output by all trials of candidates, (W, R, c)."""
 

@@ -87,6 +87,11 @@ class SmoothFitter:
             found = again if again.merit <= found.merit else found
         return self._as_fit(found)
 
+    def resumed(self, model: Model, theta: Array, near: Fit) -> Fit:
+        """See ``Fitter.resumed``."""
+        nodes = model.widen(self.samples, near.inner.nodes[:, : model.physical], theta)
+        return self._as_fit(self._shot(model, nodes, theta, None, 0.05))
+
     def _shot(
         self, model: Model, nodes: Array, theta: Array, by_state: Array | None, widths: float
     ) -> shooting.ShootingFit:

@@ -39,6 +39,8 @@ RIVALS = 4
 HOPELESS = 10.0
 #: Units of which the zero means nothing: of 298 K a share is no accuracy.
 ANY_ZERO = ("degC", "°C", "K", "degF", "°F")
+#: Loss with parameters free, over that with them fixed, beyond which a fit did not converge.
+WORSE = 1.001
 #: Parameters that are allowed for, those that matter most.
 MOST = 12
 
@@ -207,6 +209,11 @@ def calibrated(search: Search, key: Key, parameters: Sequence[Candidate]) -> Cal
     names = {candidate.label for candidate in chosen}
     free = [candidate for candidate in parameters if candidate.label not in names]
     start = np.append(search.own(key), np.zeros(len(free)))
-    fit = search.fitter.fit(Model(search.simulator, [*chosen, *free]), start, search.tried[key])
+    model, own = Model(search.simulator, [*chosen, *free]), search.tried[key]
+    fit = search.fitter.fit(model, start, own)
+    if fit.merit > WORSE * own.merit:
+        # It holds what ``own`` holds, so it did not converge, and would excuse every rival.
+        again = search.fitter.resumed(model, start, own)
+        fit = again if again.merit < fit.merit else fit
     squares = validate(search.fitter, fit).squares
     return Calibrated(fit, squares, search.currency.by_group(squares))

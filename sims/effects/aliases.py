@@ -16,6 +16,7 @@ from sims.effects.friction import DryFriction
 from sims.effects.joint import JointEffect
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
+from sims.effects.sensor import SensorOffset, SensorScale
 from sims.simulator import Array, random_values
 
 if TYPE_CHECKING:
@@ -136,6 +137,26 @@ def shortly_after(simulator: HostSimulator, states: Array, inputs: Array) -> Arr
     return simulator.integrate(states, commands, np.full(len(states), 0.1 * simulator.dt))
 
 
+def _alone(simulator: HostSimulator, channel: str) -> bool:
+    """Whether a state has neither a rate nor a position that its readings would contradict."""
+    return not any(
+        c.kind == "rate" and c.rate_of is not None and channel in (c.name, c.rate_of)
+        for c in simulator.state_channels
+    )
+
+
+def _read_after(
+    simulator: HostSimulator, sensor: SensorOffset | SensorScale, states: Array, inputs: Array
+) -> Array:
+    """Readings a tenth of a control period after readings of ``states``, (n, n_s)."""
+    column = [c.name for c in simulator.state_channels].index(sensor.channel)
+    true = states.copy()
+    true[:, column] = sensor.undo(true[:, column])
+    after = shortly_after(simulator, true, inputs)
+    after[:, column] = sensor.read(after[:, column])
+    return after
+
+
 def _linear(
     simulator: HostSimulator, rng: np.random.Generator
 ) -> tuple[dict[str, Array], dict[str, float]]:
@@ -144,16 +165,24 @@ def _linear(
     states, inputs = probes(plain, rng)
     near: dict[str, Array] = {}
     far: dict[str, Array] = {}
-    for effect in library(plain):
-        linear = isinstance(effect, JointEffect) and not isinstance(effect, DryFriction)
-        if linear or isinstance(effect, ParameterChange | ActuatorGain | ActuatorBias):
-            if len(effect.strengths()) != 1:
-                continue
-            response = _response(plain, effect, states, inputs, 1e-4)
-            if np.any(response):
-                near[str(effect)] = response
-                far[str(effect)] = _response(plain, effect, states, inputs, 3e-4)
+    # Of twins the first is named: what moves is more often off than what reads it.
+    for effect in sorted(library(plain), key=lambda e: isinstance(e, SensorOffset | SensorScale)):
+        if not _is_linear(plain, effect):
+            continue
+        response = _response(plain, effect, states, inputs, 1e-4)
+        if np.any(response):
+            near[str(effect)] = response
+            far[str(effect)] = _response(plain, effect, states, inputs, 3e-4)
     return _columns(near, far)
+
+
+def _is_linear(simulator: HostSimulator, effect: Effect) -> bool:
+    """Whether a small effect changes the motion, or its readings, in proportion to one strength."""
+    if isinstance(effect, SensorOffset | SensorScale):
+        return _alone(simulator, effect.channel)
+    force = isinstance(effect, JointEffect) and not isinstance(effect, DryFriction)
+    input_or_parameter = isinstance(effect, ParameterChange | ActuatorGain | ActuatorBias)
+    return (force or input_or_parameter) and len(effect.strengths()) == 1
 
 
 def _columns(
@@ -236,7 +265,10 @@ def _response(
     change = share * effect.quantities(simulator)[name].scale
     ends = []
     for value in (change, -change):
-        changed = simulator.with_effects([effect.with_values(**{name: value})])
-        ends.append(shortly_after(changed, states, inputs))
+        changed = effect.with_values(**{name: value})
+        if isinstance(changed, SensorOffset | SensorScale):
+            ends.append(_read_after(simulator, changed, states, inputs))
+        else:
+            ends.append(shortly_after(simulator.with_effects([changed]), states, inputs))
     scale = np.array([channel.scale for channel in simulator.physical_channels])
     return (ends[0] - ends[1]) / (scale * change)

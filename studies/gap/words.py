@@ -77,6 +77,11 @@ def unit_text(unit: str) -> str:
     return "" if unit in ("", "1") else f" {unit}"
 
 
+def _near(number: Number) -> float:
+    """How far the nearer end of the interval is from the value."""
+    return min(number.high - number.value, number.value - number.low)
+
+
 def number_text(number: Number, sign: bool = False) -> str:
     """Value and 95 % interval with the unit; of a number at its bound no interval is known."""
     plus = "+" if sign and number.value > 0 else ""
@@ -84,7 +89,9 @@ def number_text(number: Number, sign: bool = False) -> str:
         return f"{plus}{number.value:.3g}{unit_text(number.unit)} (at its bound)".replace(
             "-", "\u2212"
         )
-    half = 0.5 * (number.high - number.low)
+    # Of a lopsided interval the near side says how well the value is known.
+    half, near = 0.5 * (number.high - number.low), _near(number)
+    half = max(near, 0.05 * half) if 0 < near < 0.3 * half else half
     value, low, high = (rounded(x, half) for x in (number.value, number.low, number.high))
     return f"{plus}{value}{unit_text(number.unit)} ({low} to {high})".replace("-", "\u2212")
 

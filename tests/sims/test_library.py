@@ -1,5 +1,7 @@
 """The library of effects: units, places, families, exact aliases."""
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from hosts import HOSTS, rows
@@ -17,8 +19,10 @@ from sims.effects import (
     typical,
 )
 from sims.effects.aliases import _columns, _perhaps_dependent
+from sims.equations import FirstOrderSystem
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel, Parameter
 
 
 def test_units_and_scales_come_from_the_host():
@@ -69,6 +73,25 @@ def test_exact_aliases(host):
     following = exact_aliases(PendulumEquation(inertia_follows_mass=True))
     twins = [set(alias.effects) for alias in following if "the same motion" in alias.says]
     assert twins and not any("mass" in names for names in twins)
+
+
+class Tank(FirstOrderSystem):
+    dt = 0.1
+    state_channels = (Channel("level", "m", "other"),)
+    action_channels = (Channel("flow", "l/s", "input"),)
+    parameters: ClassVar = {
+        "rise": Parameter(2.0, "m s/l", ""),
+        "time": Parameter(3.0, "s", "", low=0.1),
+    }
+
+    def derivative(self, x, u, p):
+        return (p.rise * u - x) / p.time
+
+
+def test_what_a_sensor_of_a_first_order_state_does_is_told_from_no_gain_and_no_load():
+    twins = [set(alias.effects) for alias in exact_aliases(Tank()) if not alias.combination]
+    assert {"actuator_gain@flow", "rise", "sensor_scale@level"} in twins
+    assert {"constant_load@level", "actuator_bias@flow", "sensor_offset@level"} in twins
 
 
 @pytest.mark.parametrize(

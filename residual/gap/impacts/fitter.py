@@ -105,6 +105,10 @@ class ImpactFitter:
             changes - basis @ (inner @ changes), basis, True, found,
         )  # fmt: skip
 
+    def resumed(self, model: Model, theta: Array, near: Fit) -> Fit:
+        """See ``Fitter.resumed``."""
+        return self.fit(model, theta, near)
+
     def columns(self, fit: Fit, candidates: Sequence[Candidate]) -> Array:
         """See ``Fitter.columns``."""
         return candidate_changes(fit.model, fit.theta, self.data, fit.inner.fitted, candidates)

@@ -54,6 +54,13 @@ def test_what_would_be_surprisingly_large_comes_after_what_does_as_well():
     assert choose(Toy({(0,): 0.400, (3,): 0.201}, merits, surprising={3})).key == (3,)
 
 
+def test_a_set_that_shrank_is_exchanged_for_one_that_surprises_less():
+    """The pair does best, but either member alone does about as well."""
+    errors = {(3,): 0.1000, (0,): 0.1001, (1, 3): 0.0999}
+    merits = {(3,): 1.0, (0,): 1.01, (1, 3): 0.99}
+    assert choose(Toy(errors, merits, surprising={3})).key == (0,)
+
+
 def test_a_set_that_is_good_enough_asks_for_no_more():
     toy = Toy({(0,): 0.10, (0, 1): 0.05})
     assert choose(toy).key == (0, 1)

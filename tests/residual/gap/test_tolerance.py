@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from residual.gap import find_gap
+from residual.gap.candidates import candidates
+from residual.gap.model import Model
+from residual.gap.prepare import prepare
+from residual.gap.search import Search
+from residual.gap.tolerance import allowed, calibrated
 from residual.trajectories import Trajectory
+from sims.effects import ParameterChange
 from sims.effects.library import library
 from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
@@ -101,3 +107,19 @@ def test_of_a_temperature_no_share_is_known_but_one_of_its_range():
     assert (first.kind, first.effect) == ("confirmed", "late")
     assert first.parameters["change"].low <= -3.0 <= first.parameters["change"].high
     assert first.parameters["change"].high - first.parameters["change"].low < 2.0
+
+
+def test_a_fit_with_free_parameters_that_did_not_converge_is_resumed(monkeypatch):
+    """Else it would excuse every rival: it holds what the set itself holds."""
+    simulator = PendulumEquation()
+    logs = make_logs(Truth(mass=0.02), 0, "strong", "A", 2)
+    fitter = prepare(simulator, logs, 0.4).fitter
+    offered = [ParameterChange("mass")]
+    search = Search(simulator, candidates(simulator, offered, fitter.samples), fitter)
+    search.add({(0,): np.array([0.01])})
+    free = allowed(search, 0.03)
+    good = calibrated(search, (0,), free).fit.merit
+    lost = fitter.fit(Model(simulator), np.zeros(0))
+    monkeypatch.setattr(type(fitter), "fit", lambda *_: lost)
+    assert lost.merit > 1.5 * good
+    assert calibrated(search, (0,), free).fit.merit == pytest.approx(good, rel=0.02)
