@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -40,6 +41,8 @@ from sims.host import HostSimulator
 
 #: Sets listed as evidence.
 EVIDENCE = 40
+#: Effects tried in place of each that is left when one cannot be named.
+RIVALS = 3
 #: Forecast error over that by noise alone up to which there may be no gap.
 NEAR_NOISE = 1.5
 #: Forecast error over that by noise alone beyond which something is missing although impacts hide
@@ -88,6 +91,7 @@ def confirm(
     groups: dict[str, tuple[str, ...]],
     asked: bool = True,
     parameter_tolerance: float = KNOWN,
+    until: float = np.inf,
 ) -> Answer:
     """Claims of the chosen effects; what cannot be named is left out, and the rest asked again.
 
@@ -96,6 +100,7 @@ def confirm(
         groups: Exact twins by label.
         asked: False if the gap does not matter, so that nothing is named.
         parameter_tolerance: How well the simulator's parameters are known, as a share of each.
+        until: When to ask no further, on the clock of ``time.process_time``.
     """
     search, key = found.search, found.key if asked else ()
     leads: tuple[str, ...] = ()
@@ -108,15 +113,17 @@ def confirm(
             alone = imitated(search, key)
             made = [dataclasses.replace(c, rivals=(*c.rivals, *alone)) for c in made]
         blocks = len(search.fitter.blocks)
-        lost = [c for c in made if not nameable(search, c, blocks) or _worsens(found, c)]
+        lost = [c for c in made if not nameable(search, c, blocks, found.adequate)]
         if not lost:
-            made = allow_for_parameters(search, key, made, found.adequate, parameter_tolerance)
+            made = allow_for_parameters(
+                search, key, made, found.adequate, parameter_tolerance, until
+            )
             # Now that intervals allow for the parameters, too.
             lost = [c for c in made if not c.needed and may_vanish(search, c)]
             plainer = None if lost or found.adequate else in_plain_form(search, key, made)
             if plainer:
                 key = plainer
-                add_exchanged(search, key, 3)
+                add_exchanged(search, key, 0 if time.process_time() > until else RIVALS)
                 continue
         if not lost:
             return Answer(found, key, tuple(made), leads)
@@ -125,12 +132,7 @@ def confirm(
         leads = (search.candidates[gone].label, *leads)
         key, theta = search.merged(key, (), drop=(gone,))
         search.add({key: theta})
-        add_exchanged(search, key, 3)
-
-
-def _worsens(found: Explanation, claim: Claim) -> bool:
-    """Whether forecasts err more with an effect than without it, where chance does not decide."""
-    return not found.adequate and claim.share[0] <= 0
+        add_exchanged(search, key, 0 if time.process_time() > until else RIVALS)
 
 
 def summed_up(answer: Answer) -> Gap:

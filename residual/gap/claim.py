@@ -34,6 +34,7 @@ class Claim:
         bounded: Whether a strength lies at its bound.
         share: Part of the nominal squared error that it takes off, with a 95 % interval.
         calibration: Whether parameters of the simulator, all within their tolerance, do as well.
+        unasked: Whether there was no time to ask that.
         brief: Whether it is a time too short for the log's own clock.
         meant: Numbers of its twins in its place.
         beside: Its own numbers beside twins of the others, where they differ.
@@ -51,6 +52,7 @@ class Claim:
     bounded: bool
     share: tuple[float, float, float]
     calibration: bool = False
+    unasked: bool = False
     brief: bool = False
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
@@ -68,7 +70,14 @@ class Claim:
     @property
     def sure(self) -> bool:
         """Whether nothing speaks against it."""
-        against = (self.bounded, self.calibration, self.brief, self.rivals, self.alike)
+        against = (
+            self.bounded,
+            self.calibration,
+            self.brief,
+            self.rivals,
+            self.alike,
+            self.unasked,
+        )
         return self.needed and self.gains and self.steady and self.sound and not any(against)
 
     @property

@@ -85,7 +85,7 @@ def find_gap(
             effect is certain only if they cannot stand in for it within that, and its interval
             allows for them. 0 takes them for exact, so that intervals are of the data alone.
         minutes: Budget of processor time, so that a busy machine finds the same: the search for
-            further explanations ends in time.
+            further explanations ends in time. Confirming may take as long again.
         n_jobs: Processes for a simulator that steps row by row.
         progress: Called with a line of text now and then.
 
@@ -101,7 +101,7 @@ def find_gap(
     clock = Clock()
     tell = progress or (lambda _: None)
     over = time.process_time() + 60 * minutes
-    until = over - 60 * minutes * (1 - SEARCHING)
+    until, at_last = over - 60 * minutes * (1 - SEARCHING), over + 60 * minutes
     offered = chosen_effects(simulator, [LIBRARY] if effects is None else list(effects))
     if measured_input:
         offered = tuple(e for e in offered if not e.upstream_of_sensor)
@@ -164,7 +164,7 @@ def find_gap(
         clock.lap("search")
         tell("confirming")
         asked = matters(found, tolerance)
-        answer = confirm(found, groups, asked, parameter_tolerance)
+        answer = confirm(found, groups, asked, parameter_tolerance, at_last)
         beside = worth_freeing(answer, parameter_tolerance) if asked else []
         if beside and time.process_time() > over:
             quality.append(
@@ -174,7 +174,7 @@ def find_gap(
         elif beside:
             tell("once more with parameters free within their tolerance")
             again = explained(found.search.simulator, prepared, beside, found.search)
-            second = confirm(again, groups, asked, parameter_tolerance)
+            second = confirm(again, groups, asked, parameter_tolerance, at_last)
             if better(second, answer):
                 answer = second
         answer = dataclasses.replace(

@@ -18,11 +18,11 @@ Kind = Literal[
 ]
 #: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
 #: between folds or with the numerics, lies at its bound, parameters within their tolerance do as
-#: well, it is a time shorter than half a sample, its interval holds zero, or an effect of another
-#: kind does as well.
+#: well, or there was no time to ask that, it is a time shorter than half a sample, its interval
+#: holds zero, or an effect of another kind does as well.
 Doubt = Literal[
-    "not_needed", "unsteady", "numerics", "at_bound", "calibration", "clock", "may_be_zero",
-    "share_may_be_zero", "rivals",
+    "not_needed", "unsteady", "numerics", "at_bound", "calibration", "no_time", "clock",
+    "may_be_zero", "share_may_be_zero", "rivals",
 ]  # fmt: skip
 
 

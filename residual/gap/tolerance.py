@@ -7,6 +7,7 @@ also where every parameter may differ by its tolerance.
 from __future__ import annotations
 
 import dataclasses
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -46,8 +47,9 @@ MOST = 12
 
 
 def allow_for_parameters(
-    search: Search, key: Key, claims: Sequence[Claim], adequate: bool, tolerance: float
-) -> list[Claim]:
+    search: Search, key: Key, claims: Sequence[Claim], adequate: bool, tolerance: float,
+    until: float = np.inf,
+) -> list[Claim]:  # fmt: skip
     """The claims with parameters allowed for.
 
     Args:
@@ -56,10 +58,14 @@ def allow_for_parameters(
         claims: Of its members.
         adequate: Whether only noise is left, so that chance decides.
         tolerance: How well parameters are known, as a share of each.
+        until: When to ask no further, on the clock of ``time.process_time``: what was not asked
+            is not certain.
     """
     parameters = allowed(search, tolerance) if claims else []
     if not parameters:
         return list(claims)
+    if time.process_time() > until:
+        return [dataclasses.replace(claim, unasked=True) for claim in claims]
     add_without_each(search, key)
     beside = calibrated(search, key, parameters)
     left = float((beside.fit.projected**2).sum())
@@ -78,6 +84,7 @@ def allow_for_parameters(
 
     told = []
     for claim in claims:
+        claim = dataclasses.replace(claim, unasked=time.process_time() > until)
         if claim.sure:
             without = all_but(key, claim.number)
             claim = dataclasses.replace(claim, calibration=as_good(claim, without))

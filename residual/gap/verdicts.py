@@ -21,8 +21,13 @@ NEARLY_NONE = 0.1
 MOVED = 1e-3
 
 
-def nameable(search: Search, claim: Claim, blocks: int) -> bool:
-    """Whether an effect has few enough rivals, a size, and data enough, to be named at all."""
+def nameable(search: Search, claim: Claim, blocks: int, adequate: bool) -> bool:
+    """Whether an effect has few enough rivals, a size, and data enough, to be named at all.
+
+    Nor is one named that makes forecasts worse, unless chance decides.
+    """
+    if not adequate and claim.share[0] <= 0:
+        return False
     few = len(families(search, claim)) <= (MOST_FAMILIES if claim.needed else UNNEEDED)
     return few and blocks >= TOO_FEW and not may_vanish(search, claim)
 
@@ -108,6 +113,8 @@ def effect_verdict(
         says.append(f"{sets}, in one exact proportion, would move alike")
     if claim.calibration:
         says.append("parameters that are a few percent off would do as well")
+    if claim.unasked:
+        says.append("there was no time to ask what parameters a few percent off would do")
     if claim.brief:
         says.append("shorter than half a sample, as late time stamps and filters in sensors are")
     if not claim.needed:
@@ -138,6 +145,7 @@ def doubts(claim: Claim, vanishes: bool) -> tuple[Doubt, ...]:
         "numerics": not claim.sound,
         "at_bound": claim.bounded,
         "calibration": claim.calibration,
+        "no_time": claim.unasked,
         "clock": claim.brief,
         "may_be_zero": vanishes,
         "share_may_be_zero": not claim.gains,

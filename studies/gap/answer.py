@@ -34,6 +34,8 @@ DOUBTS: dict[Doubt, str] = {
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
+    "no_time": "there was no time to ask whether parameters that are a few percent off would do as "
+    "well, give more --minutes",
     "may_be_zero": "its interval holds zero, or nearly",
     "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
     "calibration": "parameters that are a few percent off would do nearly as well",

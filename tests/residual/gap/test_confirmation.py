@@ -179,27 +179,27 @@ def test_few_blocks_confirm_families_for_the_time_being_and_fewer_than_four_noth
         verdict = effect_verdict(toy, claim(1), blocks)
         assert (verdict.kind, verdict.provisional) == ("confirmed", provisional)
         assert verdict.family == ("dissipation" if provisional else "")
-        assert nameable(toy, claim(1), blocks)
+        assert nameable(toy, claim(1), blocks, True)
     assert effect_verdict(toy, claim(1), 3).kind == "ambiguous"
-    assert not nameable(toy, claim(1), 3)
+    assert not nameable(toy, claim(1), 3, True)
 
 
 @pytest.mark.parametrize(("low", "named"), [(0.001, True), (-0.001, False)])
 def test_what_may_have_no_size_has_no_name(low, named):
     toy = Toy({(0,): 0.3})
     small = claim(numbers={"change": Number(0.01, low, 0.02, "kg")})
-    assert nameable(toy, small, 20) is named
+    assert nameable(toy, small, 20, True) is named
 
 
 def test_what_could_be_too_many_others_has_no_name():
     toy = Toy({(0,): 0.3})
     some = ("constant_load@pivot", "viscous_friction@pivot", "coulomb_friction@pivot")
-    assert nameable(toy, claim(rivals=some), 20)  # two forms of dissipation count once
+    assert nameable(toy, claim(rivals=some), 20, True)  # two forms of dissipation count once
     many = (*some, "actuator_gain@voltage", "delay@voltage", "sensor_offset@angle")
-    assert not nameable(toy, claim(rivals=many), 20)
+    assert not nameable(toy, claim(rivals=many), 20, True)
     # What forecasts do not clearly need has to be one of fewer.
-    assert nameable(toy, claim(rivals=many[:4]), 20)
-    assert not nameable(toy, claim(rivals=many[:4], needed=False), 20)
+    assert nameable(toy, claim(rivals=many[:4]), 20, True)
+    assert not nameable(toy, claim(rivals=many[:4], needed=False), 20, True)
 
 
 def test_minor_effects_carry_their_share_and_no_number():

@@ -1,11 +1,13 @@
 """What parameters of the simulator that are a little off can do is no certain effect."""
 
+import itertools
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
-from residual.gap import find_gap
+from residual.gap import find_gap, tolerance
 from residual.gap.candidates import candidates
 from residual.gap.model import Model
 from residual.gap.prepare import prepare
@@ -123,3 +125,15 @@ def test_a_fit_with_free_parameters_that_did_not_converge_is_resumed(monkeypatch
     monkeypatch.setattr(type(fitter), "fit", lambda *_: lost)
     assert lost.merit > 1.5 * good
     assert calibrated(search, (0,), free).fit.merit == pytest.approx(good, rel=0.02)
+
+
+def test_what_there_was_no_time_to_ask_is_not_certain(monkeypatch):
+    """As of a robot whose fits take as long as the budget."""
+    simulator = PendulumEquation()
+    logs = make_logs(Truth(mass=0.02), 0, "strong", "A", 4)
+    offered = [ParameterChange("mass"), ParameterChange("inertia")]
+    clock = itertools.count(step=100.0)
+    monkeypatch.setattr(tolerance, "time", SimpleNamespace(process_time=lambda: next(clock) + 1e9))
+    first = find_gap(simulator, logs, effects=offered).verdicts[0]
+    assert (first.kind, first.effect) == ("ambiguous", "mass")
+    assert "no_time" in first.doubts

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from residual.gap.answer import _worsens
 from residual.gap.forecasts import no_better
-from residual.gap.verdicts import dependent
+from residual.gap.result import Number
+from residual.gap.verdicts import dependent, nameable
 from sims.effects.aliases import near_combinations
 from sims.pendulum_equation import PendulumEquation
 
@@ -46,12 +46,18 @@ def test_blocks_in_which_nothing_was_gained_are_counted():
     assert no_better(before, np.array([1.0, 5.0, 4.0, 1.5]), floor) == 2
 
 
-@pytest.mark.parametrize(("adequate", "share", "gone"), [
-    (False, -0.1, True), (False, 0.1, False), (True, -0.1, False),
+@pytest.mark.parametrize(("adequate", "share", "named"), [
+    (False, -0.1, False), (False, 0.1, True), (True, -0.1, True),
 ])  # fmt: skip
 def test_what_makes_forecasts_worse_is_not_named_where_chance_does_not_decide(
-    adequate, share, gone
+    adequate, share, named
 ):
-    found = SimpleNamespace(adequate=adequate)
-    claim = SimpleNamespace(share=(share, share - 0.1, share + 0.1))
-    assert _worsens(found, claim) is gone
+    knob = SimpleNamespace(field="change", strength=True)
+    search = SimpleNamespace(
+        candidates=[SimpleNamespace(label="mass", knobs=(knob,))], family=lambda number: ""
+    )
+    claim = SimpleNamespace(
+        number=0, share=(share, share - 0.1, share + 0.1), rivals=(), needed=True,
+        numbers={"change": Number(0.1, 0.05, 0.15, "kg")},
+    )  # fmt: skip
+    assert nameable(search, claim, 20, adequate) is named
