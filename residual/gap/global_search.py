@@ -26,6 +26,9 @@ GLOBALLY = 0.2
 FAR = 3.0
 #: Vectors of numbers in a generation, and generations, for every number.
 POPULATION, GENERATIONS = 12, 5
+#: Members of the last generation that fits begin from, and how far they are apart, as a share of
+#: the reach of a number.
+STARTS, NEAR = 8, 0.1
 #: Windows that are foretold, at most: what is found is only where a fit begins.
 WINDOWS = 16
 #: Most numbers that are sought at once: larger sets grow from smaller ones.
@@ -62,16 +65,18 @@ class GlobalSearch:
         begun = time.process_time()
         if begun > self.until or self._left < 0:
             return found
-        start = begins_elsewhere(fitter, found, self.noise, free)
+        starts = begins_elsewhere(fitter, found, self.noise, free)
+        fits = [fitter.fit(found.model, start, found) for start in starts]
         self._left -= time.process_time() - begun
-        if start is None:
-            return found
-        again = fitter.fit(found.model, start, found)
-        return again if again.merit < found.merit else found
+        return min([found, *fits], key=lambda fit: fit.merit)
 
 
-def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) -> Array | None:
-    """Numbers from which a fit may do better; None if there is no reason to look.
+def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) -> Array:
+    """Numbers from which a fit may do better, (k, p), most promising first; none if there is no
+    reason to look.
+
+    They are several, since forecasts of a few windows do not tell the valleys of a law apart that
+    a fit to all of them does.
 
     Args:
         fitter: Holds the windows.
@@ -83,7 +88,7 @@ def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) ->
     holds = any(candidate.effect.holds_still for candidate in model.chosen)
     own_step = model.batched and not model.simulator.own_files()
     if not (holds and own_step and 0 < free <= MOST and _far(fitter, fit, noise)):
-        return None
+        return np.zeros((0, len(fit.theta)))
     forecasts = _Forecasts(fitter, model)
     low, high, log = _box(model, fit.theta, free)
 
@@ -101,7 +106,17 @@ def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) ->
         popsize=POPULATION, maxiter=GENERATIONS * free,
         x0=np.clip(begin, low + inside, high - inside),
     )  # fmt: skip
-    return numbers(result.x[None])[0]
+    ranked = result.population[np.argsort(result.population_energies)]
+    return numbers(_apart(ranked, NEAR * (high - low)))
+
+
+def _apart(points: Array, near: Array) -> Array:
+    """The first of some points, (n, d), and up to ``STARTS`` in all that are not near another."""
+    found = points[:1]
+    for point in points[1:]:
+        if len(found) < STARTS and (np.abs(found - point) > near).any(axis=1).all():
+            found = np.vstack([found, point])
+    return found
 
 
 def _far(fitter: SmoothFitter, fit: Fit, noise: Array) -> bool:
