@@ -132,10 +132,10 @@ def find_gap(
         pool = [candidate for candidate in pool if candidate.label not in free]
         others = {label: effect for label, effect in named.items() if label not in free}
         twins = exact_twins(simulator, ready.fitter.samples, groups, others)
-        lead = 0.0 if simulator.has_contacts else horizon * LEAD / (1 - LEAD)
+        lead = 0.0 if simulator.has_contacts else ready.horizon * LEAD / (1 - LEAD)
         begun = f" begun from {lead:.3g} s before" if lead else ""
         tell(
-            f"{len(ready.fitter.blocks)} blocks of data, forecasts over {horizon:.3g} s{begun}, "
+            f"{len(ready.fitter.blocks)} blocks of data, forecasts over {ready.horizon:.3g} s{begun}, "
             f"{len(pool)} candidate effects"
         )
         tell("screening them")
