@@ -134,10 +134,8 @@ def find_gap(
         twins = exact_twins(simulator, ready.fitter.samples, groups, others)
         lead = 0.0 if simulator.has_contacts else ready.horizon * LEAD / (1 - LEAD)
         begun = f" begun from {lead:.3g} s before" if lead else ""
-        tell(
-            f"{len(ready.fitter.blocks)} blocks of data, forecasts over {ready.horizon:.3g} s{begun}, "
-            f"{len(pool)} candidate effects"
-        )
+        ahead = f"forecasts over {ready.horizon:.3g} s{begun}"
+        tell(f"{len(ready.fitter.blocks)} blocks of data, {ahead}, {len(pool)} candidate effects")
         tell("screening them")
         return explain(
             simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, tell, until,
