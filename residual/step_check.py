@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from collections.abc import Iterator, Sequence
 from typing import Protocol, runtime_checkable
 
@@ -18,6 +19,8 @@ Array = NDArray[np.float64]
 NOTICED = 15.0
 #: Length of a window in s, and the most windows that are compared.
 WINDOW, MOST = 0.3, 40
+#: Seconds of processor time after which no further finer version is tried.
+PATIENCE = 15.0
 
 
 @runtime_checkable
@@ -108,13 +111,17 @@ def fine_enough(
         trajectories: Measured runs.
 
     Returns:
-        Such as ``("--simulator.integrator RK4", simulator)``; None if none is fine enough.
+        Such as ``("--simulator.integrator RK4", simulator)``; None if none is fine enough of those
+        that there was time to try.
     """
     simulator = simulator.for_motion([run.states for run in trajectories])
     # No usual step times a strike of the ground as finely as encoders see it.
     if simulator.has_contacts or not isinstance(simulator, Refinable):
         return None
+    begun = time.process_time()
     for option, finer in simulator.finer():
+        if time.process_time() - begun > PATIENCE:
+            break
         if not check_step(finer, trajectories).visible:
             return option, finer
     return None
