@@ -235,7 +235,7 @@ def verdicts(
                 f"{table.before.value:.3g} {table.unit}, within the tolerance of {tolerance:.3g}"
             ),
         )
-    elif not answer.key and search.simulator.has_contacts and beyond_noise(table):
+    elif not answer.key and search.simulator.has_contacts and table.exceeds_noise(PARTED):
         made.append(parted_verdict(table, answer.leads))
     elif not answer.key and left.adequate and not search.beside:
         made.append(no_gap_verdict("no gap above noise"))
@@ -258,12 +258,6 @@ def within_noise(table: Gap) -> bool:
     """Whether forecasts of the nominal simulator err by no more than noise may."""
     near = table.before.value <= NEAR_NOISE * table.noise_floor.value
     return near and table.before.low <= table.noise_floor.high
-
-
-def beyond_noise(table: Gap) -> bool:
-    """Whether forecasts of the nominal simulator err by clearly more than noise makes."""
-    far = table.before.value > PARTED * table.noise_floor.value
-    return far and table.before.low > table.noise_floor.high
 
 
 def minor(answer: Answer) -> dict[int, tuple[float, float, float]]:

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: Loss over that of a model that this one holds, beyond which a fit did not converge.
+UNCONVERGED = 1.001
+
 
 @dataclasses.dataclass(frozen=True)
 class Fit:

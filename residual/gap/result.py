@@ -163,6 +163,12 @@ class Gap:
     folds: int
     no_better: int = 0
 
+    def exceeds_noise(self, times: float) -> bool:
+        """Whether the nominal simulator errs by more than so many times what noise makes, and by
+        more whichever blocks of data are drawn."""
+        error, noise = self.before, self.noise_floor
+        return error.value > times * noise.value and error.low > noise.high
+
 
 @dataclasses.dataclass(frozen=True)
 class Rival:

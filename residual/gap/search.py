@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from residual.gap.candidates import Candidate
 from residual.gap.currency import Currency, groups
 from residual.gap.effort import Effort
-from residual.gap.fitting import Fit, Fitter
+from residual.gap.fitting import UNCONVERGED, Fit, Fitter
 from residual.gap.global_search import GlobalSearch
 from residual.gap.model import Model
 from residual.gap.plausible import absurd
@@ -225,7 +225,7 @@ class Search:
         if key in self.tried and found.merit >= self.tried[key].merit:
             return
         self._forget(key)
-        if nested and found.merit > 1.001 * self.tried[near].merit:
+        if nested and found.merit > UNCONVERGED * self.tried[near].merit:
             self.unfit.add(key)
         self.tried[key] = found
         self.validated[key] = validate(self.fitter, found)

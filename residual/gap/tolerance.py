@@ -18,7 +18,7 @@ from residual.gap.candidates import Candidate, candidates
 from residual.gap.claim import Claim
 from residual.gap.confirmation import CLEARLY, tie, where_it_matters
 from residual.gap.exchange import add_without_each, exchanged
-from residual.gap.fitting import Fit
+from residual.gap.fitting import UNCONVERGED, Fit
 from residual.gap.intervals import deviations
 from residual.gap.model import Model
 from residual.gap.screening import trials
@@ -40,8 +40,6 @@ RIVALS = 4
 HOPELESS = 10.0
 #: Units of which the zero means nothing: of 298 K a share is no accuracy.
 ANY_ZERO = ("degC", "°C", "K", "degF", "°F")
-#: Loss with parameters free, over that with them fixed, beyond which a fit did not converge.
-WORSE = 1.001
 #: Parameters that are allowed for, those that matter most.
 MOST = 12
 
@@ -218,7 +216,7 @@ def calibrated(search: Search, key: Key, parameters: Sequence[Candidate]) -> Cal
     start = np.append(search.own(key), np.zeros(len(free)))
     model, own = Model(search.simulator, [*chosen, *free]), search.tried[key]
     fit = search.fitter.fit(model, start, own)
-    if fit.merit > WORSE * own.merit:
+    if fit.merit > UNCONVERGED * own.merit:
         # It holds what ``own`` holds, so it did not converge, and would excuse every rival.
         again = search.fitter.resumed(model, start, own)
         fit = again if again.merit < fit.merit else fit

@@ -55,12 +55,10 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
 def _but_off_apart(result: GapResult) -> str:
     """That records set aside do have a gap, if they do."""
     apart = result.held_out
-    if apart is None:
+    if apart is None or not apart.exceeds_noise(OFF):
         return ""
-    error, noise = apart.before, apart.noise_floor
-    if error.value <= OFF * noise.value or error.low <= noise.high:
-        return ""
-    before, alone = (quantity_text(s.value, apart.unit) for s in (error, noise))
+    spans = (apart.before, apart.noise_floor)
+    before, alone = (quantity_text(span.value, apart.unit) for span in spans)
     return (
         f" But the records set aside have one: there the {ahead(apart)} is {before}, and noise "
         f"alone makes {alone}. Search them, too."
