@@ -117,16 +117,17 @@ def candidates(
             if effect.where not in measured:
                 continue
             effect = effect.suited_to(*_range(samples, columns[effect.where]))
+        reach = 0.0
+        if isinstance(effect, ActuatorEffect):
+            commands = samples.actions[:, [inputs.index(name) for name in effect.actuators]]
+            effect = effect.suited_to(float(commands.min()), float(commands.max()))
+            reach = float(np.abs(commands).max())
         if _follows_unseen(effect, simulator, measured):
             continue
         known = _within_reach(effect, effect.quantities(simulator), simulator, samples)
         whole = {n: q for n, q in known.items() if q.integer and q.role == "shape"}
         for values in itertools.product(*(q.starts for q in whole.values())):
             fixed = effect.with_values(**dict(zip(whole, values, strict=True)))
-            reach = 0.0
-            if isinstance(effect, ActuatorEffect):
-                columns_of = [inputs.index(name) for name in effect.actuators]
-                reach = float(np.abs(samples.actions[:, columns_of]).max())
             found.append(_candidate(fixed, known, reach))
     return found
 

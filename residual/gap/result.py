@@ -87,7 +87,7 @@ class Verdict:
         form: Those of ``alternatives`` that belong to its family and do nearly as well.
         doubts: Why it is not certain.
         follows: What the force that has no name looks like, empty if it follows nothing.
-        shape: Whole numbers that were chosen rather than fitted, such as the order of a cogging.
+        shape: Numbers that were chosen rather than fitted, such as the order of a cogging.
     """
 
     kind: Kind

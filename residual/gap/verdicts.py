@@ -89,12 +89,12 @@ def effect_verdict(
         f"{name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}"
         for name, n in claim.numbers.items()
     )
-    whole = {
+    given = {
         name: float(getattr(effect, name))
         for name, quantity in effect.quantities(search.simulator).items()
-        if quantity.role == "shape" and quantity.integer
+        if not quantity.fitted and getattr(effect, name) != 0
     }
-    spelt = "".join(f", {name} {value:g}" for name, value in whole.items())
+    spelt = "".join(f", {name} {value:g}" for name, value in given.items())
     says = [f"{effect}{spelt}: {numbers}"]
     if claim.form:
         says.append(f"{family}, form undecided: {', '.join(claim.form)} would do as well")
@@ -133,7 +133,7 @@ def effect_verdict(
         kind, effect.name, effect.where, claim.numbers,
         tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
         "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
-        doubts(claim, vanishes), shape=whole, meant=claim.meant, beside=claim.beside,
+        doubts(claim, vanishes), shape=given, meant=claim.meant, beside=claim.beside,
     )  # fmt: skip
 
 

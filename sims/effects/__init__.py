@@ -1,6 +1,7 @@
 """The named physical effects that a simulator can host, by where they enter."""
 
 from sims.effects.actuator import ActuatorBias as ActuatorBias
+from sims.effects.actuator import ActuatorCurve as ActuatorCurve
 from sims.effects.actuator import ActuatorEffect as ActuatorEffect
 from sims.effects.actuator import ActuatorGain as ActuatorGain
 from sims.effects.actuator import ActuatorLag as ActuatorLag

@@ -6,7 +6,7 @@ import abc
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,8 @@ class ActuatorEffect(Effect):
     """A change of one input on its way to the actuator.
 
     Whatever their order in a list, effects act in the order of the classes below: bias and
-    dead zone, in units of the command, gain, saturation of what comes out, then delay, then lag.
+    dead zone and curve, in units of the command, gain, saturation of what comes out, then delay,
+    then lag.
 
     Attributes:
         actuator: The input, or several of one unit on which it acts alike, ``"left and right"``.
@@ -108,6 +109,37 @@ class DeadZone(StaticActuatorEffect):
 
 
 @dataclasses.dataclass(frozen=True)
+class ActuatorCurve(StaticActuatorEffect):
+    """The output bends: ``(1 - bend) u + bend u |u| / full`` up to ``full``, straight beyond.
+
+    At ``+-full`` the output is the command. With ``bend`` 1 it grows with the square, as the thrust
+    of a propeller with its speed (PX4 calls the number ``THR_MDL_FAC``); a negative one flattens.
+    """
+
+    bend: Value = number(low=-1.0, high=1.0, input=0)
+    full: Value = number(1.0, role="fixed", starts=(1.0,), input=1)
+
+    name: ClassVar[str] = "actuator_curve"
+    sentence: ClassVar[str] = (
+        "The output grows faster than the command, as a propeller's thrust, or slower."
+    )
+    needs: ClassVar[str] = "small, middling and large inputs"
+    stage: ClassVar[int] = 2
+
+    def shape(self, u: Value) -> Value:
+        """The command, bent."""
+        size = np.abs(u)
+        within = np.minimum(size, self.full)
+        bent = within * (1.0 - self.bend * (1.0 - within / self.full))
+        return np.sign(u) * (bent + (1.0 + self.bend) * (size - within))
+
+    def suited_to(self, low: float, high: float) -> Self:
+        """The same with ``full`` at the largest of the commands."""
+        full = float(max(abs(low), abs(high)))
+        return self.with_values(full=full) if full > 0 else self
+
+
+@dataclasses.dataclass(frozen=True)
 class ActuatorGain(StaticActuatorEffect):
     """The actuator receives ``(1 + gain) u``."""
 
@@ -116,7 +148,7 @@ class ActuatorGain(StaticActuatorEffect):
     name: ClassVar[str] = "actuator_gain"
     sentence: ClassVar[str] = "The actuator is stronger or weaker than commanded, by a share."
     needs: ClassVar[str] = "a varied input"
-    stage: ClassVar[int] = 2
+    stage: ClassVar[int] = 3
 
     def shape(self, u: Value) -> Value:
         """Scaled command."""
@@ -135,7 +167,7 @@ class Saturation(StaticActuatorEffect):
     sentence: ClassVar[str] = "Commands beyond a level have no further effect."
     needs: ClassVar[str] = "inputs beyond the level"
     upstream_of_sensor: ClassVar[bool] = True
-    stage: ClassVar[int] = 3
+    stage: ClassVar[int] = 4
 
     def shape(self, u: Value) -> Value:
         """The command, cut."""
@@ -156,7 +188,7 @@ class Delay(ActuatorEffect):
     sentence: ClassVar[str] = "Commands arrive late by a fixed time."
     needs: ClassVar[str] = "sudden changes of the input"
     family: ClassVar[str] = "delay or lag"
-    stage: ClassVar[int] = 4
+    stage: ClassVar[int] = 5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -170,4 +202,4 @@ class ActuatorLag(ActuatorEffect):
     needs: ClassVar[str] = "sudden changes of the input, then rest"
     family: ClassVar[str] = "delay or lag"
     upstream_of_sensor: ClassVar[bool] = True
-    stage: ClassVar[int] = 5
+    stage: ClassVar[int] = 6

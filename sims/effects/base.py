@@ -201,6 +201,11 @@ class Effect(abc.ABC):
             self, **{k: np.asarray(v, float) if np.ndim(v) else v for k, v in values.items()}
         )
 
+    def suited_to(self, low: float, high: float) -> Self:
+        """The effect as it is looked for where a sensor's readings, or commands, are between two
+        values."""
+        return self
+
     def quantities(self, simulator: HostSimulator) -> dict[str, Quantity]:
         """Unit, scale, bounds and role of every numeric field in this simulator."""
         measures = self.measures(simulator)

@@ -9,6 +9,7 @@ import numpy as np
 from sims.effects.actuator import (
     AND,
     ActuatorBias,
+    ActuatorCurve,
     ActuatorGain,
     ActuatorLag,
     DeadZone,
@@ -48,9 +49,17 @@ JOINT_EFFECTS: tuple[type[Effect], ...] = (
     Cogging,
     Backlash,
 )
-ACTUATOR_EFFECTS = (ActuatorGain, ActuatorBias, DeadZone, Saturation, Delay, ActuatorLag)
+ACTUATOR_EFFECTS: tuple[type[Effect], ...] = (
+    ActuatorGain,
+    ActuatorCurve,
+    ActuatorBias,
+    DeadZone,
+    Saturation,
+    Delay,
+    ActuatorLag,
+)
 #: What inputs of one kind have in common: amplifiers, motors and links of one make.
-SHARED_EFFECTS = (ActuatorGain, DeadZone, Saturation, Delay, ActuatorLag)
+SHARED_EFFECTS = (ActuatorGain, ActuatorCurve, DeadZone, Saturation, Delay, ActuatorLag)
 #: Most inputs that have something in common.
 ROTORS = 4
 SENSOR_EFFECTS = (SensorOffset, SensorScale)
@@ -81,7 +90,7 @@ def library(simulator: HostSimulator) -> tuple[Effect, ...]:
         typical = {
             name: quantity.starts[len(quantity.starts) // 2]
             for name, quantity in known.items()
-            if quantity.role == "shape" and quantity.starts
+            if quantity.role != "strength" and quantity.starts
         }
         found.append(effect.with_values(**typical))
     return tuple(found)

@@ -47,10 +47,6 @@ class SensorEffect(Effect):
     def undo(self, x: Value) -> Value:
         """What is true where the sensor reads ``x``: the inverse of ``read``."""
 
-    def suited_to(self, low: float, high: float) -> Self:
-        """The effect as it is looked for in readings between two values."""
-        return self
-
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of the channel."""
         channels = {c.name: c for c in simulator.state_channels if c.kind != "memory"}
