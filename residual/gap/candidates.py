@@ -16,8 +16,12 @@ from sims.effects.joint import JointEffect
 from sims.effects.library import typical
 from sims.effects.sensor import SensorEffect
 from sims.host import HostSimulator
+from sims.simulator import Channel
 
 Array = NDArray[np.float64]
+
+#: Part of an input's bound that a log has to reach to tell of full commands.
+NEAR_FULL = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,9 +123,10 @@ def candidates(
             effect = effect.suited_to(*_range(samples, columns[effect.where]))
         reach = 0.0
         if isinstance(effect, ActuatorEffect):
-            commands = samples.actions[:, [inputs.index(name) for name in effect.actuators]]
-            effect = effect.suited_to(float(commands.min()), float(commands.max()))
-            reach = float(np.abs(commands).max())
+            acting = [inputs.index(name) for name in effect.actuators]
+            reach = float(np.abs(samples.actions[:, acting]).max())
+            full = _full(simulator.action_channels[acting[0]], reach)
+            effect = effect.suited_to(-full, full)
         if _follows_unseen(effect, simulator, measured):
             continue
         known = _within_reach(effect, effect.quantities(simulator), simulator, samples)
@@ -146,6 +151,12 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     size = effect.measures(simulator)["position"][1] if joint.rate else 1.0
     places = size * np.array([-0.7, 0.0, 0.4, 1.0])
     return bool(np.ptp(there.force(places, np.zeros(4))) > 0)
+
+
+def _full(channel: Channel, reach: float) -> float:
+    """Full command of an input, where its strength is known: its bound, if the log comes near."""
+    bound = max(abs(channel.low), abs(channel.high))
+    return bound if reach >= NEAR_FULL * bound else reach
 
 
 def _range(samples: Samples, column: int) -> tuple[float, float]:

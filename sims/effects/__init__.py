@@ -1,12 +1,12 @@
 """The named physical effects that a simulator can host, by where they enter."""
 
 from sims.effects.actuator import ActuatorBias as ActuatorBias
-from sims.effects.actuator import ActuatorCurve as ActuatorCurve
 from sims.effects.actuator import ActuatorEffect as ActuatorEffect
 from sims.effects.actuator import ActuatorGain as ActuatorGain
 from sims.effects.actuator import ActuatorLag as ActuatorLag
 from sims.effects.actuator import DeadZone as DeadZone
 from sims.effects.actuator import Delay as Delay
+from sims.effects.actuator import QuadraticActuator as QuadraticActuator
 from sims.effects.actuator import Saturation as Saturation
 from sims.effects.actuator import StaticActuatorEffect as StaticActuatorEffect
 from sims.effects.aliases import Alias as Alias

@@ -28,7 +28,7 @@ class ActuatorEffect(Effect):
     """A change of one input on its way to the actuator.
 
     Whatever their order in a list, effects act in the order of the classes below: bias and
-    dead zone and curve, in units of the command, gain, saturation of what comes out, then delay,
+    dead zone and square, in units of the command, gain, saturation of what comes out, then delay,
     then lag.
 
     Attributes:
@@ -109,29 +109,30 @@ class DeadZone(StaticActuatorEffect):
 
 
 @dataclasses.dataclass(frozen=True)
-class ActuatorCurve(StaticActuatorEffect):
-    """The output bends: ``(1 - bend) u + bend u |u| / full`` up to ``full``, straight beyond.
+class QuadraticActuator(StaticActuatorEffect):
+    """A part of the output is square: ``(1 - square) u + square u |u| / full``, straight beyond.
 
-    At ``+-full`` the output is the command. With ``bend`` 1 it grows with the square, as the thrust
-    of a propeller with its speed (PX4 calls the number ``THR_MDL_FAC``); a negative one flattens.
+    At ``+-full`` the output is the command. ``square`` is 1 for the thrust of a propeller by its
+    speed, the heat of a resistor by its voltage or the pull of a magnet by its current, and in
+    between for many throttles (PX4 calls it ``THR_MDL_FAC``).
     """
 
-    bend: Value = number(low=-1.0, high=1.0, input=0)
+    square: Value = number(low=0.0, high=1.0, input=0)
     full: Value = number(1.0, role="fixed", starts=(1.0,), input=1)
 
-    name: ClassVar[str] = "actuator_curve"
+    name: ClassVar[str] = "quadratic_actuator"
     sentence: ClassVar[str] = (
-        "The output grows faster than the command, as a propeller's thrust, or slower."
+        "A part of the output grows with the square of the command, as thrust or heat does."
     )
     needs: ClassVar[str] = "small, middling and large inputs"
     stage: ClassVar[int] = 2
 
     def shape(self, u: Value) -> Value:
-        """The command, bent."""
+        """What comes out for the command."""
         size = np.abs(u)
         within = np.minimum(size, self.full)
-        bent = within * (1.0 - self.bend * (1.0 - within / self.full))
-        return np.sign(u) * (bent + (1.0 + self.bend) * (size - within))
+        bent = within * (1.0 - self.square * (1.0 - within / self.full))
+        return np.sign(u) * (bent + (1.0 + self.square) * (size - within))
 
     def suited_to(self, low: float, high: float) -> Self:
         """The same with ``full`` at the largest of the commands."""

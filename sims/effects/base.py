@@ -202,8 +202,7 @@ class Effect(abc.ABC):
         )
 
     def suited_to(self, low: float, high: float) -> Self:
-        """The effect as it is looked for where a sensor's readings, or commands, are between two
-        values."""
+        """The effect as it is looked for in readings, or commands, between two values."""
         return self
 
     def quantities(self, simulator: HostSimulator) -> dict[str, Quantity]:

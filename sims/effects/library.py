@@ -9,11 +9,11 @@ import numpy as np
 from sims.effects.actuator import (
     AND,
     ActuatorBias,
-    ActuatorCurve,
     ActuatorGain,
     ActuatorLag,
     DeadZone,
     Delay,
+    QuadraticActuator,
     Saturation,
 )
 from sims.effects.backlash import Backlash
@@ -51,7 +51,7 @@ JOINT_EFFECTS: tuple[type[Effect], ...] = (
 )
 ACTUATOR_EFFECTS: tuple[type[Effect], ...] = (
     ActuatorGain,
-    ActuatorCurve,
+    QuadraticActuator,
     ActuatorBias,
     DeadZone,
     Saturation,
@@ -59,7 +59,7 @@ ACTUATOR_EFFECTS: tuple[type[Effect], ...] = (
     ActuatorLag,
 )
 #: What inputs of one kind have in common: amplifiers, motors and links of one make.
-SHARED_EFFECTS = (ActuatorGain, ActuatorCurve, DeadZone, Saturation, Delay, ActuatorLag)
+SHARED_EFFECTS = (ActuatorGain, QuadraticActuator, DeadZone, Saturation, Delay, ActuatorLag)
 #: Most inputs that have something in common.
 ROTORS = 4
 SENSOR_EFFECTS = (SensorOffset, SensorScale)

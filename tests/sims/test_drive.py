@@ -5,7 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sims.effects import ActuatorBias, ActuatorGain, ActuatorLag, DeadZone, Delay, Saturation
+from sims.effects import (
+    ActuatorBias,
+    ActuatorGain,
+    ActuatorLag,
+    DeadZone,
+    Delay,
+    QuadraticActuator,
+    Saturation,
+)
 from sims.pendulum_equation import PendulumEquation
 
 PENDULUM = PendulumEquation()
@@ -63,12 +71,14 @@ def test_linear_hold_averages_the_ramp():
 def test_static_effects_act_in_the_order_of_the_chain():
     chain = [
         Saturation("voltage", 2.0),
+        QuadraticActuator("voltage", 0.5, 2.6),
         DeadZone("voltage", 0.5),
         ActuatorBias("voltage", 0.2),
         ActuatorGain("voltage", 0.5),
     ]
     found = drive(chain, [1.0, -0.3, 2.9], substeps=1).ravel()
-    assert found == pytest.approx([1.5 * (1.0 + 0.2 - 0.5), 0.0, 2.0])
+    left = 1.0 + 0.2 - 0.5
+    assert found == pytest.approx([1.5 * (0.5 * left + 0.5 * left**2 / 2.6), 0.0, 2.0])
 
 
 def test_input_before_the_log_can_be_given():

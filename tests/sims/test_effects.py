@@ -23,6 +23,7 @@ from sims.effects import (
     DirectionalFriction,
     LinearSpring,
     ParameterChange,
+    QuadraticActuator,
     QuadraticDrag,
     Saturation,
     SensorOffset,
@@ -108,6 +109,11 @@ EQUATIONS = {
     ),
     "gain": (ActuatorGain("voltage", 0.2), lambda s, u: smooth_step(s, 1.2 * u), (1e-6, 1e-5)),
     "bias": (ActuatorBias("voltage", 0.3), lambda s, u: smooth_step(s, u + 0.3), (1e-6, 1e-5)),
+    "curve": (
+        QuadraticActuator("voltage", 0.4, 3.0),
+        lambda s, u: smooth_step(s, 0.6 * u + 0.4 * u * abs(u) / 3.0),
+        (1e-6, 1e-5),
+    ),
     "dead zone": (
         DeadZone("voltage", 0.6),
         lambda s, u: smooth_step(s, dead(u, 0.6)),
