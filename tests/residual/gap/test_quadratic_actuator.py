@@ -57,20 +57,20 @@ def flight(seed, power=2.0, steps=500):
 
 
 @given(
-    square=st.floats(-1, 1), full=st.floats(0.1, 1e3), share=st.lists(st.floats(-3, 3), min_size=2)
+    square=st.floats(0, 1), full=st.floats(0.1, 1e3), share=st.lists(st.floats(-3, 3), min_size=2)
 )
-def test_a_curve_is_odd_rises_and_leaves_full_commands(square, full, share):
-    curve = QuadraticActuator("throttle", square, full)
+def test_it_is_odd_rises_and_leaves_full_commands(square, full, share):
+    actuator = QuadraticActuator("throttle", square, full)
     commands = full * np.sort(share)
-    out = curve.shape(commands)
+    out = actuator.shape(commands)
     assert (np.diff(out) >= -1e-9 * full).all()
-    np.testing.assert_allclose(curve.shape(-commands), -out)
-    np.testing.assert_allclose(curve.shape(np.array([full, -full])), [full, -full])
+    np.testing.assert_allclose(actuator.shape(-commands), -out)
+    np.testing.assert_allclose(actuator.shape(np.array([full, -full])), [full, -full])
 
 
 def test_its_slope_has_no_jump_at_full_command():
-    curve = QuadraticActuator("throttle", 0.7, 2.0)
-    below, at, above = curve.shape(np.array([2.0 - 1e-6, 2.0, 2.0 + 1e-6]))
+    actuator = QuadraticActuator("throttle", 0.7, 2.0)
+    below, at, above = actuator.shape(np.array([2.0 - 1e-6, 2.0, 2.0 + 1e-6]))
     assert above - at == pytest.approx(at - below, rel=1e-5)
     assert (at - below) / 1e-6 == pytest.approx(1.7, rel=1e-5)
 
@@ -105,6 +105,6 @@ def test_the_corrected_simulator_forecasts_fresh_flights(squares):
     assert errors[1] < 0.1 * errors[0]
 
 
-def test_a_propeller_as_in_the_simulator_has_no_curve():
+def test_a_propeller_as_in_the_simulator_has_no_gap():
     found = find_gap(RotorArm(), [flight(seed, power=1.0) for seed in range(3)])
     assert [verdict.kind for verdict in found.verdicts] == ["no_gap"]
