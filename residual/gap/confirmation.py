@@ -53,6 +53,7 @@ def claims(
     """
     fit = search.tried[key]
     half = 1.96 * deviations(fit, search.fitter.blocks)
+    limits = in_the_limit(fit.theta, numerics)
     found = []
     for place, number in enumerate(key):
         own = [int(j) for j in np.flatnonzero(fit.model.owner == place)]
@@ -71,7 +72,7 @@ def claims(
                 twins,
                 needed(search, key, number, adequate) and not (adequate and taken[1] < 0),
                 all(steady(search, key, j) for j in strengths),
-                all(survives(fit.theta[j], half[j], [n[j] for n in numerics]) for j in strengths),
+                all(survives(fit.theta[j], half[j], [n[j] for n in limits]) for j in strengths),
                 any(at_bound(fit, j) for j in strengths),
                 taken,
                 brief=brief(search, number, fit.theta[own]),
@@ -215,6 +216,16 @@ def steady(search: Search, key: Key, j: int) -> bool:
     """Whether a number has one sign and about one size in every fold."""
     value, folds = search.tried[key].theta[j], search.validated[key].thetas[:, j]
     return bool((np.abs(folds - value) <= STEADY * abs(value)).all())
+
+
+def in_the_limit(theta: Array, numerics: Sequence[Array]) -> list[Array]:
+    """Numbers where the step goes to zero, and with the other hold, each (p,).
+
+    What half the step changes is doubled: an integrator of first order has as much again to go, so
+    that a number which only makes up for its error, and is half as large at half the step, ends
+    at zero (Richardson's extrapolation).
+    """
+    return [2 * numerics[0] - theta, *numerics[1:]] if len(numerics) else []
 
 
 def survives(value: float, half: float, others: Sequence[float]) -> bool:
