@@ -138,8 +138,7 @@ def confirm(
 def summed_up(answer: Answer) -> Gap:
     """The table of errors."""
     found, search = answer.found, answer.found.search
-    alone = search.simulator.has_contacts and not answer.key
-    by_noise = fitted_floor if alone else noise_floor
+    by_noise = fitted_floor if search.simulator.has_contacts else noise_floor
     floor = by_noise(search.fitter, search.tried[answer.key], found.floor.sigma)
     left = search.fitter.left(search.tried[answer.key], found.floor)
     order = [claim.number for claim in answer.claims]
@@ -235,7 +234,7 @@ def verdicts(
                 f"{table.before.value:.3g} {table.unit}, within the tolerance of {tolerance:.3g}"
             ),
         )
-    elif not answer.key and search.simulator.has_contacts and table.exceeds_noise(PARTED):
+    elif search.simulator.has_contacts and table.exceeds_noise(PARTED, corrected=True):
         made.append(parted_verdict(table, answer.leads))
     elif not answer.key and left.adequate and not search.beside:
         made.append(no_gap_verdict("no gap above noise"))

@@ -163,10 +163,10 @@ class Gap:
     folds: int
     no_better: int = 0
 
-    def exceeds_noise(self, times: float) -> bool:
-        """Whether the nominal simulator errs by more than so many times what noise makes, and by
-        more whichever blocks of data are drawn."""
-        error, noise = self.before, self.noise_floor
+    def exceeds_noise(self, times: float, *, corrected: bool = False) -> bool:
+        """Whether the nominal (or the corrected) simulator errs by more than so many times what
+        noise makes, and by more whichever blocks of data are drawn."""
+        error, noise = self.after if corrected else self.before, self.noise_floor
         return error.value > times * noise.value and error.low > noise.high
 
 

@@ -190,12 +190,16 @@ def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdic
 
 
 def parted_verdict(gap: Gap, leads: Sequence[str] = ()) -> Verdict:
-    """Forecasts past impacts that err by more than noise makes, where no effect earns a name."""
-    times = gap.before.value / gap.noise_floor.value
-    says = f"nothing of the library explains forecasts that err {times:.3g} times as by noise"
+    """Forecasts past impacts that err by more than noise makes, whatever was named."""
+    times = gap.after.value / gap.noise_floor.value
+    share = Span(1 - gap.share.value, 1 - gap.share.high, 1 - gap.share.low)
+    says = (
+        f"{100 * share.value:.3g} % of the gap has no name: forecasts err {times:.3g} times as by "
+        "noise, and nothing of the library explains it"
+    )
     if leads:
         says += f"; {', '.join(leads)} would take some of it, and so would many others"
-    return Verdict("unexplained", "", "", {}, tuple(leads), "", says, Span(1.0, 1.0, 1.0))
+    return Verdict("unexplained", "", "", {}, tuple(leads), "", says, share)
 
 
 def minor_verdict(search: Search, number: int, share: tuple[float, float, float]) -> Verdict:

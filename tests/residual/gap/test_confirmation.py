@@ -11,6 +11,7 @@ from residual.gap.candidates import candidates
 from residual.gap.confirmation import (
     Claim,
     in_plain_form,
+    in_the_limit,
     near,
     needed,
     steady,
@@ -128,6 +129,16 @@ def test_a_size_has_to_be_about_the_same_in_every_fold():
     for folds, wanted in (([0.6, 1.4], True), ([0.4, 1.0], False), ([1.0, -0.1], False)):
         toy.validated[(0,)].thetas = np.array(folds)[:, None]
         assert steady(toy, (0,), 0) is wanted
+
+
+def test_a_size_that_halves_with_the_step_ends_at_zero():
+    whole, half, other = np.array([0.0063, 0.58]), np.array([0.0033, 0.58]), np.array([0.007, 0.6])
+    ends = in_the_limit(whole, [half, other])
+    np.testing.assert_allclose(ends, [[0.0003, 0.58], [0.007, 0.6]])
+    assert survives(0.0063, 0.002, [half[0], other[0]])
+    assert not survives(0.0063, 0.002, [end[0] for end in ends])
+    assert survives(0.58, 0.02, [end[1] for end in ends])
+    assert in_the_limit(whole, []) == []
 
 
 def test_a_size_has_to_survive_other_numerics():
