@@ -127,6 +127,11 @@ class QuadraticActuator(StaticActuatorEffect):
     needs: ClassVar[str] = "small, middling and large inputs"
     stage: ClassVar[int] = 2
 
+    @property
+    def surprising(self) -> bool:
+        """Always: most actuators are made to answer in proportion."""
+        return True
+
     def shape(self, u: Value) -> Value:
         """What comes out for the command."""
         size = np.abs(u)

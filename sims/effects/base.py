@@ -142,8 +142,8 @@ class Effect(abc.ABC):
 
     @property
     def surprising(self) -> bool:
-        """Whether it is larger than its kind usually is, so that what explains as much and is not
-        comes first."""
+        """Whether its size or its kind is rarer than others', so that what explains as much and is
+        not comes first."""
         return False
 
     def contains(self, other: Effect) -> bool:
