@@ -33,7 +33,9 @@ class Claim:
         sound: Whether it survives other numerics.
         bounded: Whether a strength lies at its bound.
         share: Part of the nominal squared error that it takes off, with a 95 % interval.
-        calibration: Whether parameters of the simulator, all within their tolerance, do as well.
+        calibration: Whether forecasts are nearly as good without it if parameters of the simulator
+            are free within their tolerance.
+        slight: Whether they are without these, too: the parameters do nothing of its work.
         unasked: Whether there was no time to ask that.
         brief: Whether it is a time too short for the log's own clock.
         meant: Numbers of its twins in its place.
@@ -52,6 +54,7 @@ class Claim:
     bounded: bool
     share: tuple[float, float, float]
     calibration: bool = False
+    slight: bool = False
     unasked: bool = False
     brief: bool = False
     meant: tuple[Meant, ...] = ()

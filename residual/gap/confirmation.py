@@ -89,7 +89,7 @@ def near(
     form: list[str] = []
     same: list[str] = []
     others: list[str] = []
-    for other, rival in exchanged(search, key, number):
+    for other, rival in exchanged(search, key, number, nearly=True):
         alike = bool(family) and search.family(other) == family
         label = search.candidates[other].label
         if excluded(search, key, rival, number, adequate, alike):

@@ -115,14 +115,22 @@ def spelt_out(search: Search, number: int, taken: Sequence[int]) -> bool:
     return sum(search.candidates[other].label == label for other in set(taken)) >= SPELLINGS
 
 
-def exchanged(search: Search, key: Key, number: int) -> list[tuple[int, Key]]:
+def exchanged(search: Search, key: Key, number: int, nearly: bool = False) -> list[tuple[int, Key]]:
     """What was fitted in place of a member, and the set with it.
 
     Laws of which the member is a special case are left out: they are it, with more freedom.
+
+    Args:
+        search: With what was fitted.
+        key: The set.
+        number: Its member.
+        nearly: Whether sets count, too, whose numbers are absurd, but known so badly that they
+            need not be.
     """
     rest = set(key) - {number}
     found = []
-    for rival in search.usable():
+    doubtful = [k for k in search.nearly if k not in search.unfit] if nearly else []
+    for rival in [*search.usable(), *doubtful]:
         if len(rival) == len(key) and rest < set(rival) and number not in rival:
             (other,) = set(rival) - rest
             if not search.contains(other, number):

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.fitting import Fit, Fitter
+from residual.gap.intervals import deviations
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
@@ -62,6 +64,22 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
             number = acting.index(True) if any(acting) else len(acting)
             return number, f"{channel.name} would have {left / usual:.2g} of its strength"
     return len(model.chosen), ""
+
+
+def nearly(fit: Fit, number: int, fitter: Fitter) -> bool:
+    """Whether numbers that can be believed are as likely as the absurd ones of a fit.
+
+    What is known badly may be nine times its nominal value as well as eleven.
+
+    Args:
+        fit: With absurd numbers.
+        number: Whose they are, by position among the model's effects.
+        fitter: Of the fit.
+    """
+    half = 1.96 * deviations(fit, fitter.blocks)
+    reach = np.where(fit.model.owner == number, half, 0.0)
+    nearer = fit.theta - np.clip(fit.theta, -reach, reach)
+    return not absurd(fit.model, nearer, fitter.samples)[1]
 
 
 def _acts_on(effect: Effect, actuator: str) -> bool:

@@ -19,7 +19,7 @@ from residual.gap.effort import Effort
 from residual.gap.fitting import UNCONVERGED, Fit, Fitter
 from residual.gap.global_search import GlobalSearch
 from residual.gap.model import Model
-from residual.gap.plausible import absurd
+from residual.gap.plausible import absurd, nearly
 from residual.gap.screening import Signatures, signatures, trials
 from residual.gap.validation import Validated, validate
 from sims.host import HostSimulator
@@ -50,6 +50,7 @@ class Search:
         tried: Every fitted set: sorted candidate numbers -> fit.
         unfit: Sets that did not converge.
         refused: Sets that cannot be right whatever they take off, and why.
+        nearly: Those of them that could be, as far as their numbers are known.
         halved: Those that were fitted at half the step, too, see ``numerics.at_half_step``.
         validated: Cross-validated forecasts of the sets.
         currency: Relative errors.
@@ -82,6 +83,7 @@ class Search:
         self.tried: dict[Key, Fit] = {(): base}
         self.unfit: set[Key] = set()
         self.refused: dict[Key, str] = {}
+        self.nearly: set[Key] = set()
         self.halved: dict[Key, Fit] = {}
         self._globally = GlobalSearch(noise, until)
         self._from_longer_leads: dict[Key, Array] = {}
@@ -232,6 +234,8 @@ class Search:
         number, reason = absurd(found.model, found.theta, self.fitter.samples)
         if reason:
             self.refused[key] = reason
+            if nearly(found, number, self.fitter):
+                self.nearly.add(key)
             if number < len(key):
                 self._with_twins(key, key[number])
 
@@ -239,6 +243,7 @@ class Search:
         """Forget what was worked out from an earlier fit of a set."""
         self.unfit.discard(key)
         self.refused.pop(key, None)
+        self.nearly.discard(key)
         self.halved.pop(key, None)
         self._from_longer_leads.pop(key, None)
         self._signatures.pop(key, None)

@@ -38,6 +38,8 @@ RIVALS = 4
 #: Squared residual that linear parameters promise a rival, over that of the chosen set, from which
 #: on it is not fitted with them: on a robot's logs the promise was right within a factor of 1.5.
 HOPELESS = 10.0
+#: Part of an effect's work that free parameters do without it, from which on it may be theirs.
+WORK = 0.2
 #: Units of which the zero means nothing: of 298 K a share is no accuracy.
 ANY_ZERO = ("degC", "°C", "K", "degF", "°F")
 #: Parameters that are allowed for, those that matter most.
@@ -67,12 +69,13 @@ def allow_for_parameters(
     add_without_each(search, key)
     beside = calibrated(search, key, parameters)
     left = float((beside.fit.projected**2).sum())
+    asked: dict[Key, Calibrated] = {}
 
     def as_good(claim: Claim, other: Key) -> bool:
         """Whether another set does as well as the chosen one, parameters free beside both."""
         if not search.beside and promised(search, other, parameters) > HOPELESS * left:
             return False
-        its = calibrated(search, other, parameters)
+        its = asked[other] = calibrated(search, other, parameters)
         if adequate:
             more = search.numbers(key) - search.numbers(other)
             price = np.log(size(search)) * more + tie(search)
@@ -80,12 +83,23 @@ def allow_for_parameters(
         group = where_it_matters(search, key, claim.number)
         return bool(its.errors[group] <= CLEARLY * beside.errors[group])
 
+    def slight(claim: Claim) -> bool:
+        """Whether free parameters do nothing of an effect's work, which is little as it is."""
+        without = all_but(key, claim.number)
+        if adequate or search.beside or without not in asked:
+            return False
+        group = where_it_matters(search, key, claim.number)
+        own, rest = (search.currency.by_group(search.validated[k].squares) for k in (key, without))
+        free = asked[without].errors[group] - beside.errors[group]
+        return work(rest[group] - own[group], free) < WORK
+
     told = []
     for claim in claims:
         claim = dataclasses.replace(claim, unasked=time.process_time() > until)
         if claim.sure:
-            without = all_but(key, claim.number)
-            claim = dataclasses.replace(claim, calibration=as_good(claim, without))
+            as_well = as_good(claim, all_but(key, claim.number))
+            little = as_well and slight(claim)
+            claim = dataclasses.replace(claim, calibration=as_well, slight=little)
         if claim.sure:
             rivals = [
                 search.candidates[other].label
@@ -101,9 +115,19 @@ def allow_for_parameters(
         sizes = own[search.candidates[claim.number].linear]
         lost = bool(sizes.size) and not (np.abs(beside.fit.theta) > half)[sizes].any()
         if lost or within(search, claim, tolerance):
-            claim = dataclasses.replace(claim, calibration=True)
+            claim = dataclasses.replace(claim, calibration=True, slight=False)
         final.append(claim)
     return final
+
+
+def work(fixed: float, free: float) -> float:
+    """Part of what an effect takes off the error that parameters take off in its place.
+
+    Args:
+        fixed: What it takes off with parameters as they are.
+        free: The same with parameters free.
+    """
+    return 1 - free / fixed if fixed > 0 else 1.0
 
 
 def promised(search: Search, key: Key, parameters: Sequence[Candidate]) -> float:

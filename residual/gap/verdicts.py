@@ -111,7 +111,9 @@ def effect_verdict(
     if together:
         sets = " or ".join(" with ".join(names) for names in together[:2])
         says.append(f"{sets}, in one exact proportion, would move alike")
-    if claim.calibration:
+    if claim.slight:
+        says.append("what has no name may favour it by as much as it takes off")
+    elif claim.calibration:
         says.append("parameters that are a few percent off would do as well")
     if claim.unasked:
         says.append("there was no time to ask what parameters a few percent off would do")
@@ -144,7 +146,8 @@ def doubts(claim: Claim, vanishes: bool) -> tuple[Doubt, ...]:
         "unsteady": not claim.steady,
         "numerics": not claim.sound,
         "at_bound": claim.bounded,
-        "calibration": claim.calibration,
+        "calibration": claim.calibration and not claim.slight,
+        "slight": claim.slight,
         "no_time": claim.unasked,
         "clock": claim.brief,
         "may_be_zero": vanishes,

@@ -39,6 +39,8 @@ DOUBTS: dict[Doubt, str] = {
     "may_be_zero": "its interval holds zero, or nearly",
     "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
     "calibration": "parameters that are a few percent off would do nearly as well",
+    "slight": "without it errors are less than 1.5 times as large, and what has no name may favour "
+    "it by as much",
     "rivals": "an effect of another kind does nearly as well",
 }
 

@@ -67,11 +67,16 @@ def _but_off_apart(result: GapResult) -> str:
 
 def _but_worse_apart(result: GapResult) -> str:
     """What speaks against the corrected simulator on the records that were set aside, if it is
-    worse there."""
+    no better there."""
     apart = result.held_out
-    if apart is None or apart.after.value <= WORSE * apart.before.value:
+    if apart is None or WORSE * apart.after.value < apart.before.value:
         return ""
     before, after = (quantity_text(s.value, apart.unit) for s in (apart.before, apart.after))
+    if apart.after.value <= WORSE * apart.before.value:
+        return (
+            f" But it does not help on the records set aside, where the {ahead(apart)} is {after} "
+            f"with it and {before} without."
+        )
     return (
         f" But it does not hold on the records set aside, where the corrected simulator is worse: "
         f"the {ahead(apart)} is {after}, the nominal one's {before}."

@@ -77,8 +77,10 @@ def test_a_gain_is_told_as_a_share_more_and_as_times():
     )
 
 
-@pytest.mark.parametrize(("after", "worse"), [(0.9, False), (1.2, True)])
-def test_the_first_sentence_says_where_the_corrected_simulator_is_worse(after, worse):
+@pytest.mark.parametrize(
+    ("after", "worse", "helps"), [(0.9, False, True), (0.99, False, False), (1.2, True, False)]
+)
+def test_the_first_sentence_says_where_the_corrected_simulator_is_no_better(after, worse, helps):
     found = result(MASS)
     apart = dataclasses.replace(found.gap, after=Span(after, 0.5 * after, 2 * after))
     says = lead(dataclasses.replace(found, held_out=apart))
@@ -87,6 +89,11 @@ def test_the_first_sentence_says_where_the_corrected_simulator_is_worse(after, w
         "does not hold on the records set aside, where the corrected simulator is worse: the 1 s "
         "error of angle is 1.2 rad, the nominal one's 1 rad." in says
     ) is worse
+    assert (
+        "does not help on the records set aside, where the 1 s error of angle is 0.99 rad with it "
+        "and 1 rad without." in says
+    ) is not (helps or worse)
+    assert ("records set aside" in says) is not helps
 
 
 @pytest.mark.parametrize(("error", "said"), [(1.2, False), (2.0, True)])

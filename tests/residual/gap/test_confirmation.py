@@ -117,6 +117,16 @@ def test_a_set_that_did_not_converge_is_no_rival():
     assert near(toy, (0,), 0, adequate=False) == ((), (), ())
 
 
+@pytest.mark.parametrize("likely", [True, False])
+def test_a_rival_whose_numbers_may_be_believable_is_one(likely):
+    """Eleven times its nominal value is absurd; eleven that may be nine excludes nothing."""
+    toy = Toy({(0,): 0.3, (3,): 0.3})
+    toy.refused[(3,)] = "11 times its nominal value"
+    toy.nearly |= {(3,)} if likely else set()
+    left = ("constant_load@pivot",) if likely else ()
+    assert near(toy, (0,), 0, adequate=False) == ((), (), left)
+
+
 @pytest.mark.parametrize(("rest", "scatter", "sure"), [(0.9, 0.1, True), (0.33, 0.6, False)])
 def test_an_effect_is_needed_if_forecasts_are_clearly_worse_without_it(rest, scatter, sure):
     toy = Toy({(0,): 0.3, (0, 1): 0.3, (1,): rest}, scatter=scatter)
@@ -170,6 +180,8 @@ def test_only_what_leaves_no_doubt_is_confirmed():
         "numerics": {"sound": False},
         "at_bound": {"bounded": True},
         "share_may_be_zero": {"share": (0.35, -0.3, 0.7)},
+        "calibration": {"calibration": True},
+        "slight": {"calibration": True, "slight": True},
         "rivals": {"rivals": ("constant_load@pivot",)},
     }.items():
         verdict = effect_verdict(toy, claim(**changed), 20)

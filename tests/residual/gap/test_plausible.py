@@ -1,24 +1,32 @@
 """Numbers that switch a system off are refused, whatever error they take away."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from residual.gap import plausible
 from residual.gap.candidates import candidates
 from residual.gap.model import Model
-from residual.gap.plausible import absurd
+from residual.gap.plausible import absurd, nearly
 from residual.gap.samples import Samples
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorGain, DeadZone, ParameterChange, Saturation, ViscousFriction
 from sims.pendulum_equation import PendulumEquation
 
 
-def said(effect, **values):
+def built(effect, **values):
+    """A model with one effect, its numbers, and what was measured."""
     rng = np.random.default_rng(0)
     volts = np.repeat(rng.uniform(-2, 2, (40, 1)), 5, axis=0)
     states = np.array([np.pi, 0.0]) + rng.standard_normal((201, 2))
     samples = Samples.join([Trajectory("run", 0.05 * np.arange(201.0), states, volts)], 4)
     model = Model(PendulumEquation(), candidates(PendulumEquation(), [effect], samples))
-    return absurd(model, np.array([values[knob.field] for knob in model.knobs]), samples)[1]
+    return model, np.array([values[knob.field] for knob in model.knobs]), samples
+
+
+def said(effect, **values):
+    return absurd(*built(effect, **values))[1]
 
 
 @pytest.mark.parametrize(
@@ -47,6 +55,16 @@ def test_what_switches_the_system_off_is_refused(effect, values, words):
 )
 def test_what_may_be_is_left_to_the_data(effect, values):
     assert said(effect, **values) == ""
+
+
+@pytest.mark.parametrize(("deviation", "may_be"), [(0.1, True), (0.01, False)])
+def test_an_absurd_number_that_is_badly_known_may_be_a_believable_one(
+    monkeypatch, deviation, may_be
+):
+    model, theta, samples = built(ParameterChange("mass"), change=0.6)
+    monkeypatch.setattr(plausible, "deviations", lambda fit, blocks: np.array([deviation]))
+    fitter = SimpleNamespace(blocks=None, samples=samples)
+    assert nearly(SimpleNamespace(model=model, theta=theta), 0, fitter) is may_be
 
 
 def test_a_limit_that_the_input_reaches_once_is_refused():

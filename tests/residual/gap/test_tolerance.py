@@ -12,7 +12,7 @@ from residual.gap.candidates import candidates
 from residual.gap.model import Model
 from residual.gap.prepare import prepare
 from residual.gap.search import Search
-from residual.gap.tolerance import allowed, calibrated
+from residual.gap.tolerance import allowed, calibrated, work
 from residual.trajectories import Trajectory
 from sims.effects import ParameterChange
 from sims.effects.library import library
@@ -109,6 +109,26 @@ def test_of_a_temperature_no_share_is_known_but_one_of_its_range():
     assert (first.kind, first.effect) == ("confirmed", "late")
     assert first.parameters["change"].low <= -3.0 <= first.parameters["change"].high
     assert first.parameters["change"].high - first.parameters["change"].low < 2.0
+
+
+def test_parameters_are_not_blamed_for_an_effect_of_which_they_do_nothing():
+    """Without the delay errors are 1.3 times as large: the oven wanders, which no library holds."""
+    rng = np.random.default_rng(0)
+    power = np.repeat(rng.integers(0, 2, 80), 10).astype(float)
+    base, x = 300.0 + 0.11 * np.cumsum(rng.standard_normal(800)), np.full(801, 300.0)
+    for k in range(800):  # the exact solution
+        end = base[k] + 6.0 * power[max(k - 4, 0)]
+        x[k + 1] = end + (x[k] - end) * np.exp(-1.0 / 8.0)
+    log = Trajectory("run", np.arange(801.0), x[:, None], power[:, None])
+    first = find_gap(Plate(), [log], effects=["delay@power"], hold="zero").verdicts[0]
+    assert (first.kind, first.effect, first.doubts) == ("ambiguous", "delay", ("slight",))
+    assert first.parameters["time"].low <= 4.0 <= first.parameters["time"].high
+
+
+@pytest.mark.parametrize(("free", "part"), [(0.4, 0.0), (0.3, 0.25), (0.0, 1.0)])
+def test_the_part_of_an_effects_work_that_parameters_do(free, part):
+    assert np.isclose(work(0.4, free), part)
+    assert work(0.0, free) == 1.0
 
 
 def test_a_fit_with_free_parameters_that_did_not_converge_is_resumed(monkeypatch):

@@ -68,7 +68,7 @@ class Toy:
             key: SimpleNamespace(merit=(merits or {}).get(key, float(np.mean(error))))
             for key, error in errors.items()
         }
-        self.unfit, self.refused = set(), {}
+        self.unfit, self.refused, self.nearly = set(), {}, set()
         self.candidates = [
             SimpleNamespace(
                 effect=e, label=str(e), knobs=(SimpleNamespace(field="change", strength=True),)
