@@ -108,6 +108,11 @@ class Verdict:
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
 
+    @property
+    def label(self) -> str:
+        """``name@where``, or the name alone of a parameter; empty if there is no effect."""
+        return self.effect if self.where in ("", self.effect) else f"{self.effect}@{self.where}"
+
     def __repr__(self) -> str:
         return f"Verdict({self.kind}: {self.says})"[:180]
 

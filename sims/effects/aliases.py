@@ -91,6 +91,15 @@ def exact_aliases(
     return tuple(found)
 
 
+def exact_twins(simulator: HostSimulator) -> dict[str, frozenset[str]]:
+    """By label of an effect all labels of the same motion, its own included; see ``Alias``.
+
+    Effects without a twin are left out.
+    """
+    pairs = [alias.effects for alias in exact_aliases(simulator) if not alias.combination]
+    return {name: frozenset(twins) for twins in pairs for name in twins}
+
+
 def near_combinations(
     simulator: HostSimulator,
     names: Sequence[str],

@@ -13,7 +13,6 @@ from studies.gap.words import (
     capitalized,
     effect_name,
     known_effects,
-    label_of,
     listed,
     names_of,
     number_text,
@@ -62,7 +61,7 @@ def headline(verdict: Verdict, result: GapResult) -> str:
         return capitalized(names_of(verdict.alternatives, "and")) + "."
     if verdict.kind == "calibrated":
         return f"Parameters moved within their tolerance: {_changes(verdict)}."
-    name = capitalized(effect_name(label_of(verdict)))
+    name = capitalized(effect_name(verdict.label))
     if verdict.kind == "minor":
         return f"{name}: {percent(verdict.share.value)} of the gap, not added."
     parameter = result.corrected.parameters.get(verdict.where)
@@ -134,7 +133,7 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         spans = [("" if single else f"{_spelt(f)} ") + span(n) for f, n in surer.items()]
         found.append(f"{', '.join(spans)} if all else in the simulator is exact")
     doubts = [DOUBTS[doubt] for doubt in verdict.doubts if doubt != "rivals"]
-    own = label_of(verdict)
+    own = verdict.label
     if own in rivals(verdict):
         found.append("not certain: of another order it would do nearly as well")
     others = [label for label in rivals(verdict) if label != own]
@@ -148,7 +147,7 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         found.append(f"no motion can tell it from {_twins(verdict)}")
     for other in verdict.beside:
         twin = next(v for v in result.verdicts if other.effect in v.same_motion)
-        meant, named = effect_name(other.effect), effect_name(label_of(twin))
+        meant, named = effect_name(other.effect), effect_name(twin.label)
         found.append(f"{_values(other)} if {meant} is meant, not {named}")
     if verdict.provisional:
         found.append(provisional(result))

@@ -12,7 +12,6 @@ from residual import gap
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.host import HostSimulator
-from studies.gap.answer import label_of
 from studies.running.progress import Bars
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ class FoundGap(gap.GapResult):
 
         rows: list[dict[str, Any]] = []
         for verdict in self.verdicts:
-            row = {"kind": verdict.kind, "effect": label_of(verdict) if verdict.effect else "",
+            row = {"kind": verdict.kind, "effect": verdict.label,
                    "share": verdict.share.value}  # fmt: skip
             numbers = [
                 {"parameter": name, **dataclasses.asdict(number)}

@@ -11,7 +11,6 @@ from studies.gap.words import (
     ahead,
     capitalized,
     effect_name,
-    label_of,
     listed,
     names_of,
     percent,
@@ -114,7 +113,7 @@ def _briefly(verdict: Verdict, result: GapResult) -> str:
 
 def _with_rivals(verdict: Verdict, result: GapResult) -> str:
     name = _briefly(verdict, result)
-    others = [label for label in rivals(verdict) if label != label_of(verdict)]
+    others = [label for label in rivals(verdict) if label != verdict.label]
     if not others:
         return f"perhaps {name}"
     if len(others) <= FEW_RIVALS:
@@ -134,4 +133,4 @@ def _by_place(names: Sequence[str]) -> list[str]:
 def _short(verdict: Verdict, result: GapResult) -> str:
     """Name and place; of a system with a single joint the place goes without saying."""
     joints = [joint.name for joint in result.corrected.joints]
-    return verdict.effect if joints == [verdict.where] else label_of(verdict)
+    return verdict.effect if joints == [verdict.where] else verdict.label

@@ -16,7 +16,7 @@ from studies.gap.answer import (
     sentence,
 )
 from studies.gap.lead import lead
-from studies.gap.words import effect_name, label_of, names_of, set_name
+from studies.gap.words import effect_name, names_of, set_name
 from studies.reporting import Prose, Section, Table, Verdict
 from studies.reporting.sections import Cell
 
@@ -66,7 +66,7 @@ def banners(result: GapResult, tolerance: float | None) -> list[Section]:
 
 def banner(answer: Answer, result: GapResult) -> Verdict:
     """One verdict."""
-    text = [sentence(label_of(answer), result)] if answer.effect else []
+    text = [sentence(answer.label, result)] if answer.effect else []
     text += [f"{note[:1].upper()}{note[1:]}." for note in notes(answer, result)]
     return Verdict(
         headline(answer, result), " ".join(filter(None, text)), tone=TONES[answer.kind],
@@ -107,7 +107,7 @@ def apart(result: GapResult) -> list[Section]:
     for answer in result.verdicts:
         if answer.kind not in ("confirmed", "ambiguous"):
             continue
-        label = label_of(answer)
+        label = answer.label
         groups = (
             ([name for name in rivals(answer) if name != label], "these data", False),
             (answer.form, "these data, and it is of the same family", False),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from residual.gap import GapResult
-from residual.gap.result import Gap, Number, Span, Verdict
+from residual.gap.result import Gap, Number, Span
 from sims.effects.base import Effect
 from sims.effects.library import library
 
@@ -129,12 +129,6 @@ def seconds_text(seconds: float) -> str:
 def ahead(gap: Gap) -> str:
     """``1 s error of angle``."""
     return f"{seconds_text(gap.horizon_s)} error of {gap.channel}"
-
-
-def label_of(verdict: Verdict) -> str:
-    """``name@where``, or the name alone of a parameter."""
-    same = verdict.effect == verdict.where
-    return verdict.effect if same else f"{verdict.effect}@{verdict.where}"
 
 
 def known_effects(result: GapResult) -> dict[str, Effect]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from residual.gap import GapResult
-from sims.effects.aliases import exact_aliases
+from sims.effects.aliases import exact_aliases, exact_twins
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.strengths import HIDDEN
 
@@ -16,18 +16,12 @@ TWINS: tuple[frozenset[str], ...] = (
     frozenset({"coulomb_friction", "stribeck_friction", "directional_friction"}),
 )
 
-
-def same_motion() -> dict[str, frozenset[str]]:
-    """For every effect the names that no data could tell from it, its own included."""
-    found: dict[str, frozenset[str]] = {}
-    for alias in exact_aliases(PendulumEquation()):
-        if not alias.combination:
-            names = frozenset(label.split("@")[0] for label in alias.effects)
-            found.update(dict.fromkeys(names, names))
-    return found
-
-
-_SAME = same_motion()
+_GROUPS = [
+    frozenset(label.split("@")[0] for label in twins)
+    for twins in exact_twins(PendulumEquation()).values()
+]
+#: For every effect with a twin the names that no data could tell from it, its own included.
+_SAME = {name: names for names in _GROUPS for name in names}
 _COMBINED = [
     {label.split("@")[0] for label in alias.effects}
     for alias in exact_aliases(PendulumEquation())

@@ -14,8 +14,10 @@ import numpy as np
 import yaml
 
 import studies
+from residual.gap.result import Verdict
 from residual.logs import LogFormat
 from residual.trajectories import Trajectory
+from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import load_simulator
 from studies import find_gap
@@ -187,15 +189,14 @@ def ask(
     )
 
 
-def _short(verdict: Any) -> str:
+def _short(verdict: Verdict) -> str:
     if not verdict.effect:
         return verdict.kind
     numbers = ", ".join(f"{n.value:.3g} {n.unit}" for n in verdict.parameters.values())
     others = f" or {', '.join(verdict.alternatives)}" if verdict.alternatives else ""
-    where = "" if verdict.where == verdict.effect else f"@{verdict.where}"
-    return f"{verdict.kind}: {verdict.effect}{where} {numbers}{others}"
+    return f"{verdict.kind}: {verdict.label} {numbers}{others}"
 
 
-def _numbers(effect: Any) -> str:
+def _numbers(effect: Effect) -> str:
     values = ", ".join(f"{getattr(effect, name):.4g}" for name in effect.strengths())
     return f"{effect} {values}"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
+from residual.gap.result import Verdict
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.host import HostSimulator
@@ -31,14 +31,14 @@ class Named:
         return all(how in ("confirmed", "one of 1", "one of 2") for how in self.right)
 
 
-def named(rig: Rig, simulator: HostSimulator, verdicts: Sequence[Any]) -> Named:
+def named(rig: Rig, simulator: HostSimulator, verdicts: Sequence[Verdict]) -> Named:
     """Compare verdicts with the key of a rig."""
     family = {str(effect): _family(effect, simulator) for effect in library(simulator)}
     right = []
     for accepted in rig.wanted:
         found = "missing"
         for verdict in verdicts:
-            label = label_of(verdict)
+            label = verdict.label
             offered = {label, *verdict.alternatives} if verdict.effect else set()
             if not offered & accepted or verdict.kind not in ("confirmed", "ambiguous"):
                 continue
@@ -49,17 +49,8 @@ def named(rig: Rig, simulator: HostSimulator, verdicts: Sequence[Any]) -> Named:
                 families = {family.get(name, name) for name in offered}
                 found = f"one of {len(families)}"
         right.append(found)
-    sure = [label_of(v) for v in verdicts if v.kind == "confirmed" and v.effect]
+    sure = [v.label for v in verdicts if v.kind == "confirmed" and v.effect]
     return Named(tuple(right), tuple(label for label in sure if label not in rig.allowed))
-
-
-def label_of(verdict: Any) -> str:
-    """``name@where``, or the name alone of a parameter."""
-    return (
-        verdict.effect
-        if verdict.where in ("", verdict.effect)
-        else f"{verdict.effect}@{verdict.where}"
-    )
 
 
 def _family(effect: Effect, simulator: HostSimulator) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
-from sims.effects.aliases import exact_aliases
+from sims.effects.aliases import exact_twins
 from sims.mujoco import MujocoSimulator
 from studies.robots.drives import MODELS, measure
 
@@ -158,18 +158,11 @@ def ask(case: Case, minutes: float) -> Answer:
     named, forms = [], {}
     for verdict in result.verdicts:
         if verdict.effect and verdict.kind in ("confirmed", "ambiguous", "minor"):
-            same = verdict.effect == verdict.where
-            label = verdict.effect if same else f"{verdict.effect}@{verdict.where}"
             numbers = {k: (n.value, n.low, n.high) for k, n in verdict.parameters.items()}
-            named.append((label, verdict.kind, numbers))
-            forms[label] = {label, *verdict.form}
-    twins = {
-        name: set(alias.effects)
-        for alias in exact_aliases(simulator)
-        if not alias.combination
-        for name in alias.effects
-    }
-    alike = [twins.get(name, {name}) for name in case.hidden]
+            named.append((verdict.label, verdict.kind, numbers))
+            forms[verdict.label] = {verdict.label, *verdict.form}
+    twins = exact_twins(simulator)
+    alike = [twins.get(name, frozenset({name})) for name in case.hidden]
     first = [label for label, _, _ in named][: len(alike)]
     strictly = all(any(label in group for label in first) for group in alike)
     found = all(any(forms[label] & group for label in first) for group in alike)

@@ -2,11 +2,11 @@
 
 import os
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from residual.gap.result import Span, Verdict
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorLag, Delay, ViscousFriction
 from studies.judging.forecasts import plan, root_mean_squares
@@ -97,7 +97,7 @@ def test_the_car_rolls_in_a_circle():
 
 
 def verdict(kind, effect, where, *alternatives):
-    return SimpleNamespace(kind=kind, effect=effect, where=where, alternatives=alternatives)
+    return Verdict(kind, effect, where, {}, alternatives, "", "", Span(0.0, 0.0, 0.0))
 
 
 def test_names_are_held_against_the_key():

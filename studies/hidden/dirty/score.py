@@ -11,7 +11,7 @@ import numpy as np
 from residual.gap import GapResult, find_gap
 from residual.gap.result import Verdict
 from residual.trajectories import Trajectory
-from sims.effects.aliases import exact_aliases
+from sims.effects.aliases import exact_aliases, exact_twins
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.host import HostSimulator
@@ -76,7 +76,7 @@ def errors(result: GapResult, made: Dirty) -> dict[str, Any]:
     row["oracle_strength"] = float(getattr(found, field))
     covered = None
     for verdict in result.verdicts:
-        if _label(verdict) == made.label and verdict.kind in ("confirmed", "ambiguous"):
+        if verdict.label == made.label and verdict.kind in ("confirmed", "ambiguous"):
             number = verdict.parameters[field]
             covered = bool(number.low <= row["oracle_strength"] <= number.high)
             row["covered_truth"] = bool(number.low <= made.truth.strength <= number.high)
@@ -99,17 +99,17 @@ def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, An
     """What was named first and what with confidence, held against what was hidden."""
     offered = {str(effect): effect for effect in library(made.simulator)}
     chosen = [v for v in result.verdicts if v.effect and v.kind in ("confirmed", "ambiguous")]
-    sure = [_label(v) for v in chosen if v.kind == "confirmed"]
+    sure = [v.label for v in chosen if v.kind == "confirmed"]
     row: dict[str, Any] = {
-        "named": [_label(v) for v in chosen],
+        "named": [v.label for v in chosen],
         "sure": sure,
         "kinds": [v.kind for v in result.verdicts],
     }
-    row["truly_off"] = [_label(verdict) for verdict in chosen if truly_off(verdict, made)]
+    row["truly_off"] = [verdict.label for verdict in chosen if truly_off(verdict, made)]
     if not made.label:
         return row | {"first": None, "family": None, "among": None, "wrong_sure": list(sure)}
     right = twins | _family(made.label, made.simulator, offered)
-    first = _label(chosen[0]) if chosen else ""
+    first = chosen[0].label if chosen else ""
     among = {first, *(chosen[0].alternatives if chosen else ())}
     row["first"] = first in twins
     row["family"] = first in right
@@ -121,10 +121,10 @@ def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, An
 
 def truly_off(verdict: Verdict, made: Dirty) -> bool:
     """Whether a verdict names a parameter that is off, as all are a little, or its exact twin."""
-    label = _label(verdict)
     (strength,) = [n.value for n in verdict.parameters.values()][:1]
-    parameters = [name for name in same_as(label, made.simulator) if name in made.truth.off]
-    return label != made.label and any(made.truth.off[name] * strength > 0 for name in parameters)
+    off = made.truth.off
+    parameters = [name for name in same_as(verdict.label, made.simulator) if name in off]
+    return verdict.label != made.label and any(off[name] * strength > 0 for name in parameters)
 
 
 def together(label: str, simulator: HostSimulator, named: Sequence[str]) -> frozenset[str]:
@@ -139,11 +139,7 @@ def together(label: str, simulator: HostSimulator, named: Sequence[str]) -> froz
 
 def same_as(label: str, simulator: HostSimulator) -> frozenset[str]:
     """Labels that mean exactly the same motion, its own included; none for no label."""
-    found = {label} if label else set()
-    for alias in exact_aliases(simulator):
-        if not alias.combination and label in alias.effects:
-            found |= set(alias.effects)
-    return frozenset(found)
+    return exact_twins(simulator).get(label, frozenset({label} if label else ()))
 
 
 def _family(label: str, simulator: HostSimulator, offered: Mapping[str, Effect]) -> frozenset[str]:
@@ -157,11 +153,6 @@ def _family(label: str, simulator: HostSimulator, offered: Mapping[str, Effect])
         for name, effect in offered.items()
         if family and effect.family_in(simulator) == family and effect.where == hidden.where
     )
-
-
-def _label(verdict: Any) -> str:
-    alone = verdict.where in ("", verdict.effect)
-    return str(verdict.effect) if alone else f"{verdict.effect}@{verdict.where}"
 
 
 def finite(value: Any) -> float:
