@@ -19,16 +19,13 @@ from typing import Any
 from simgap_files import atomic_write_json, atomic_write_text, read_json
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
+from studies.running.workers import ONE_THREAD
 from studies.timing.fit_scaling import write_figure
 from studies.timing.tables import SCALING, records, tables
 
 ROOT = Path(__file__).resolve().parents[1]
 SUITE = Path("tests", "benchmarks")
 FIGURE = Path("images", "fit_scaling.png")
-ONE_THREAD = {
-    name: "1"
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
-}
 MUJOCO = "## MuJoCo models\n"
 # What takes most of the time: large fits, and the second problem size of DDPG.
 QUICK = "not leo and not 15000 and not 100000 and not (3750 and GaussianProcessRegressor)"

@@ -21,7 +21,6 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import json
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -48,7 +47,7 @@ from studies.hidden.strengths import draw, truth
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
 from studies.running.progress import Progress
-from studies.running.trials import Execution, read_trials, run_trials, trial_folder
+from studies.running.trials import Execution, read_trials, run_trials, tell_failures, trial_folder
 
 RESULTS = Path("results/hidden_effects")
 
@@ -160,9 +159,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     results, failures = run_trials("hidden_effects", folders, run_set, Execution(jobs=given.jobs))
     if results:
         _report(results, output, settings)
-    for folder, failure in failures.items():
-        reason = failure.strip().splitlines()[-1]
-        print(f"failed: {folder}: {reason} (see error.txt there)", file=sys.stderr)
+    tell_failures(failures)
     if failures:
         raise SystemExit(1)
 

@@ -17,14 +17,17 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jsonargparse.typing import NonNegativeInt, PositiveFloat, PositiveInt
 
-from studies.robots.cases import Answer, Case, ask, cases, nominal
+from studies.robots.cases import Case, ask, cases, nominal
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
+
+#: An ``Answer`` in plain values, as its line of JSON holds it.
+Kept = dict[str, Any]
 
 
 def build_parser() -> Parser:
@@ -78,24 +81,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(table(answers))
 
 
-def line(answer: dict[str, object] | object) -> str:
+def line(answer: Kept) -> str:
     """One answer in words."""
-    a = _plain(answer)
-    named = ", ".join(f"{label} ({kind})" for label, kind, _ in a["named"]) or "nothing"
-    hidden = " + ".join(f"{name} {size:.3g}" for name, size in a["sizes"].items()) or "nothing"
-    mark = "ok " if a["right"] else "MISS"
-    return f"{mark} {a['processor']:5.0f} s  hidden {hidden}; named {named}"
+    named = ", ".join(f"{label} ({kind})" for label, kind, _ in answer["named"]) or "nothing"
+    hidden = " + ".join(f"{name} {size:.3g}" for name, size in answer["sizes"].items()) or "nothing"
+    mark = "ok " if answer["right"] else "MISS"
+    return f"{mark} {answer['processor']:5.0f} s  hidden {hidden}; named {named}"
 
 
-def table(answers: Sequence[object]) -> str:
+def table(answers: Sequence[Kept]) -> str:
     """Markdown over all answers."""
-    rows = [_plain(answer) for answer in answers]
     lines = [
         "| robot | hidden | sets | right | of them by family | confirmed wrong | s, median, most |",
         "|---|---|---|---|---|---|---|",
     ]
-    groups: dict[tuple[str, int], list[dict]] = {}
-    for row in rows:
+    groups: dict[tuple[str, int], list[Kept]] = {}
+    for row in answers:
         groups.setdefault((row["case"]["robot"], len(row["case"]["hidden"])), []).append(row)
     for (robot, count), own in groups.items():
         seconds = [row["processor"] for row in own]
@@ -110,15 +111,11 @@ def table(answers: Sequence[object]) -> str:
     return "\n".join(lines)
 
 
-def _plain(answer: object) -> dict:
-    return dataclasses.asdict(answer) if isinstance(answer, Answer) else dict(answer)  # type: ignore[call-overload]
-
-
 def _key(case: Case) -> str:
     return json.dumps(dataclasses.asdict(case), sort_keys=True)
 
 
-def _read(path: Path) -> dict[str, dict]:
+def _read(path: Path) -> dict[str, Kept]:
     if not path.is_file():
         return {}
     found = [json.loads(text) for text in path.read_text(encoding="utf-8").splitlines()]

@@ -104,6 +104,10 @@ def confirm(
     """
     search, key = found.search, found.key if asked else ()
     leads: tuple[str, ...] = ()
+
+    def exchange(key: Key) -> None:
+        add_exchanged(search, key, 0 if time.process_time() > until else RIVALS)
+
     while True:
         fit = search.tried[key]
         slack = search.fitter.tie(search.tried[()]) if found.adequate else OTHER_HOLD * fit.merit
@@ -123,7 +127,7 @@ def confirm(
             plainer = None if lost or found.adequate else in_plain_form(search, key, made)
             if plainer:
                 key = plainer
-                add_exchanged(search, key, 0 if time.process_time() > until else RIVALS)
+                exchange(key)
                 continue
         if not lost:
             return Answer(found, key, tuple(made), leads)
@@ -132,7 +136,7 @@ def confirm(
         leads = (search.candidates[gone].label, *leads)
         key, theta = search.merged(key, (), drop=(gone,))
         search.add({key: theta})
-        add_exchanged(search, key, 0 if time.process_time() > until else RIVALS)
+        exchange(key)
 
 
 def summed_up(answer: Answer) -> Gap:

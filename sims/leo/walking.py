@@ -122,16 +122,6 @@ class Walk:
     work_without_gear: float
     score: float
 
-    @property
-    def work_per_metre(self) -> float:
-        """J/m, infinite for a walk that leads nowhere."""
-        return self.work / self.distance if self.distance > 0 else np.inf
-
-    @property
-    def work_without_gear_per_metre(self) -> float:
-        """The same with the bare motor constant."""
-        return self.work_without_gear / self.distance if self.distance > 0 else np.inf
-
 
 def measure_walk(states: Array, actions: Array, task: Walking | None = None) -> Walk:
     """Measure one episode.

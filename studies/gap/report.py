@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -82,11 +81,8 @@ def quality(result: GapResult, record: Mapping[str, Any]) -> list[Section]:
 
 def provenance(record: Mapping[str, Any]) -> list[Section]:
     """What made the numbers."""
-    settings = io.StringIO()
-    yaml.safe_dump(record["config"], settings, sort_keys=False)
-    return [
-        Code(settings.getvalue(), summary="The settings of this run", heading="Settings"),
-    ]
+    settings = yaml.safe_dump(record["config"], sort_keys=False)
+    return [Code(settings, summary="The settings of this run", heading="Settings")]
 
 
 def footer(record: Mapping[str, Any]) -> str:

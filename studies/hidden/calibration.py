@@ -20,7 +20,7 @@ import threadpoolctl
 from jsonargparse.typing import PositiveInt
 
 from residual.gap.adequacy import remainder
-from residual.gap.aliases import aliases
+from residual.gap.aliases import aliases, representatives
 from residual.gap.candidates import candidates
 from residual.gap.horizon import usual_horizon
 from residual.gap.noise import Floor
@@ -47,7 +47,7 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
         )
         offered = library(simulator)
         groups, _ = aliases(simulator, offered)
-        kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
+        kept = representatives(simulator, offered, groups)
         ready = prepare(simulator, logs, usual_horizon(simulator, logs))
         assert isinstance(ready.fitter, SmoothFitter)
         assert isinstance(ready.floor, Floor)

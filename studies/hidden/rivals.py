@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 from scipy.stats import chi2
 
-from residual.gap.aliases import aliases
-from residual.gap.candidates import Candidate, candidates
+from residual.gap.aliases import aliases, representatives
+from residual.gap.candidates import candidates
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from residual.trajectories import Trajectory
@@ -66,8 +66,7 @@ def columns(
 ) -> tuple[Array, tuple[str, ...]]:
     """Change of the rate over one step per effect and trial size, as acceleration, (n, c)."""
     groups, _ = aliases(simulator, offered)
-    kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
-    pool: list[Candidate] = candidates(simulator, kept, samples)
+    pool = candidates(simulator, representatives(simulator, offered, groups), samples)
     base = Model(simulator).advance(samples, nodes[None], np.zeros((1, 0)))[0]
     found, owner = [], []
     for candidate in pool:

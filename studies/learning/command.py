@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import importlib.util
 import json
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -24,7 +23,14 @@ from studies.running.curves import Curves
 from studies.running.ending import check_output, fail, guarded, users_code
 from studies.running.grids import expand_grid
 from studies.running.progress import Bars, Several
-from studies.running.trials import Execution, Failures, read_trials, run_trials, trial_folder
+from studies.running.trials import (
+    Execution,
+    Failures,
+    read_trials,
+    run_trials,
+    tell_failures,
+    trial_folder,
+)
 from studies.running.workers import WorkersError
 
 BEST = "best.json"
@@ -141,9 +147,7 @@ def report_grid(folder: Path) -> Failures:
         write_tables(results, folder)
         table = write_report(results, folder, failures=failures, best=best)
         print(f"\n{table}\n\nreport: {folder / 'report.html'}")
-    for path, failure in failures.items():
-        reason = failure.strip().splitlines()[-1]
-        print(f"failed: {path}: {reason} (see error.txt there)", file=sys.stderr)
+    tell_failures(failures)
     return failures
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -162,8 +161,7 @@ def _provenance(results: Sequence[Results]) -> list[Section]:
     if "versions" in results[0]:
         sections.append(KeyValues(dict(results[0]["versions"]), heading="Versions"))
     if len(results) == 1 and "config" in results[0]:
-        settings = io.StringIO()
-        yaml.safe_dump(results[0]["config"], settings, sort_keys=False)
+        settings = yaml.safe_dump(results[0]["config"], sort_keys=False)
         summary = "The resolved configuration"
-        sections.append(Code(settings.getvalue(), summary=summary, heading="Configuration"))
+        sections.append(Code(settings, summary=summary, heading="Configuration"))
     return sections

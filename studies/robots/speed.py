@@ -11,7 +11,8 @@ import numpy as np
 
 from sims.mujoco import MujocoSimulator
 from sims.mujoco.rows import threads
-from studies.robots.drives import MODELS, ROBOTS
+from studies.robots.cases import nominal
+from studies.robots.drives import ROBOTS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,7 +38,7 @@ def speeds(rows: int = 1024, steps: int = 25, rounds: int = 5) -> list[Speed]:
 
 
 def _speed(robot: str, rows: int, steps: int, rounds: int) -> Speed:
-    simulator = MujocoSimulator(str(MODELS / f"{robot}.xml"))
+    simulator = nominal(robot)
     rng = np.random.default_rng(0)
     start = simulator.smooth_states(rows, rng)
     actions = np.stack(

@@ -12,6 +12,7 @@ import functools
 import hashlib
 import json
 import logging
+import sys
 import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -136,6 +137,13 @@ def read_trials(root: Path) -> tuple[list[dict[str, Any]], Failures]:
         if not (folder / RESULTS).exists() and (folder / "error.txt").exists()
     }
     return results, failures
+
+
+def tell_failures(failures: Failures) -> None:
+    """A line on stderr for each trial that failed: what went wrong, and where all of it stands."""
+    for folder, failure in failures.items():
+        reason = failure.strip().splitlines()[-1]
+        print(f"failed: {folder}: {reason} (see error.txt there)", file=sys.stderr)
 
 
 def attempt_trial(work: Work, tensorboard: Path | None, config: Config, folder: Path) -> str | None:

@@ -11,7 +11,7 @@ from sims.effects.library import library
 from studies.hidden.dirty.measure import Sensors, records
 from studies.hidden.dirty.report import headlines, misses
 from studies.hidden.dirty.score import oracle, same_as
-from studies.hidden.dirty.sets import LEAD, all_labels, make_set, oracle_effect
+from studies.hidden.dirty.sets import HIDDEN, LEAD, make_set, oracle_effect
 from studies.hidden.dirty.systems import SYSTEMS, nominal
 from studies.hidden.dirty.truth import COORDINATES, INPUTS, PARAMETERS, Truth, simulate
 from studies.hidden.grid import DirtyBlock, HiddenStudy, trials_of
@@ -19,6 +19,7 @@ from studies.hidden_effects import main
 from studies.judging.forecasts import plan, relative_error, root_mean_squares
 
 SHARP = Sensors(noise=0.0, coloured=0.0)
+LABELS = [(system, label) for system, labels in HIDDEN.items() for label in labels]
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
@@ -31,7 +32,7 @@ def test_a_clean_truth_moves_as_the_nominal_simulator(system):
     assert relative_error(simulator, groups) < 1e-4
 
 
-@pytest.mark.parametrize(("system", "label"), all_labels())
+@pytest.mark.parametrize(("system", "label"), LABELS)
 def test_a_hidden_effect_is_what_the_library_calls_so(system, label):
     """With the library's effect at the true strength, nothing is left."""
     name, _, where = label.partition("@")
@@ -56,7 +57,7 @@ def test_every_nominal_simulator_keeps_the_contract_and_hosts_what_is_hidden(sys
     simulator = nominal(system, 0.02, False, False)
     check_simulator(simulator)
     labels = {str(effect) for effect in library(simulator)}
-    assert {label for own, label in all_labels() if own == system} <= labels
+    assert {label for own, label in LABELS if own == system} <= labels
     assert set(PARAMETERS[system]) == set(simulator.parameters)
     for name, value in PARAMETERS[system].items():
         assert simulator.parameters[name].value == value
@@ -124,7 +125,7 @@ def test_what_means_the_same_is_the_same():
 def test_the_grid_takes_every_effect_in_turn():
     study = HiddenStudy(dirty=[DirtyBlock("hidden", repeats=2), DirtyBlock("dirt only")])
     cells = trials_of(study)
-    assert len(cells) == 2 * len(all_labels()) + len(SYSTEMS)
+    assert len(cells) == 2 * len(LABELS) + len(SYSTEMS)
     assert len({cell["seed"] for cell in cells}) == len(cells)
     assert {cell["layout"] for cell in cells} == {"ramp", "single", "many"}
 

@@ -27,12 +27,24 @@ def _ratio(row: Row) -> float:
     return finite(row["corrected"]) / finite(row["oracle"])
 
 
+def _close(row: Row) -> bool:
+    return _ratio(row) <= RATIO
+
+
 def _clear(row: Row) -> bool:
     return finite(row["nominal"]) >= 1.5 * finite(row["oracle"])
 
 
 def _worse(row: Row) -> bool:
     return finite(row["corrected"]) > SAME * finite(row["nominal"])
+
+
+def _hits(part: Sequence[Row], test: Callable[[Row], Any]) -> int:
+    return sum(bool(test(row)) for row in part)
+
+
+def _count(part: Sequence[Row], test: Callable[[Row], Any]) -> str:
+    return count(_hits(part, test), len(part))
 
 
 def headlines(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
@@ -45,7 +57,7 @@ def headlines(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
 
     def add(what: str, wanted: str, part: Sequence[Row], test: Callable[[Row], Any]) -> None:
         if part:
-            found.append((what, wanted, share(sum(bool(test(r)) for r in part), len(part))))
+            found.append((what, wanted, share(_hits(part, test), len(part))))
 
     add("hidden effect first", "", hidden, lambda r: r["first"])
     add("or its family", "95 %", hidden, lambda r: r["family"])
@@ -56,12 +68,7 @@ def headlines(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
     add("a confirmed wrong name", "at most 2 %", hidden, lambda r: r["wrong_sure"])
     add("the same, parameters that are truly off left out", "", hidden,
         lambda r: set(r["wrong_sure"]) - set(r["truly_off"]))  # fmt: skip
-    add(
-        "held-out error at most 1.3 times the oracle's",
-        "95 %",
-        hidden,
-        lambda r: _ratio(r) <= RATIO,
-    )
+    add("held-out error at most 1.3 times the oracle's", "95 %", hidden, _close)
     add("95 % intervals with the oracle's strength", "85 %", known, lambda r: r["covered"])
     add("or with the true strength", "", known, lambda r: r.get("covered_truth"))
     add("removed from the library: a confirmed wrong name", "at most 2 %", removed,
@@ -86,24 +93,23 @@ def cells(rows: Sequence[Row]) -> pd.DataFrame:
     found = []
     keys = sorted({(r["block"], r["system"], r["layout"]) for r in rows})
     for block, system, layout in keys:
-        part = [
-            r for r in rows if (r["block"], r["system"], r["layout"]) == (block, system, layout)
-        ]
+        cell = (block, system, layout)
+        part = [r for r in rows if (r["block"], r["system"], r["layout"]) == cell]
         inside = [r for r in part if r["block"] == "hidden"]
         known = [r for r in inside if r.get("covered") is not None]
         seconds = sorted(float(r["seconds"]) for r in part)
         found.append(
             {
                 "block": block, "system": system, "records": layout, "sets": len(part),
-                "first": count(sum(bool(r["first"]) for r in inside), len(inside)),
-                "or family": count(sum(bool(r["family"]) for r in inside), len(inside)),
-                "among": count(sum(bool(r["among"]) for r in inside), len(inside)),
-                "named": count(sum(bool(r["named"]) for r in part), len(part)),
-                "confirmed": count(sum(bool(r["sure"]) for r in part), len(part)),
-                "wrong confirmed": count(sum(bool(r["wrong_sure"]) for r in part), len(part)),
-                "error <= 1.3": count(sum(_ratio(r) <= RATIO for r in inside), len(inside)),
-                "cover": count(sum(bool(r["covered"]) for r in known), len(known)),
-                "worse": count(sum(_worse(r) for r in part), len(part)),
+                "first": _count(inside, lambda r: r["first"]),
+                "or family": _count(inside, lambda r: r["family"]),
+                "among": _count(inside, lambda r: r["among"]),
+                "named": _count(part, lambda r: r["named"]),
+                "confirmed": _count(part, lambda r: r["sure"]),
+                "wrong confirmed": _count(part, lambda r: r["wrong_sure"]),
+                "error <= 1.3": _count(inside, _close),
+                "cover": _count(known, lambda r: r["covered"]),
+                "worse": _count(part, _worse),
                 "s": round(seconds[len(seconds) // 2]),
                 "s most": round(seconds[-1]),
             }
@@ -123,8 +129,8 @@ def by_effect(rows: Sequence[Row]) -> pd.DataFrame:
         found.append(
             {
                 "system": system, "hidden": label, "sets": len(inside),
-                "or family": count(sum(bool(r["family"]) for r in inside), len(inside)),
-                "error <= 1.3": count(sum(_ratio(r) <= RATIO for r in inside), len(inside)),
+                "or family": _count(inside, lambda r: r["family"]),
+                "error <= 1.3": _count(inside, _close),
                 "called": ", ".join(said),
             }
         )  # fmt: skip
@@ -146,7 +152,7 @@ def misses(rows: Sequence[Row]) -> list[str]:
                 for name in row["wrong_sure"]
             ]
             lines.append(f"{what}: confirmed {', '.join(wrong)}")
-        if row["block"] == "hidden" and _ratio(row) > RATIO:
+        if row["block"] == "hidden" and not _close(row):
             lines.append(f"{what}: {_ratio(row):.2f} times the oracle's error (named {told})")
         if _worse(row):
             times = finite(row["corrected"]) / finite(row["nominal"])

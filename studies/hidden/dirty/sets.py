@@ -13,7 +13,7 @@ from sims import effects as known
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 from studies.hidden.dirty.measure import Layout, Sensors, records
-from studies.hidden.dirty.systems import SYSTEMS, nominal
+from studies.hidden.dirty.systems import nominal
 from studies.hidden.dirty.truth import INPUTS, PARAMETERS, Truth
 from studies.judging.forecasts import plan, relative_error
 
@@ -192,8 +192,3 @@ _KINDS: Sequence[type[Effect]] = (
     known.ConstantLoad, known.ActuatorGain, known.Delay, known.ActuatorLag, known.DeadZone,
     known.SensorOffset,
 )  # fmt: skip
-
-
-def all_labels() -> list[tuple[str, str]]:
-    """Every system with everything that can be hidden in it."""
-    return [(system, label) for system in SYSTEMS for label in HIDDEN[system]]

@@ -24,8 +24,8 @@ from sims.effects import (
     typical,
 )
 from sims.mujoco import AttributeChange, MujocoSimulator
-from sims.mujoco.agreement import agreement
 from sims.mujoco.corrected import corrected_files
+from tests.sims.mujoco.agreement import agreement
 from tests.sims.mujoco.robots import MODELS, robot
 
 

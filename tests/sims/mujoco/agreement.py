@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
-if TYPE_CHECKING:
-    from sims.mujoco.simulator import MujocoSimulator
+from sims.mujoco import MujocoSimulator
 
 
 def agreement(simulator: MujocoSimulator, path: str | Path, seconds: float = 1.0) -> float:
