@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import yaml
 
 from simgap_npz import read_npz
 from studies.learnt.figures import (
+    Drawn,
     budgets_figure,
     curves_figure,
     drawn_steps,
@@ -32,6 +34,8 @@ from studies.reporting import Animation, Code, Figure, Gallery, KeyValues, Repor
 from studies.reporting.figures import save_figure
 
 Episodes = Mapping[str, Mapping[str, np.ndarray]]
+#: Name of its file, the figure with its numbers, heading, what it shows, caption.
+Drawing = tuple[str, Drawn, str, str, str]
 
 
 def read_episodes(results: Results, folder: Path) -> dict[str, dict[str, np.ndarray]]:
@@ -77,30 +81,69 @@ def write_report(
         text = "\n".join(f"{path}\n{failure}" for path, failure in failures.items())
         count = f"{len(failures)} trials failed and are in no mean"
         sections.append(Code(text, summary=count, heading="Failed trials"))
-    drawings = []
+    drawings: list[Drawing] = []
     if episodes:
-        titles = _shown(results[0])
-        moving = {title: films[key] for key, title in titles.items() if films and key in films}
-        if moving:
-            pictures = [
-                Animation(path, f"The true system under the policy: {title}.", title)
-                for title, path in moving.items()
-            ]
-            caption = "The first seconds on the **true** system."
-            sections.append(Gallery(pictures, caption, heading="Before and after"))
-        drawn = {title: episodes[key] for key, title in titles.items() if key in episodes}
+        sections += _before_and_after(results[0], films or {})
+        drawings += _of_episodes(results[0], episodes)
+    drawings += _of_returns(results, rows, once, errors, best)
+    for file, (figure, numbers), heading, alt, caption in drawings:
+        save_figure(figure, folder / "figures" / f"{file}.png", numbers)
+        sections.append(Figure(figure, alt, caption, heading=heading))
+    sections += [
+        policies_section(summary, once, best),
+        *accuracy_section(errors, about),
+        *samples_section(once, apart(results), about),
+        *_provenance(results),
+    ]
+    title = f"{about['name'].replace('_', ' ').capitalize()}: closing the simulation gap"
+    seeds = len(set(rows["seed"]))
+    subtitle = f"{len(results)} trials, {seeds} seeds"
+    if len(results) == 1:
+        own = [results[0].get("label", ""), f"seed {results[0].get('seed', 0)}"]
+        subtitle = ", ".join(filter(None, own))
+    Report(title, subtitle, sections).write(folder / name)
+    # What others published makes lines too long for a terminal.
+    told = summary.drop(columns="published", errors="ignore")
+    table = told.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
+    return "\n".join([table, "", *legend(summary, once)])
+
+
+def _before_and_after(results: Results, films: Mapping[str, Path]) -> list[Section]:
+    """The films of the policies that pictures show, if there are any."""
+    moving = {title: films[key] for key, title in _shown(results).items() if key in films}
+    pictures = [
+        Animation(path, f"The true system under the policy: {title}.", title)
+        for title, path in moving.items()
+    ]
+    caption = "The first seconds on the **true** system."
+    return [Gallery(pictures, caption, heading="Before and after")] if pictures else []
+
+
+def _of_episodes(results: Results, episodes: Episodes) -> list[Drawing]:
+    """Pictures of one episode of each policy on the true system."""
+    about = results["about"]
+    drawn = {title: episodes[key] for key, title in _shown(results).items() if key in episodes}
+    drawings = [(
+        "trajectories", episodes_figure(about, drawn), "Episodes on the true system",
+        "State and action over time for each policy on the true system.",
+        f"The first {drawn_steps(about['dt']) * about['dt']:.4g} s on the true system; a line "
+        "ends where its episode ends.",
+    )]  # fmt: skip
+    if about.get("path"):
         drawings.append((
-            "trajectories", episodes_figure(about, drawn), "Episodes on the true system",
-            "State and action over time for each policy on the true system.",
-            f"The first {drawn_steps(about['dt']) * about['dt']:.4g} s on the true system; a line "
-            "ends where its episode ends.",
+            "path", path_figure(about, drawn), "Paths on the true system",
+            f"{about['path'][1]} against {about['path'][0]} for each policy.",
+            "One whole episode of each policy.",
         ))  # fmt: skip
-        if about.get("path"):
-            drawings.append((
-                "path", path_figure(about, drawn), "Paths on the true system",
-                f"{about['path'][1]} against {about['path'][0]} for each policy.",
-                "One whole episode of each policy.",
-            ))  # fmt: skip
+    return drawings
+
+
+def _of_returns(
+    results: Sequence[Results], rows: pd.DataFrame, once: pd.DataFrame, errors: pd.DataFrame,
+    best: float | None,
+) -> list[Drawing]:  # fmt: skip
+    """Pictures of the returns by budget, by update and while learning, those that say something."""
+    about, drawings = results[0]["about"], []
     learnt = rows[rows["name"] == "difference"]
     if learnt["samples_per_update"].nunique() > 1:
         drawings.append((
@@ -123,26 +166,7 @@ def write_report(
             "Tests in what each policy learns in; the best of them is kept. Cold and warm start "
             "learn on the true system: their steps are true samples.",
         ))  # fmt: skip
-    for file, (figure, numbers), heading, alt, caption in drawings:
-        save_figure(figure, folder / "figures" / f"{file}.png", numbers)
-        sections.append(Figure(figure, alt, caption, heading=heading))
-    sections += [
-        policies_section(summary, once, best),
-        *accuracy_section(errors, about),
-        *samples_section(once, apart(results), about),
-        *_provenance(results),
-    ]
-    title = f"{about['name'].replace('_', ' ').capitalize()}: closing the simulation gap"
-    seeds = len(set(rows["seed"]))
-    subtitle = f"{len(results)} trials, {seeds} seeds"
-    if len(results) == 1:
-        own = [results[0].get("label", ""), f"seed {results[0].get('seed', 0)}"]
-        subtitle = ", ".join(filter(None, own))
-    Report(title, subtitle, sections).write(folder / name)
-    # What others published makes lines too long for a terminal.
-    told = summary.drop(columns="published", errors="ignore")
-    table = told.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
-    return "\n".join([table, "", *legend(summary, once)])
+    return drawings
 
 
 def _shown(results: Results) -> dict[str, str]:
