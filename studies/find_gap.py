@@ -58,7 +58,7 @@ class GapStudy:
             ("linear"), as most inputs measured at the actuator are, or whichever the nominal
             simulator fits better ("auto"); for all inputs or by name, {torque: linear}. What
             happens before an input said to be "linear" (dead zone, lag) is no candidate.
-        horizon: Forecast length in s that matters to you; by default a quarter of the usual
+        horizon: Forecast length in s that matters to you; by default a third of the usual
             period of the motion.
         parameter_tolerance: How well the parameters of the simulator are known, as a share of
             each: an effect is certain only if they cannot stand in for it within that, and its

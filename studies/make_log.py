@@ -24,10 +24,10 @@ from jsonargparse.typing import PositiveInt
 
 from sims.pendulum import IDEALISED_MASS, TRUE_MASS
 from studies.hidden.data import Truth, make_logs
+from studies.hidden.logs import write_log
+from studies.hidden.walks import write_walks
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
-from studies.running.logs import write_log
-from studies.walks import write_walks
 
 HIDDEN = Truth(mass=TRUE_MASS / IDEALISED_MASS - 1)
 

@@ -12,7 +12,7 @@ from policy.learner import load_policy
 from policy.noise import OrnsteinUhlenbeck
 from sims.environment import SimulatorEnv
 from sims.leo import Leo, Walking
-from studies.running.logs import write_log
+from studies.hidden.logs import write_log
 
 #: Sub-steps of 0.04 ms, a fifth of what find_gap explains the log with.
 SUBSTEPS = 150
