@@ -186,7 +186,7 @@ def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdic
     share = Span(1 - gap.share.value, 1 - gap.share.high, 1 - gap.share.low)
     says = f"{100 * share.value:.3g} % of the gap has no name: {left.ratio:.3g} times the noise"
     if left.force:
-        says += f"; it looks like a force that follows {left.force}"
+        says += f"; it looks like something that follows {left.force}"
     if leads:
         says += f"; {', '.join(leads)} would take some of it, and so would many others"
     return Verdict("unexplained", "", "", {}, tuple(leads), "", says, share, follows=left.force)

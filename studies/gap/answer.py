@@ -207,7 +207,7 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
             f"log some {more} more, or set a shorter --horizon"
         )
     if verdict.follows:
-        found.append(f"it looks like a force that follows {verdict.follows}")
+        found.append(f"it looks like something that follows {verdict.follows}")
     if verdict.alternatives:
         found.append(
             f"{names_of(verdict.alternatives, 'and')} would take some of it, and so would many "

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure as Drawing
 
 from residual.gap import GapResult
 from residual.gap.result import Profile, Rollout
-from studies.gap.words import FLOOR, gap_rows, quantity_text
+from studies.gap.words import FLOOR, gap_rows, quantity_text, typeset
 from studies.reporting.figures import (
     AMBER,
     BLUE,
@@ -51,7 +51,7 @@ def shrinking(result: GapResult, path: Path | None = None) -> Drawing:
     axis.axvline(gap.noise_floor.value, color=GREEN, linestyle=(0, (4, 3)), label="noise floor")
     axis.set_yticks(range(len(rows)), [textwrap.fill(name, LONGEST_NAME) for name, _ in rows])
     axis.set(ylim=(len(rows) - 0.5, -0.5), xlim=(0, 1.06 * top))
-    axis.set_xlabel(f"error of {gap.channel}" + (f" ({gap.unit})" if gap.unit else ""))
+    axis.set_xlabel(f"error of {gap.channel}" + (f" ({typeset(gap.unit)})" if gap.unit else ""))
     axis.grid(axis="y", visible=False)
     axis.tick_params(axis="y", length=0)
     figure.legend(loc="outside upper left", handlelength=1.8)
@@ -85,7 +85,7 @@ def rollout(result: GapResult, shown: Rollout, path: Path) -> Drawing:
         axis.plot(time, seen, "o", color=INK, markersize=3 if len(time) < 80 else 1.6,
                   label="measured" if first else None)  # fmt: skip
         between = "\n" if len(name) > 10 else " "  # a panel is as high as some twenty letters
-        axis.set_ylabel(name + (f"{between}({unit})" if unit else ""))
+        axis.set_ylabel(name + (f"{between}({typeset(unit)})" if unit else ""))
         # A nominal forecast that runs away must not flatten all else.
         good = seen[np.isfinite(seen)]
         if len(good):
@@ -112,9 +112,9 @@ def profile(found: Profile, path: Path) -> Drawing:
     axis.axhline(0, color=MUTED, linewidth=0.9)
     axis.fill_between(found.centres, found.low, found.high, color=BLUE, alpha=0.2, linewidth=0)
     axis.plot(found.centres, found.mean, "o-", color=BLUE, markersize=4.5)
-    axis.set_xlabel(f"{found.variable}" + (f" ({found.unit})" if found.unit else ""))
+    axis.set_xlabel(f"{found.variable}" + (f" ({typeset(found.unit)})" if found.unit else ""))
     unit = found.target_unit.replace("/s/s", "/s²")
-    axis.set_ylabel(f"missing change of\n{found.target} ({unit})")
+    axis.set_ylabel(f"missing change of\n{found.target} ({typeset(unit)})")
     save_figure(
         figure, path,
         {"centre": found.centres, "mean": found.mean, "low": found.low, "high": found.high},

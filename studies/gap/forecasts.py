@@ -10,7 +10,15 @@ import numpy as np
 from residual.gap import GapResult
 from residual.gap.result import Gap, Rollout
 from studies.gap.figures import lags, profile, rollout, shrinking
-from studies.gap.words import CROSS_VALIDATED, ahead, percent, quantity_text, seconds_text
+from studies.gap.words import (
+    CROSS_VALIDATED,
+    ahead,
+    percent,
+    quantity_text,
+    seconds_text,
+    typeset,
+    unit_text,
+)
 from studies.reporting import Figure, Gallery, KeyValues, Prose, Section, Table
 from studies.reporting.sections import Cell
 
@@ -71,7 +79,8 @@ def bars(result: GapResult, folder: Path) -> Figure:
     )
     return Figure(
         shrinking(result, folder / "gap.png"),
-        f"The error falls from {gap.before.value:.3g} to {gap.after.value:.3g} {gap.unit}; noise "
+        f"The error falls from {gap.before.value:.3g} to {gap.after.value:.3g}"
+        f"{unit_text(gap.unit)}; noise "
         f"alone gives {gap.noise_floor.value:.3g}.",
         f"Root mean square error of {gap.channel} over {seconds_text(gap.horizon_s)}, in "
         f"{CROSS_VALIDATED}: {gap.blocks} blocks of the records, dealt over {gap.folds} groups "
@@ -101,7 +110,7 @@ def _errors(gap: Gap) -> list[list[Cell]]:
     """Channel, nominal, corrected, noise floor."""
     return [
         [
-            f"{name} ({of.unit})" if of.unit else name,
+            f"{name} ({typeset(of.unit)})" if of.unit else name,
             of.before.value, of.after.value, of.noise_floor.value,
         ]
         for name, of in gap.by_channel.items()

@@ -16,7 +16,7 @@ from studies.gap.answer import (
     sentence,
 )
 from studies.gap.lead import lead
-from studies.gap.words import effect_name, names_of, set_name
+from studies.gap.words import effect_name, names_of, set_name, unit_text
 from studies.reporting import Prose, Section, Table, Verdict
 from studies.reporting.sections import Cell
 
@@ -139,7 +139,7 @@ def blind(result: GapResult) -> list[Section]:
     if not result.blind:
         return []
     rows: list[list[Cell]] = [
-        [effect_name(b.effect), f"{b.visible_from:.3g} {b.unit}".removesuffix(" 1"), b.needs]
+        [effect_name(b.effect), f"{b.visible_from:.3g}{unit_text(b.unit)}", b.needs]
         for b in result.blind
     ]
     return [

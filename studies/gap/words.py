@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 from residual.gap import GapResult
@@ -23,6 +24,12 @@ KINDS = {
 FLOOR = "noise floor"
 #: What the errors are errors of.
 CROSS_VALIDATED = "forecasts of data that did not fit the numbers"
+#: Digits of a power.
+RAISED = str.maketrans(
+    "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
+)
+#: Units that begin with one of which a thousandth has a name.
+DIVIDED = re.compile(r"(rad|[mVKNA])(?![\w^])")
 #: Names of people, in the names of effects.
 PEOPLE = ("Coulomb", "Stribeck")
 
@@ -72,9 +79,14 @@ def rounded(value: float, half: float) -> str:
     return f"{round(value, places):.{max(places, 0)}f}"
 
 
+def typeset(unit: str) -> str:
+    """``kg m^2`` as ``kg m\u00b2``."""
+    return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(RAISED), unit)
+
+
 def unit_text(unit: str) -> str:
     """A unit to be set behind a number; a share has none."""
-    return "" if unit in ("", "1") else f" {unit}"
+    return "" if unit in ("", "1") else f" {typeset(unit)}"
 
 
 def _near(number: Number) -> float:
@@ -103,8 +115,8 @@ def span_text(span: Span, unit: str = "") -> str:
 
 def quantity_text(value: float, unit: str) -> str:
     """A number with its unit, in thousandths of it if it is small."""
-    if unit[:1] in ("r", "m", "V", "K", "N", "A") and 1e-6 <= abs(value) < 1e-2:
-        return f"{1e3 * value:.3g} m{unit}"
+    if DIVIDED.match(unit) and 1e-6 <= abs(value) < 1e-2:
+        return f"{1e3 * value:.3g} m{typeset(unit)}"
     return f"{value:.3g}{unit_text(unit)}"
 
 

@@ -20,6 +20,7 @@ from residual.measured import fit_measured
 from residual.trajectories import Transitions
 from residual.uncertainty_penalty import PenalisedTask
 from simgap_files import jsonable
+from sims.rates import refuse_unrelated_rates
 from sims.simulator import Simulator
 from sims.system import System
 from studies.learning.described import modules_in, settings_of
@@ -27,7 +28,7 @@ from studies.learning.fingerprint import fingerprint
 from studies.learning.measuring import anywhere, where_it_goes
 from studies.learning.results import Measured, Model, Samples
 from studies.learning.streams import seeded, stream
-from studies.learning.training import Training, exploration, train, transitions
+from studies.learning.training import Training, exploration, train, transitions, visited
 from studies.learning.warm_start import Recorder, ReplayRule, WarmStart
 
 if TYPE_CHECKING:
@@ -96,6 +97,8 @@ class Steps:
             with self.progress.task(f"collect {samples} true samples", samples) as tell:
                 runs = collect(policy.policy, env, samples, seed, noise)
                 tell(samples, "")
+            steps = [(visited(self.system, run), run.actions) for run in runs]
+            refuse_unrelated_rates("the true system", self.system.nominal, steps)
             return Samples(transitions(self.system, runs))
 
         settings: dict[str, Any] = {"policy": policy.key, "samples": samples, "update": update}

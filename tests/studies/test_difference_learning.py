@@ -10,6 +10,7 @@ from policy import Algorithm, DDPGConfig
 from residual import Linear
 from sims import Channel, FirstOrderSystem, Parameter
 from sims.effects import ActuatorLag
+from sims.environment import SimulatorEnv
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.system import EvaluationProtocol, System
@@ -178,6 +179,17 @@ def test_a_true_system_with_hidden_memory_is_learnt_and_measured():
     (accuracy,) = quickly(PendulumEquation(), lagging, Named(horizon=30)).accuracy
     for where in ("visited", "uniform"):
         assert set(accuracy[where]["one_step"]) == {"angle", "rate"}
+
+
+def test_columns_in_another_order_are_refused_before_anything_is_learnt_from_them():
+    def true():
+        return SimulatorEnv(PendulumEquation.true(), SwingUp(horizon=30))
+
+    def swapped(env, seen):
+        return 10.0 * seen[2], np.arctan2(seen[1], seen[0])
+
+    with pytest.raises(ValueError, match=r"true system: 'angle' does not move as 'rate' says"):
+        quickly(PendulumEquation(), true, SwingUp(horizon=30), state_of=swapped)
 
 
 def test_a_control_period_of_seconds_is_measured_over_enough_of_them():

@@ -7,7 +7,7 @@ import pytest
 
 from residual.gap.result import Number
 from studies.gap.progress import Heartbeat
-from studies.gap.words import number_text, percent, rounded
+from studies.gap.words import number_text, percent, quantity_text, rounded, unit_text
 
 
 @pytest.mark.parametrize(
@@ -49,3 +49,24 @@ def test_a_sign_of_life_comes_while_nothing_is_said():
     assert len(lines) >= 3
     assert all(re.match(r" *\d+\.\d s, \d+ s left  ", line) for line in lines)
     assert lines[-1].endswith("still working; last: mass: 3 % of the error")
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.005, "m", "5 mm"),
+        (0.005, "m/s^2", "5 mm/s\u00b2"),
+        (0.005, "mm", "0.005 mm"),
+        (0.005, "m^2", "0.005 m\u00b2"),
+        (0.005, "rpm", "0.005 rpm"),
+        (0.05, "rad", "0.05 rad"),
+        (0.005, "1", "0.005"),
+    ],
+)
+def test_thousandths_have_a_name_only_of_a_plain_unit(value, unit, text):
+    assert quantity_text(value, unit) == text
+
+
+def test_powers_are_raised():
+    assert unit_text("N m s^2/rad^2") == " N m s\u00b2/rad\u00b2"
+    assert unit_text("s^-1") == " s\u207b\u00b9"
