@@ -113,15 +113,14 @@ class Simulated:
 
     def pieces(self) -> list[tuple[Array, Array, Array]]:
         """The rows in double precision, some thousands at a time."""
-        columns = self.states, self.actions, self.next_states
-        starts = range(0, len(self), _ROWS)
+        parts = [slice(k, k + _ROWS) for k in range(0, len(self), _ROWS)]
         return [
             (
-                columns[0][k : k + _ROWS].astype(float),
-                columns[1][k : k + _ROWS].astype(float),
-                columns[2][k : k + _ROWS].astype(float),
+                self.states[part].astype(float),
+                self.actions[part].astype(float),
+                self.next_states[part].astype(float),
             )
-            for k in starts
+            for part in parts
         ]
 
 

@@ -63,16 +63,15 @@ class Prose(Section):
 
 
 @dataclasses.dataclass(frozen=True)
-class Figure(Section):
-    """One picture.
+class Picture(Section):
+    """What a still and a moving picture share.
 
     Args:
-        source: A matplotlib figure, or the bytes or path of a PNG, SVG or JPEG.
+        source: A matplotlib figure, or the bytes or path of a PNG, SVG, JPEG or GIF.
         alt: What it shows, for those who cannot see it: the finding, not "a plot".
         caption: Text under it; markup as in ``Prose``.
     """
 
-    template: ClassVar[str] = "figure.html"
     source: Source
     alt: str
     caption: str = ""
@@ -81,6 +80,13 @@ class Figure(Section):
     def picture(self) -> Media:
         """``source``, ready to be put into the page."""
         return load_media(self.source)
+
+
+@dataclasses.dataclass(frozen=True)
+class Figure(Picture):
+    """One picture, see ``Picture``."""
+
+    template: ClassVar[str] = "figure.html"
 
     @property
     def narrow_picture(self) -> Media | None:
@@ -102,24 +108,13 @@ class Gallery(Section):
 
 
 @dataclasses.dataclass(frozen=True)
-class Animation(Section):
-    """A moving picture; readers who ask their system for less motion see one still of it.
+class Animation(Picture):
+    """A moving picture, a GIF (``media.encode_gif``); see ``Picture``.
 
-    Args:
-        source: Bytes or path of a GIF; see ``media.encode_gif``.
-        alt: What happens in it.
-        caption: Text under it; markup as in ``Prose``.
+    Readers who ask their system for less motion see one still of it.
     """
 
     template: ClassVar[str] = "animation.html"
-    source: bytes | str | Path
-    alt: str
-    caption: str = ""
-
-    @property
-    def picture(self) -> Media:
-        """``source``, ready to be put into the page."""
-        return load_media(self.source)
 
     @property
     def still(self) -> Media | None:

@@ -55,7 +55,7 @@ class Bars:
 
 
 class Silent:
-    """No output, for tests."""
+    """No output, for ``learn_by_difference(..., progress=Silent())`` in a script."""
 
     @contextmanager
     def task(self, title: str, total: int) -> Iterator[Advance]:
