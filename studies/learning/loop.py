@@ -34,42 +34,42 @@ from studies.learning.warm_start import ReplayRule, WarmStart
 from studies.running.progress import Bars, Progress
 
 
-def run_loop(do: Steps, budget: Budget, corrected: Simulator | None = None) -> Learnt:
+def run_loop(steps: Steps, budget: Budget, corrected: Simulator | None = None) -> Learnt:
     """The loop, then the control and the baselines that the budget asks for.
 
     Args:
-        do: The steps.
+        steps: The steps for one system, estimator, algorithm and seed.
         budget: Samples and steps.
         corrected: The simulator with what it lacked: a policy is trained on it as well, from the
             idealised one, without a true sample.
     """
-    learnt, samples, model = Learnt.of(do.system), [], None
-    policy = idealised = do.train("idealised", budget.idealised_steps)
+    learnt, samples, model = Learnt.of(steps.system), [], None
+    policy = idealised = steps.train("idealised", budget.idealised_steps)
     learnt.add_policy("idealised", idealised)
-    start = begin = WarmStart.begin(idealised, do.replay)
+    start = begin = WarmStart.begin(idealised, steps.replay)
     for update in range(1, budget.iterations + 1):
-        samples.append(do.collect(policy, budget.true_samples, update, model))
-        model = do.fit(samples)
-        policy = do.train("difference", budget.difference_steps, start, on=model, update=update)
-        accuracy = do.measure(model, policy, update)
+        samples.append(steps.collect(policy, budget.true_samples, update, model))
+        model = steps.fit(samples)
+        policy = steps.train("difference", budget.difference_steps, start, on=model, update=update)
+        accuracy = steps.measure(model, policy, update)
         learnt.add_update(update, update * budget.true_samples, policy, model, accuracy)
         start = start.then(policy)
 
     start = begin
     for update in range(1, budget.iterations + 1 if budget.control_steps else 1):
-        control = do.train("control", budget.control_steps, start, update=update)
+        control = steps.train("control", budget.control_steps, start, update=update)
         learnt.add_policy("control", control, iteration=update)
         start = start.then(control)
     if corrected is not None:
-        named = do.train("corrected", budget.corrected_steps, begin, on=corrected)
+        named = steps.train("corrected", budget.corrected_steps, begin, on=corrected)
         learnt.add_policy("corrected", named)
     # The reference and the cold start are one experiment, read at two budgets.
     if longest := max(budget.true_steps, budget.baseline_steps):
-        cold = do.train("cold", longest)
+        cold = steps.train("cold", longest)
         learnt.add_on_truth("true", cold, budget.true_steps)
         learnt.add_on_truth("cold", cold, budget.baseline_steps)
     if budget.baseline_steps:
-        warm = do.train("warm", budget.baseline_steps, idealised)
+        warm = steps.train("warm", budget.baseline_steps, idealised)
         learnt.add_on_truth("warm", warm, budget.baseline_steps)
     return learnt
 
@@ -145,7 +145,7 @@ def learn_by_difference(
     budget = budget or Budget(samples, updates, steps, steps)
     budget.check(algorithm, replay == "all")
     system.check()
-    do = Steps(
+    loop = Steps(
         system,
         estimator or GaussianProcess(),
         algorithm,
@@ -155,7 +155,7 @@ def learn_by_difference(
         replay,
         uncertainty_penalty,
     )
-    return run_loop(do, budget)
+    return run_loop(loop, budget)
 
 
 @runtime_checkable
