@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -33,32 +34,11 @@ def maximise_likelihood(
         warnings.simplefilter("ignore", DeprecationWarning)
         import gpytorch
 
-    def positive() -> gpytorch.constraints.Positive:
-        return gpytorch.constraints.Positive(transform=torch.exp, inv_transform=torch.log)
-
-    class Process(gpytorch.models.ExactGP):
-        def __init__(self) -> None:
-            likelihood = gpytorch.likelihoods.GaussianLikelihood(noise_constraint=positive())
-            super().__init__(inputs, targets, likelihood)
-            width = X.shape[1]
-            base = (
-                gpytorch.kernels.RBFKernel(ard_num_dims=width, lengthscale_constraint=positive())
-                if kernel == "rbf"
-                else gpytorch.kernels.MaternKernel(
-                    nu=2.5, ard_num_dims=width, lengthscale_constraint=positive()
-                )
-            )
-            self.kernel = gpytorch.kernels.ScaleKernel(base, outputscale_constraint=positive())
-            self.mean = gpytorch.means.ZeroMean()
-
-        def forward(self, x: torch.Tensor) -> gpytorch.distributions.MultivariateNormal:
-            return gpytorch.distributions.MultivariateNormal(self.mean(x), self.kernel(x))
-
     def tensors(rows: int) -> tuple[torch.Tensor, torch.Tensor]:
         return torch.from_numpy(X[:rows].copy()), torch.from_numpy(y[:rows].copy())
 
     inputs, targets = tensors(len(X))
-    process = Process().double()
+    process = _process(inputs, targets, kernel)
     process.kernel.base_kernel.lengthscale = X.shape[1] ** 0.5
     process.kernel.outputscale = 1.0
     process.likelihood.noise = max(1e-2, least_noise)
@@ -115,3 +95,30 @@ def maximise_likelihood(
         float(process.likelihood.noise.item()),
         max(int(iterations), 1),
     )
+
+
+def _process(inputs: Any, targets: Any, kernel: str) -> Any:
+    """An exact process of rows (n, n_in) and targets (n,), searched over logarithms."""
+    import gpytorch
+    import torch
+
+    def positive() -> Any:
+        return gpytorch.constraints.Positive(transform=torch.exp, inv_transform=torch.log)
+
+    class Process(gpytorch.models.ExactGP):
+        def __init__(self) -> None:
+            likelihood = gpytorch.likelihoods.GaussianLikelihood(noise_constraint=positive())
+            super().__init__(inputs, targets, likelihood)
+            scales = {"ard_num_dims": inputs.shape[1], "lengthscale_constraint": positive()}
+            base = (
+                gpytorch.kernels.RBFKernel(**scales)
+                if kernel == "rbf"
+                else gpytorch.kernels.MaternKernel(nu=2.5, **scales)
+            )
+            self.kernel = gpytorch.kernels.ScaleKernel(base, outputscale_constraint=positive())
+            self.mean = gpytorch.means.ZeroMean()
+
+        def forward(self, x: Any) -> Any:
+            return gpytorch.distributions.MultivariateNormal(self.mean(x), self.kernel(x))
+
+    return Process().double()
