@@ -23,6 +23,7 @@ import numpy as np
 from jsonargparse.typing import NonNegativeInt, PositiveFloat, PositiveInt
 
 from studies.robots.cases import Case, ask, cases, nominal
+from studies.robots.drives import ROBOTS
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
 
@@ -33,7 +34,7 @@ Kept = dict[str, Any]
 def build_parser() -> Parser:
     """The command line."""
     parser = Parser(prog="python -m studies.robot_gaps", description=__doc__)
-    parser.add_argument("--robot", choices=("cart_pole", "arm2", "arm6", "hopper"), default="arm2")
+    parser.add_argument("--robot", choices=ROBOTS, default="arm2")
     parser.add_argument(
         "--kind", type=Literal["none", "single", "pair"], default="single",
         help="nothing, each effect of the library alone, or a friction and a payload",

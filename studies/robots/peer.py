@@ -146,12 +146,10 @@ def _sequences(
     nq = simulator.model.nq
     signals = {f"{name}_qpos": (sysid.SignalType.MjStateQPos, [k]) for k, name in enumerate(joints)}
     for log in logs:
-        period = float(np.median(log.durations))
+        period, q = float(np.median(log.durations)), log.states[:, :nq]
         steps = round(SEQUENCE / period)
         fine = round(period / simulator.timestep)
-        q = log.states[:, :nq]
-        smooth = savgol_filter(q, 9, 3, axis=0)
-        rates = savgol_filter(q, 9, 3, deriv=1, delta=period, axis=0)
+        smooth, rates = _smoothed(q, period)
         for a in range(0, len(log.actions) - steps, steps):
             starts.append(sysid.create_initial_state(model, smooth[a], rates[a]))
             held = np.repeat(log.actions[a : a + steps], fine, axis=0)
@@ -166,6 +164,11 @@ def _sequences(
     )
 
 
+def _smoothed(q: Array, period: float) -> tuple[Array, Array]:
+    """Positions and rates at every sample, from a cubic through nine; both (n, nq)."""
+    return savgol_filter(q, 9, 3, axis=0), savgol_filter(q, 9, 3, deriv=1, delta=period, axis=0)
+
+
 def forecast_error(
     simulator: HostSimulator,
     logs: Sequence[Trajectory],
@@ -176,11 +179,9 @@ def forecast_error(
     nq = len([c for c in simulator.physical_channels if c.kind == "position"])
     errors: list[Array] = []
     for log in logs:
-        period = float(np.median(log.durations))
+        period, q = float(np.median(log.durations)), log.states[:, :nq]
         steps = round(0.3 / period)
-        q = log.states[:, :nq]
-        smooth = savgol_filter(q, 9, 3, axis=0)
-        rates = savgol_filter(q, 9, 3, deriv=1, delta=period, axis=0)
+        smooth, rates = _smoothed(q, period)
         begins = np.arange(4, len(log.actions) - steps, steps)
         start = np.concatenate([smooth[begins], rates[begins]], axis=1)
         held = np.stack([log.actions[a : a + steps] for a in begins])
