@@ -17,8 +17,8 @@ from residual.gap.blocks import Blocks
 from residual.gap.candidates import Candidate
 from residual.gap.model import Model
 from residual.gap.noise import Noise
-from residual.gap.result import Where
 from residual.gap.samples import Samples
+from residual.gap.where import Where
 
 if TYPE_CHECKING:
     from residual.gap.screening import Signatures

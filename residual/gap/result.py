@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.where import Where
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 
@@ -190,44 +191,6 @@ class Rival:
     error: float
     chosen: bool
     reason: str
-
-
-@dataclasses.dataclass(frozen=True)
-class Profile:
-    """Missing acceleration against one variable: mean and 95 % band in bins.
-
-    Attributes:
-        variable, unit: What it is plotted against.
-        target, target_unit: The driven channel and the unit of its missing rate of change.
-    """
-
-    variable: str
-    unit: str
-    target: str
-    target_unit: str
-    centres: Array
-    mean: Array
-    low: Array
-    high: Array
-
-
-@dataclasses.dataclass(frozen=True)
-class Where:
-    """Where the nominal simulator fails.
-
-    Attributes:
-        by_channel: Residual over noise for each measured channel.
-        profiles: Missing acceleration against states and inputs.
-        lags_s: Lags of the input in s.
-        lag_correlation: Correlation of the missing acceleration with the input that long ago.
-        run_ratio: Residual over noise of each training run, by name.
-    """
-
-    by_channel: dict[str, float]
-    profiles: tuple[Profile, ...]
-    lags_s: Array
-    lag_correlation: dict[str, Array]
-    run_ratio: dict[str, float]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,11 +16,10 @@ from residual.gap.chance import TIE, threshold
 from residual.gap.fitting import Fit, Fitter, Foretold, Left
 from residual.gap.model import Model
 from residual.gap.noise import Floor, Noise
-from residual.gap.result import Where
 from residual.gap.samples import Samples
 from residual.gap.screening import Signatures
 from residual.gap.slopes import observe
-from residual.gap.where import locate
+from residual.gap.where import Where, locate
 from residual.gap.windows import carry
 
 Array = NDArray[np.float64]

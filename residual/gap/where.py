@@ -2,19 +2,60 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.fitting import Fit
 from residual.gap.model import Model
 from residual.gap.noise import Floor, driven_states
-from residual.gap.result import Profile, Where
 from residual.gap.samples import Samples
 from residual.gap.windows import Windows
 
+if TYPE_CHECKING:
+    from residual.gap.fitting import Fit
+
 Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Profile:
+    """Missing acceleration against one variable: mean and 95 % band in bins.
+
+    Attributes:
+        variable, unit: What it is plotted against.
+        target, target_unit: The driven channel and the unit of its missing rate of change.
+    """
+
+    variable: str
+    unit: str
+    target: str
+    target_unit: str
+    centres: Array
+    mean: Array
+    low: Array
+    high: Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Where:
+    """Where the nominal simulator fails.
+
+    Attributes:
+        by_channel: Residual over noise for each measured channel.
+        profiles: Missing acceleration against states and inputs.
+        lags_s: Lags of the input in s.
+        lag_correlation: Correlation of the missing acceleration with the input that long ago.
+        run_ratio: Residual over noise of each training run, by name.
+    """
+
+    by_channel: dict[str, float]
+    profiles: tuple[Profile, ...]
+    lags_s: Array
+    lag_correlation: dict[str, Array]
+    run_ratio: dict[str, float]
 
 
 def locate(

@@ -19,9 +19,9 @@ from residual.gap.impacts.single_shooting import Job, WindowData, fit_starts, jo
 from residual.gap.impacts.windows import lay_out
 from residual.gap.model import Model
 from residual.gap.noise import Noise
-from residual.gap.result import Where
 from residual.gap.samples import Recorded, Samples
 from residual.gap.screening import Signatures
+from residual.gap.where import Where
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ import gymnasium
 import mujoco
 import numpy as np
 import pytest
+from sims.mujoco.agreement import agreement
 
 from sims.mujoco import AttributeChange, MujocoSimulator
-from sims.mujoco.agreement import agreement
 from sims.mujoco.corrected import corrected_files
 
 ASSETS = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
