@@ -16,6 +16,8 @@ _INLINE = (
 )
 # A number stays on one line with its unit.
 _UNIT = re.compile(r"(?<=\d) (?=[A-Za-zµ°%])|(?<=\bN) (?=m\b)|(?<=\bm) (?=s\b)|(?<=\bkg) (?=m)")
+# A hyphen before a number that nothing is joined to is a minus.
+_MINUS = re.compile(r"(?<![\w./-])-(?=[\d.])")
 _CODE = re.compile(r"`([^`]+)`")
 
 
@@ -34,7 +36,7 @@ def inline(text: str) -> Markup:
     for even in range(0, len(pieces), 2):
         for pattern, replacement in _INLINE:
             pieces[even] = pattern.sub(replacement, pieces[even])
-        pieces[even] = _UNIT.sub("\u00a0", pieces[even])
+        pieces[even] = _UNIT.sub("\u00a0", _MINUS.sub("\u2212", pieces[even]))
     for odd in range(1, len(pieces), 2):
         pieces[odd] = f"<code>{pieces[odd]}</code>"
     return Markup("".join(pieces))
