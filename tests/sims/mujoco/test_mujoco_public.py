@@ -7,10 +7,10 @@ import gymnasium
 import mujoco
 import numpy as np
 import pytest
-from sims.mujoco.agreement import agreement
 
 from sims.mujoco import AttributeChange, MujocoSimulator
 from sims.mujoco.corrected import corrected_files
+from tests.sims.mujoco.agreement import agreement
 
 ASSETS = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
 SMOOTH = ("inverted_pendulum", "inverted_double_pendulum", "reacher", "swimmer", "pusher")
