@@ -23,7 +23,7 @@ def column(value: float | Array) -> float | Array:
 
 
 def shaped(samples: Array, effects: Iterable[ActuatorEffect]) -> Array:
-    """Samples (rows, T) of one input after bias, dead zone, gain and saturation."""
+    """Samples (rows, T) of one input after all effects without memory."""
     for effect in sorted(effects, key=lambda effect: effect.stage):
         if isinstance(effect, StaticActuatorEffect):
             columns = effect.with_values(

@@ -27,9 +27,8 @@ AND = " and "
 class ActuatorEffect(Effect):
     """A change of one input on its way to the actuator.
 
-    Whatever their order in a list, effects act in the order of the classes below: bias and
-    dead zone and square, in units of the command, gain, saturation of what comes out, then delay,
-    then lag.
+    Whatever their order in a list, effects act in the order of the classes below: bias, dead zone
+    and square, in units of the command, gain, saturation of what comes out, then delay, then lag.
 
     Attributes:
         actuator: The input, or several of one unit on which it acts alike, ``"left and right"``.

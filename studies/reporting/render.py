@@ -16,8 +16,9 @@ _INLINE = (
 )
 # A number stays on one line with its unit.
 _UNIT = re.compile(r"(?<=\d) (?=[A-Za-zµ°%])|(?<=\bN) (?=m\b)|(?<=\bm) (?=s\b)|(?<=\bkg) (?=m)")
-# A hyphen before a number that nothing is joined to is a minus.
-_MINUS = re.compile(r"(?<![\w./-])-(?=[\d.])")
+# A hyphen that begins a number, at the start, after a space, a bracket or a tag, is a minus; one in
+# an address is not.
+_MINUS = re.compile(r"(?<![^\s(>])-(?=\.?\d)")
 _CODE = re.compile(r"`([^`]+)`")
 
 

@@ -258,3 +258,13 @@ def test_drawing_leaves_no_global_state_behind():
     assert dict(matplotlib.rcParams) == before
     if "matplotlib.pyplot" in sys.modules:
         assert not sys.modules["matplotlib.pyplot"].get_fignums()
+
+
+def test_a_hyphen_before_a_number_is_a_minus_and_none_in_an_address():
+    assert (
+        inline("-1.5 \u00b1 2 (-3, **-0.5**)")
+        == "\u22121.5 \u00b1 2 (\u22123, <strong>\u22120.5</strong>)"
+    )
+    for kept in ("2026-11-23", "1e-05", "arm-3", "`-1`"):
+        assert "\u2212" not in inline(kept)
+    assert 'href="https://x.org/?a=-1"' in inline("[x](https://x.org/?a=-1)")
