@@ -18,6 +18,7 @@ from policy.files import content_of, read_arrays, write_arrays
 from policy.mlp import MlpPolicy
 from policy.noise import OrnsteinUhlenbeck
 from policy.replay import Replay, Seen
+from policy.scaling import Scaling
 
 FORMAT = "simgap.ddpg.1"
 
@@ -52,6 +53,7 @@ class DDPG:
         action_space: One-dimensional bounded ``Box``, n_a actions.
         config: Settings.
         seed: Seed of the initial weights, the noise, the batches and the environment's resets.
+        scaling: Of what the networks see; by default none.
 
     Attributes:
         policy: The current deterministic policy, a live view: it changes as the agent learns.
@@ -67,6 +69,7 @@ class DDPG:
         action_space: gymnasium.Space[Any],
         config: DDPGConfig | None = None,
         seed: int = 0,
+        scaling: Scaling | None = None,
     ) -> None:
         n_o = _box("observation_space", observation_space).shape[0]
         box = _box("action_space", action_space)
@@ -75,6 +78,7 @@ class DDPG:
         n_a = box.shape[0]
         self.config = c = config or DDPGConfig()
         self._rng = rng = np.random.default_rng(seed)
+        self.scaling = scaling or Scaling.none(n_o)
         self._networks = ActorCritic(n_o, n_a, c, rng)
         self._noise = OrnsteinUhlenbeck(n_a, c.noise_sigma, c.noise_theta, rng)
         self.replay = Replay(c.replay, n_o, n_a)
@@ -82,14 +86,19 @@ class DDPG:
             self._networks.actor.layers(),
             np.asarray(box.low, np.float32),
             np.asarray(box.high, np.float32),
+            scaling,
         )
 
     @classmethod
     def for_env(
-        cls, env: gymnasium.Env[Any, Any], config: DDPGConfig | None = None, seed: int = 0
+        cls,
+        env: gymnasium.Env[Any, Any],
+        config: DDPGConfig | None = None,
+        seed: int = 0,
+        scaling: Scaling | None = None,
     ) -> DDPG:
         """An agent for the spaces of ``env``; errors as for the class."""
-        return cls(env.observation_space, env.action_space, config, seed)
+        return cls(env.observation_space, env.action_space, config, seed, scaling)
 
     def __repr__(self) -> str:
         return f"DDPG({self.policy!r}, {self.updates} updates, {len(self.replay)} transitions)"
@@ -141,7 +150,8 @@ class DDPG:
                 finite.
         """
         self._check_env(env)
-        c = self.config
+        c, seen = self.config, self.scaling.seen
+        factor = c.reward_scale * self.scaling.reward
         returns: list[float] = []
         total = 0.0
         observation, _ = env.reset(seed=int(self._rng.integers(2**31)))
@@ -159,9 +169,8 @@ class DDPG:
                     f"step {step} gave the observation {following} and the reward {reward}: "
                     "the environment has left its valid range"
                 )
-            self.replay.add(
-                observation, normalised, c.reward_scale * float(reward), following, terminated
-            )
+            scaled = factor * float(reward)
+            self.replay.add(seen(observation), normalised, scaled, seen(following), terminated)
             total += float(reward)
             observation = following
             if len(self.replay) >= max(c.warm_up, 1):
@@ -192,10 +201,12 @@ class DDPG:
         """Add transitions to the replay as if they had been seen in ``learn``."""
         low, high = self.policy.low, self.policy.high
         normalised = 2 * (np.asarray(seen.actions, float) - low) / (high - low) - 1
-        scaled = self.config.reward_scale * np.asarray(seen.rewards, float)
-        self.replay.extend(
-            seen.observations, normalised, scaled, seen.next_observations, seen.terminated
+        factor = self.config.reward_scale * self.scaling.reward
+        scaled = factor * np.asarray(seen.rewards, float)
+        before, after = (
+            self.scaling.seen(rows) for rows in (seen.observations, seen.next_observations)
         )
+        self.replay.extend(before, normalised, scaled, after, seen.terminated)
 
     def networks(self) -> dict[str, NDArray[np.float32]]:
         """A copy of all networks, targets and optimiser moments by name, for ``restore``."""
@@ -217,6 +228,8 @@ class DDPG:
             replay: Include the transitions. Without them a loaded agent warms up again.
         """
         arrays = {**self._networks.arrays(), "low": self.policy.low, "high": self.policy.high}
+        if self.policy.scaling:
+            arrays |= self.scaling.arrays()
         if replay:
             arrays["replay"] = self.replay.stored()
         metadata = {
@@ -248,11 +261,12 @@ class DDPG:
         known = {field.name for field in dataclasses.fields(DDPGConfig)}
         settings = {name: value for name, value in metadata["config"].items() if name in known}
         config, n_o = DDPGConfig(**settings), metadata["observation_size"]
+        scaling = Scaling.taken_from(arrays, n_o)
         check_sizes(config, n_o, len(low), arrays)
         if low.dtype != np.float32 or high.dtype != np.float32 or not np.all(low <= high):
             raise ValueError("the bounds of the action are no float32, or the wrong way round")
         observed = gymnasium.spaces.Box(-np.inf, np.inf, (n_o,))
-        agent = cls(observed, gymnasium.spaces.Box(low, high), config)
+        agent = cls(observed, gymnasium.spaces.Box(low, high), config, scaling=scaling)
         agent.restore(arrays)
         if rows is not None:
             agent.replay.restore(rows, whole("position", metadata["position"], 0, config.replay))

@@ -16,6 +16,7 @@ from policy.ddpg import DDPG, Progress
 from policy.evaluate import Policy
 from policy.files import OtherForm, read_arrays
 from policy.replay import Seen
+from policy.scaling import Scaling
 
 OURS = "policy.DDPG"
 
@@ -93,7 +94,11 @@ class Algorithm:
         return off_policy_class(self.path)
 
     def make(
-        self, env: gymnasium.Env[Any, Any], seed: int, noise_sigma: float | None = None
+        self,
+        env: gymnasium.Env[Any, Any],
+        seed: int,
+        noise_sigma: float | None = None,
+        scaling: Scaling | None = None,
     ) -> Learner:
         """A learner that knows nothing yet.
 
@@ -102,15 +107,16 @@ class Algorithm:
             seed: Everything random follows from it.
             noise_sigma: Exploration noise of DDPG, if not that of its settings; other algorithms
                 explore in their own way.
+            scaling: Of what its networks see; by default none.
         """
         if self.path != OURS:
             from policy.stable_baselines import StableBaselines
 
-            return StableBaselines(self.kind(), self.options, env, seed)
+            return StableBaselines(self.kind(), self.options, env, seed, scaling)
         config = self.ddpg
         if noise_sigma is not None:
             config = dataclasses.replace(config, noise_sigma=noise_sigma)
-        return DDPG.for_env(env, config, seed)
+        return DDPG.for_env(env, config, seed, scaling)
 
     def load(self, path: Path, env: gymnasium.Env[Any, Any]) -> Learner:
         """A learner with what another one of this algorithm has saved; errors as ``DDPG.load``."""

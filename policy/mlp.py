@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from policy.files import content_of, read_arrays, write_arrays
+from policy.scaling import Scaling
 
 FORMAT = "simgap.policy.1"
 
@@ -22,11 +23,13 @@ class MlpPolicy:
             ``weight3`` (n_a, n_2), ``bias3``; float32.
         low: Lowest action, shape (n_a,).
         high: Highest action, shape (n_a,).
+        scaling: Of observations, before the first layer; by default none.
     """
 
     weights: dict[str, NDArray[np.float32]]
     low: NDArray[np.float32]
     high: NDArray[np.float32]
+    scaling: Scaling | None = None
 
     def __post_init__(self) -> None:
         # One layout, whether learnt, copied or loaded: another one would round differently.
@@ -60,13 +63,14 @@ class MlpPolicy:
 
     def normalised(self, observation: ArrayLike) -> NDArray[np.float32]:
         """Action(s) in [-1, 1]; arguments and errors as in ``act``."""
-        x = np.asarray(observation, np.float32)
+        x = np.asarray(observation)
         w = self.weights
         if x.ndim not in (1, 2) or x.shape[-1] != self.observation_size:
             raise ValueError(
                 f"observation has shape {x.shape}, expected ({self.observation_size},) "
                 f"or (n, {self.observation_size})"
             )
+        x = np.asarray(self.scaling.seen(x) if self.scaling else x, np.float32)
         x = x @ w["weight1"].T
         x += w["bias1"]
         np.maximum(x, 0, out=x)
@@ -86,12 +90,12 @@ class MlpPolicy:
     def copy(self) -> MlpPolicy:
         """The same policy with weights of its own."""
         weights = {name: value.copy(order="K") for name, value in self.weights.items()}
-        return MlpPolicy(weights, self.low.copy(), self.high.copy())
+        return MlpPolicy(weights, self.low.copy(), self.high.copy(), self.scaling)
 
     def save(self, path: str | Path) -> None:
         """Write a safetensors file; it appears whole or not at all."""
         tensors = {**self.weights, "low": self.low, "high": self.high}
-        write_arrays(path, FORMAT, tensors, {})
+        write_arrays(path, FORMAT, tensors | (self.scaling.arrays() if self.scaling else {}), {})
 
     @classmethod
     def load(cls, path: str | Path) -> MlpPolicy:
@@ -104,8 +108,9 @@ class MlpPolicy:
         arrays, _ = read_arrays(path, FORMAT)
         with content_of(path, "policy"):
             low, high = arrays.pop("low"), arrays.pop("high")
+            scaling = Scaling.taken_from(arrays, arrays["weight1"].shape[-1])
             _check_shapes(arrays, low, high)
-        return cls(arrays, low, high)
+        return cls(arrays, low, high, scaling)
 
 
 def _check_shapes(

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from policy.ddpg import Progress
 from policy.files import write_arrays
 from policy.replay import Seen
+from policy.scaling import ScaledEnv, Scaling
 
 if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
@@ -64,6 +65,7 @@ class StableBaselines:
             noise as a share of the actions' bounds, for DDPG and TD3 0.1 unless they say otherwise.
         env: For the spaces.
         seed: Seed of everything random; the library also sets the global generators by it.
+        scaling: Of what the networks see; by default none.
 
     Attributes:
         model: The algorithm itself.
@@ -75,6 +77,7 @@ class StableBaselines:
         options: Mapping[str, Any],
         env: gymnasium.Env[Any, Any],
         seed: int = 0,
+        scaling: Scaling | None = None,
     ) -> None:
         from stable_baselines3 import TD3
         from stable_baselines3.common.noise import NormalActionNoise
@@ -88,6 +91,7 @@ class StableBaselines:
             zeros = np.zeros(env.action_space.shape or ())
             chosen["action_noise"] = NormalActionNoise(zeros, zeros + sigma)
         self._seed = seed % 2**32
+        self.scaling = scaling or Scaling.none(int(np.prod(env.observation_space.shape or ())))
         self.model: Any = kind(env=env, seed=self._seed, **chosen)
         self._remembered = 0
 
@@ -98,7 +102,7 @@ class StableBaselines:
 
     def act(self, observation: ArrayLike) -> NDArray[Any]:
         """Action(s) without noise: shape (n_o,) or (n, n_o) in, (n_a,) or (n, n_a) out."""
-        return self.model.predict(np.asarray(observation), deterministic=True)[0]
+        return self.model.predict(self.scaling.seen(observation), deterministic=True)[0]
 
     @property
     def updates(self) -> int:
@@ -125,7 +129,7 @@ class StableBaselines:
         if self._remembered:
             self.model.learning_starts = 0
         if steps:
-            self.model.set_env(env)
+            self.model.set_env(ScaledEnv(env, self.scaling))
             # What happened to the global generators since the start shall not matter.
             self._seed = (self._seed + 1) % 2**32
             self.model.set_random_seed(self._seed)
@@ -135,8 +139,9 @@ class StableBaselines:
         """Add transitions to the replay; of more than fit the last remain."""
         memory: Any = self.model.replay_buffer
         rows = zip(
-            np.asarray(seen.observations), np.asarray(seen.next_observations),
-            self.model.policy.scale_action(np.asarray(seen.actions)), np.asarray(seen.rewards),
+            self.scaling.seen(seen.observations), self.scaling.seen(seen.next_observations),
+            self.model.policy.scale_action(np.asarray(seen.actions)),
+            self.scaling.reward * np.asarray(seen.rewards),
             np.asarray(seen.terminated), strict=True,
         )  # fmt: skip
         for observation, following, action, reward, ended in rows:
@@ -152,7 +157,7 @@ class StableBaselines:
         found = {name: value.detach().cpu().numpy().copy() for name, value in state.items()}
         if (entropy := getattr(self.model, _ENTROPY, None)) is not None:
             found[_ENTROPY] = entropy.detach().cpu().numpy().copy()
-        return found
+        return found | self.scaling.arrays()
 
     def restore(self, networks: dict[str, NDArray[Any]]) -> None:
         """Return to a copy from ``networks``.
@@ -162,6 +167,8 @@ class StableBaselines:
         """
         import torch
 
+        networks = dict(networks)
+        self.scaling = Scaling.taken_from(networks, len(self.scaling.middle))
         tensors = {name: torch.as_tensor(value) for name, value in networks.items()}
         entropy = tensors.pop(_ENTROPY, None)
         try:

@@ -10,15 +10,17 @@ from residual.estimator import NotFinite
 from sims.simulator import Array, Simulator
 
 # A difference far outside its data could throw the state anywhere; it is kept within this many
-# typical magnitudes so that a bad model ends in a bad return and not in infinities.
-_LIMIT = 8.0
+# typical magnitudes so that a bad model ends in a bad return and not in infinities. What a channel
+# says is typical may be far from how it moves: rates of so many times what was seen are allowed.
+_LIMIT, _SEEN = 8.0, 4.0
 
 
 class CorrectedSimulator(Simulator):
     """A simulator plus the difference model learnt for it, itself a simulator.
 
-    It stays finite: rates are held within 8 times their scale, and other channels within so much
-    of where they were one step before. What is no number stays as it was.
+    It stays finite: rates are held within 8 times their scale, or 4 times the largest in the data
+    if that is more, and other channels within 8 times their scale, or their range in the data, of
+    where they were one step before. What is no number stays as it was.
 
     Args:
         simulator: The idealised simulator f.
@@ -46,10 +48,12 @@ class CorrectedSimulator(Simulator):
         same = hasattr(estimator, "corrected") and estimator.simulator is simulator
         self._whole: Simulator | None = estimator.corrected() if same else None
         channels = simulator.state_channels
-        self._limits = np.array(
-            [np.inf if c.kind == "memory" else _LIMIT * c.scale for c in channels]
-        )
         self._rates = np.array([channel.kind == "rate" for channel in channels])
+        low, high = difference.seen_
+        fastest = _SEEN * np.maximum(np.abs(low), np.abs(high))
+        reach = np.where(self._rates, fastest, high - low)
+        typical = np.array([np.inf if c.kind == "memory" else c.scale for c in channels])
+        self._limits = np.maximum(_LIMIT * typical, reach)
 
     def __repr__(self) -> str:
         return f"CorrectedSimulator({self.simulator.name} + {self.difference!r})"

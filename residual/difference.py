@@ -36,6 +36,7 @@ class DifferenceModel:
         dt: Control period in s of the simulator; the difference holds for no other.
         state_channels, action_channels: Those of the simulator.
         has_std: Whether ``predict`` can return a standard deviation.
+        seen_: Lowest and highest states of the data, shape (2, n_s); zeros if that is not known.
     """
 
     def __init__(self, estimator: Any, simulator: Simulator) -> None:
@@ -56,6 +57,7 @@ class DifferenceModel:
         action_channels: tuple[Channel, ...],
         mean: Array,
         scale: Array,
+        seen: Array | None = None,
     ) -> Self:
         """A fitted model without a simulator, from a fitted estimator and what it was fitted for.
 
@@ -64,11 +66,14 @@ class DifferenceModel:
             dt: Control period in s.
             state_channels, action_channels: Of the simulator it was fitted for.
             mean, scale: Of the targets, per state channel, shape (n_s,).
+            seen: Lowest and highest states of the data, shape (2, n_s).
         """
         model = cls.__new__(cls)
         model.simulator = None
         model._describe(estimator, dt, state_channels, action_channels)
         model.estimator_, model.mean_, model.scale_ = estimator, mean, scale
+        if seen is not None:
+            model.seen_ = seen
         return model
 
     def _describe(
@@ -88,6 +93,7 @@ class DifferenceModel:
         self.features.fit(np.zeros((1, width)))
         self._low = np.array([channel.low for channel in self.action_channels])
         self._high = np.array([channel.high for channel in self.action_channels])
+        self.seen_ = np.zeros((2, len(self.state_channels)))
 
     def fit(self, transitions: Transitions) -> Self:
         """Learn from observed transitions of the true system.
@@ -112,6 +118,8 @@ class DifferenceModel:
     def fit_difference(self, states: ArrayLike, actions: ArrayLike, y: ArrayLike) -> Self:
         """Learn from differences already computed, shapes (n, n_s), (n, n_a) and (n, n_s)."""
         X, y = self._inputs(states, actions), np.asarray(y, float)
+        rows = np.asarray(states, float)
+        self.seen_ = np.stack([rows.min(axis=0), rows.max(axis=0)])
         estimator: Any
         if self.raw:
             self.mean_, self.scale_ = np.zeros(y.shape[1]), np.ones(y.shape[1])

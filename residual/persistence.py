@@ -66,6 +66,7 @@ def save(model: Any, path: str | Path) -> None:
             "action_channels": [dataclasses.asdict(channel) for channel in model.action_channels],
             "mean": model.mean_.tolist(),
             "scale": model.scale_.tolist(),
+            "seen": model.seen_.tolist(),
         }
     name = type(estimator).__name__
     if not is_ours(estimator):
@@ -183,11 +184,22 @@ def _difference(header: dict[str, Any], estimator: Any) -> Any:
         tuple(map(_channel, fields["action_channels"])),
         np.array(fields["mean"], float),
         np.array(fields["scale"], float),
+        _seen(fields),
     )
     model.predict(
         np.zeros((1, len(model.state_channels))), np.zeros((1, len(model.action_channels)))
     )
     return model
+
+
+def _seen(fields: dict[str, Any]) -> NDArray | None:
+    """Lowest and highest states of the data; files of earlier versions do not tell."""
+    if "seen" not in fields:
+        return None
+    seen = np.array(fields["seen"], float)
+    if seen.shape != (2, len(fields["state_channels"])) or not np.isfinite(seen).all():
+        raise ValueError(f"seen has shape {seen.shape}, expected the lowest and highest states")
+    return seen
 
 
 def _channel(fields: dict[str, Any]) -> Channel:

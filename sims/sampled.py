@@ -72,7 +72,7 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if number and not np.isclose(period, nominal.dt):  # type: ignore[arg-type]
             raise Unsound(
                 f"the true environment's control period is {period:g} s, that of {nominal.name} "
-                f"{nominal.dt:g} s: make them one"
+                f"{nominal.dt:g} s: make them one, such as by dt of the simulator"
             )
         self._name = f"the true environment {type(env.unwrapped).__name__}"
         self._angles = np.array([channel.angle for channel in nominal.state_channels])
@@ -98,7 +98,13 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         assert isinstance(box, gymnasium.spaces.Box)
         held = np.clip(np.asarray(action, float), box.low, box.high)
         dtype = self.env.action_space.dtype
-        observation, _, ended, cut, info = self.env.step(held.astype(dtype))
+        stepped = self.env.step(held.astype(dtype))
+        if len(stepped) != 5:
+            raise Unsound(
+                f"{self._name}: step returned {len(stepped)} values, expected Gymnasium's five: "
+                "observation, reward, terminated, truncated, info"
+            )
+        observation, _, ended, cut, info = stepped
         self._steps += 1
         reached = self._read(observation, info)
         turned = wrap(reached - self._state)

@@ -19,6 +19,7 @@ A killed run continues where it stopped when the same command is given again.
 from __future__ import annotations
 
 import dataclasses
+import inspect
 
 from policy.learner import imported
 from sims.system import System
@@ -50,6 +51,12 @@ def system_of(trial: LearnTrial) -> System:
         raise ValueError("which system? Give --system my_file.SYSTEM, a sims.System")
     found = imported(trial.system, "system")
     if not isinstance(found, System) and callable(found):
+        try:
+            inspect.signature(found).bind()
+        except TypeError as error:
+            raise ValueError(
+                f"{trial.system} cannot be called without arguments: {error}"
+            ) from None
         found = found()
     if not isinstance(found, System):
         raise ValueError(
@@ -59,7 +66,7 @@ def system_of(trial: LearnTrial) -> System:
     return found
 
 
-STUDY = Study("learn", __doc__, LearnTrial, system_of, "residual.GaussianProcess")
+STUDY = Study("learn", __doc__, LearnTrial, system_of, "residual.GaussianProcess", scaled=True)
 main = command(STUDY)
 
 

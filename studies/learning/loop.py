@@ -154,6 +154,7 @@ def learn_by_difference(
         progress or Bars(),
         replay,
         uncertainty_penalty,
+        scaled=True,
     )
     return run_loop(loop, budget)
 

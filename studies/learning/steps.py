@@ -13,6 +13,7 @@ from sklearn.base import BaseEstimator
 
 from policy.evaluate import collect
 from policy.learner import Algorithm
+from policy.scaling import Scaling
 from policy.selection import Point
 from residual.corrected import CorrectedSimulator
 from residual.difference import DifferenceModel
@@ -64,6 +65,8 @@ class Steps:
         uncertainty_penalty: See ``residual.uncertainty_penalty``.
         smoothing: Learn the difference from smoothed paths where states are measured, not from
             one step to the next.
+        scaled: Whether observations and rewards are brought to a size that networks learn from,
+            see ``Scaling``, measured on the simulator at hand.
         described: Settings behind the system that its parts do not tell, plain values.
     """
 
@@ -76,6 +79,7 @@ class Steps:
     replay: ReplayRule = "first"
     uncertainty_penalty: float = 0.0
     smoothing: bool = True
+    scaled: bool = False
     described: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     def collect(
@@ -210,7 +214,8 @@ class Steps:
             for _ in range(2)
         )
         sigma = self.system.cold_noise_sigma if start is None else None
-        learner = self.algorithm.make(env, stream(self.seed, "train", kind, update), sigma)
+        seed = stream(self.seed, "train", kind, update)
+        learner = self.algorithm.make(env, seed, sigma, self._scaling)
         recorder = None
         if isinstance(start, WarmStart):
             if start.rows:
@@ -265,6 +270,12 @@ class Steps:
         return {"estimator": settings_of(self.estimator)}
 
     @cached_property
+    def _scaling(self) -> Scaling | None:
+        # Of no seed: it is the system's. All policies of a trial are made with one.
+        env = self.system.environment(self.system.nominal)
+        return Scaling.measured(env) if self.scaled else None
+
+    @cached_property
     def _common(self) -> dict[str, Any]:
         """What every step depends on."""
         return {
@@ -272,6 +283,7 @@ class Steps:
             "described": dict(self.described),
             "algorithm": settings_of(self.algorithm),
             "seed": self.seed,
+            "scaled": self.scaled,
         }
 
     def _kept(self, name: str, settings: Any, compute: Any, load: Any, *code: Any) -> Any:

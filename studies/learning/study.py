@@ -84,6 +84,7 @@ class Study:
         trial: Settings of one trial, a dataclass that extends ``Trial``.
         system: The system of a trial.
         estimator: Class path of the default estimator.
+        scaled: Whether policies see observations and rewards scaled, see ``Steps``.
     """
 
     name: str
@@ -91,6 +92,7 @@ class Study:
     trial: type[Trial]
     system: Callable[[Any], System]
     estimator: str = "residual.DropoutNet"
+    scaled: bool = False
 
     @property
     def settings(self) -> list[str]:

@@ -55,6 +55,7 @@ def run_trial(
         trial.replay,
         trial.uncertainty_penalty,
         trial.smoothing,
+        study.scaled,
         study.describe(config),
     )
     # What was there before anything ran, not what running may have changed.

@@ -83,7 +83,8 @@ def guarded(
             except (OSError, Unsound) as error:
                 if debug:
                     traceback.print_exc()
-                fail(str(error))
+                place = users_code(error)
+                fail(f"{error} ({place})" if place else str(error))
             except Exception as error:
                 if debug:
                     traceback.print_exc()

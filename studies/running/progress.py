@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Protocol
 
 from tqdm.auto import tqdm
+
+from studies.running.stream import stderr
 
 
 class Advance(Protocol):
@@ -35,13 +36,13 @@ class Progress(Protocol):
 
 
 class Bars:
-    """Progress bars: in a notebook its own, else on stderr; quiet lines without a terminal."""
+    """Progress bars: in a notebook its own, else on stderr, or lines there without a terminal."""
 
     @contextmanager
     def task(self, title: str, total: int) -> Iterator[Advance]:
         """A bar of ``total`` units."""
         with tqdm(
-            total=total, desc=f"{title:<34}", file=sys.stderr, leave=True, mininterval=0.5,
+            total=total, desc=f"{title:<34}", file=stderr(), leave=True, mininterval=0.5,
             bar_format="{desc} {percentage:3.0f}% |{bar:20}| {elapsed}<{remaining} {postfix}",
         ) as bar:  # fmt: skip
 

@@ -20,6 +20,7 @@ from tqdm import tqdm
 
 from simgap_files import atomic_write_json, read_json
 from studies.running.progress import Advance
+from studies.running.stream import stderr
 
 STATUS = "status.json"
 WRITE_EVERY = 10.0  # seconds; hundreds of trials share a file system
@@ -79,7 +80,7 @@ class TrialsView:
         self._failed = 0
         self._bar = tqdm(
             total=total, initial=total - len(self._waiting), desc=f"{total} trials",
-            file=sys.stderr, mininterval=0.5, smoothing=0, position=0,
+            file=stderr(), mininterval=0.5, smoothing=0, position=0,
             bar_format="{desc} |{bar:20}| {n} done{postfix}, {elapsed}<{remaining}",
         )  # fmt: skip
         self._lines: list[tqdm[Any]] = []

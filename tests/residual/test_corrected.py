@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from residual import CorrectedSimulator, DifferenceModel, Linear, accuracy_along
+from residual import CorrectedSimulator, DifferenceModel, Linear, accuracy_along, load, save
 from residual.accuracy import uniform_rollouts, usual_steps
 from residual.trajectories import Transitions
 from sims.checks import check_simulator
 from sims.effects import ActuatorLag
+from sims.equations import FirstOrderSystem
 from sims.pendulum import Pendulum
+from sims.simulator import Channel
 
 
 def sampled(system, n, seed=0):
@@ -63,6 +65,32 @@ def test_a_wrong_difference_never_leaves_the_numbers(wrong):
     # Positions, too, do not run faster than eight of their scales a step.
     assert np.abs(np.diff(states[:, :, 0], axis=1)).max() <= 8.0
     assert simulator.held == 3 * 400
+
+
+def test_what_was_seen_is_never_held_whatever_the_scale(tmp_path):
+    """Scales are optional, and degrees per second move by hundreds."""
+
+    class Degrees(FirstOrderSystem):
+        dt = 0.01
+        state_channels = (
+            Channel("angle", "deg", "position"),
+            Channel("speed", "deg/s", "rate", rate_of="angle"),
+        )
+        action_channels = (Channel("volts", "V", "input", low=-12.0, high=12.0),)
+
+        def derivative(self, x, u, p):
+            return np.stack([x[:, 1], 900 * u[:, 0] - 9 * x[:, 1]], axis=1)
+
+    rng = np.random.default_rng(0)
+    states, actions = rng.uniform(-800, 800, (50, 2)), rng.uniform(-12, 12, (50, 1))
+    reached = Degrees().step(states, actions) + np.array([0.1, 5.0])
+    data = Transitions(states, actions, reached, np.zeros(50, int))
+    fitted = DifferenceModel(Linear(), Degrees()).fit(data)
+    save(fitted, tmp_path / "difference.safetensors")
+    for model in (fitted, load(tmp_path / "difference.safetensors", Degrees())):
+        corrected = CorrectedSimulator(Degrees(), model)
+        np.testing.assert_allclose(corrected.step(states, actions), reached, rtol=1e-3)
+        assert corrected.held == 0
 
 
 def test_a_good_difference_is_never_held(corrected):

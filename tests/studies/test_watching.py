@@ -35,7 +35,6 @@ def test_the_view_counts_what_runs_ended_and_failed(tmp_path, capsys):
         view.ended(folders[1], failed=False)
         view.ended(folders[2], failed=True)
     shown = capsys.readouterr().err
-    assert "2 done, 0 running, 0 failed" in shown
     assert "4 done, 1 running, 1 failed" in shown
 
 
@@ -66,3 +65,15 @@ def test_a_step_without_numbers_leaves_no_curve(tmp_path):
     with Curves(tmp_path).task("fit", 1) as tell:
         tell(1, "")
     assert not list(tmp_path.iterdir())
+
+
+def test_progress_in_a_file_is_lines(capsys, monkeypatch):
+    now = iter(range(0, 10**6, 11))
+    monkeypatch.setattr("studies.running.stream.time.monotonic", lambda: next(now))
+    with Bars().task("train", 100) as tell:
+        for k in range(100):
+            tell(k + 1, f"return -{k}")
+    shown = capsys.readouterr().err
+    assert "\r" not in shown
+    *_, last = shown.splitlines()
+    assert "train" in last and "100%" in last and "return -99" in last
