@@ -30,7 +30,7 @@ def refuse_unsound_task(task: Task, simulator: Simulator) -> None:
     name = type(task).__name__
     names = [channel.name for channel in physical(simulator.state_channels)]
     fits = f"{name} does not fit {simulator.name} ({', '.join(names)})"
-    horizon = getattr(task, "horizon", None)
+    horizon: Any = getattr(task, "horizon", None)
     whole = isinstance(horizon, int | np.integer) and not isinstance(horizon, bool)
     if not whole or horizon < 1:
         raise Unsound(f"{name}.horizon is {horizon!r}, expected a whole number of steps from 1")

@@ -37,7 +37,7 @@ class Mean:
 
     def __str__(self) -> str:
         if self.count == 1:
-            return f"{self.value:.5g}"
+            return plain(self.value)
         larger = max(abs(self.value), float(np.nan_to_num(self.half_width)))
         if abs(self.value) >= 100:
             return self._decimals(0)
@@ -73,3 +73,8 @@ def mean(values: Sequence[float]) -> Mean:
         standard_error = sample.std(ddof=1) / np.sqrt(len(sample))
         half = float(stats.t.ppf(0.975, len(sample) - 1) * standard_error)
     return Mean(float(sample.mean()), half, float(sample.min()), len(sample))
+
+
+def plain(value: float) -> str:
+    """A return as people write it: five digits, and of what is large the units."""
+    return f"{value:.0f}" if 1e5 <= abs(value) < 1e9 else f"{value:.5g}"

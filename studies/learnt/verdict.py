@@ -14,7 +14,7 @@ import pandas as pd
 
 from studies.learnt.errors import by_group, model_errors, no_gap
 from studies.learnt.pairs import above, starts
-from studies.learnt.statistics import Mean, mean
+from studies.learnt.statistics import Mean, mean, plain
 from studies.learnt.words import NEAR, POLICY_WORDS, duration
 from studies.reporting import KeyValues, Section, Verdict
 
@@ -104,7 +104,9 @@ def headline(
     start, learnt = _value(before), kinds.get("difference", kinds.get("corrected"))
     if learnt is None:
         good = target is not None and before["return_true"].min() >= target
-        says = f"Trained on the simulator alone, the policy returns {start:.5g} on the true system."
+        says = (
+            f"Trained on the simulator alone, the policy returns {plain(start)} on the true system."
+        )
         return [Verdict(says, tone="neutral" if target is None else "good" if good else "bad")]
     chosen, reached = _chosen(learnt, target)
     samples, estimator, update = chosen.iloc[0][_PLACE]
@@ -126,13 +128,14 @@ def headline(
     )
     by = f"{estimator}, update {update}" if "difference" in kinds else POLICY_WORDS["corrected"]
     needed = f"{samples} true samples, {duration(samples * about['dt'])}"
-    went = f"On the true system the return went from {start:.5g} to {value:.5g} ({by}, {needed})."
+    gone = f"from {plain(start)} to {plain(value)} ({by}, {needed})"
+    went = f"On the true system the return went {gone}."
     alone = _value(control) if control is not None else None
     text = [went] if found.same else []
     text += [_of_gain(found, starts(chosen)), *_of_target(found, target)]
     text += [*_of_cause(found, alone), *_of_rest(found, true, best)]
     tiles = {
-        "idealised policy": f"{start:.5g}", f"after update {update}": f"{value:.5g}",
+        "idealised policy": plain(start), f"after update {update}": plain(value),
         "gain": str(found.gain), "true interaction": duration(samples * about["dt"]),
     }  # fmt: skip
     if found.error is not None and not found.same:
@@ -173,11 +176,11 @@ def _of_target(found: Evidence, target: float | None) -> list[str]:
 
 def _of_cause(found: Evidence, control: float | None) -> list[str]:
     """What the control says; nothing where there is nothing to explain."""
-    if found.worth is not None:
+    if found.worth is not None and control is not None:
         by = "seed by seed" if found.seeds > 1 else "in pairs"
         return [
-            f"As much training without a difference model ends at {control:.5g}; {by} the model is "
-            f"worth {found.worth}."
+            f"As much training without a difference model ends at {plain(control)}; {by} the "
+            f"model is worth {found.worth}."
         ]
     if found.same or found.unchanged or found.gain.low <= 0:
         return []
@@ -198,7 +201,7 @@ def _of_rest(found: Evidence, true: float | None, best: float | None) -> list[st
             f"{found.worst}: the gap is not closed, whatever the return."
         )
     if true is not None:
-        text.append(f"Learnt on the true system: {true:.5g}.")
+        text.append(f"Learnt on the true system: {plain(true)}.")
     if best is not None:
         text.append(f"The best that is possible is {best:.0f}.")
     return text

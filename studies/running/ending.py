@@ -83,7 +83,8 @@ def guarded(
             except (OSError, Unsound) as error:
                 if debug:
                     traceback.print_exc()
-                place = users_code(error)
+                # One that names a file tells enough.
+                place = "" if getattr(error, "filename", None) else users_code(error)
                 fail(f"{error} ({place})" if place else str(error))
             except Exception as error:
                 if debug:

@@ -100,6 +100,17 @@ def test_other_actions_or_another_period_are_refused():
         SampledEnv(Foreign(dt=0.1), Pendulum(), SwingUp())
 
 
+def test_an_environment_of_the_old_gym_is_named():
+    class Old(Foreign):
+        def step(self, action):
+            return super().step(action)[:4]
+
+    env = SampledEnv(Old(), Pendulum(), SwingUp())
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"Old: step returned 4 values.*terminated, truncated"):
+        env.step(np.zeros(1))
+
+
 def test_parts_that_do_not_fit_are_one_line():
     class Cart(EquationOfMotion):
         state_channels = (

@@ -32,6 +32,7 @@ def greedy(states, actions, next_states):
     [
         ({"horizon": 0}, r"horizon is 0, expected a whole number of steps from 1"),
         ({"horizon": 2.5}, r"horizon is 2.5"),
+        ({"horizon": None}, r"horizon is None"),
         ({"start": lambda rng: np.zeros(1)}, r"start returned shape \(1,\), expected \(2,\).*rate"),
         ({"start": lambda rng: np.zeros(4)}, r"start returned shape \(4,\)"),
         ({"start": lambda rng: np.array([np.nan, 0.0])}, "expected finite numbers"),
