@@ -175,4 +175,5 @@ def _worst(search: Search, key: Key, chosen: Key) -> str:
     windows, samples = blocks.windows, search.fitter.samples
     first = int((blocks.block == number).argmax())
     start = samples.times[windows.index[first, 0]]
-    return f", most at {start:.3g} s of {samples.names[windows.run[first]]}"
+    digits = 6 if start < 1e6 else 12  # of a date, counted from 1970
+    return f", most at {start:.{digits}g} s of {samples.names[windows.run[first]]}"
