@@ -118,6 +118,8 @@ def confirm(
             made = [dataclasses.replace(c, rivals=(*c.rivals, *alone)) for c in made]
         blocks = len(search.fitter.blocks)
         lost = [c for c in made if not nameable(search, c, blocks, found.adequate)]
+        if not lost and key in search.refused:  # without those that went, it cannot be right
+            lost = made
         if not lost:
             made = allow_for_parameters(
                 search, key, made, found.adequate, parameter_tolerance, until

@@ -76,10 +76,16 @@ def _better_fit(search: Search, keys: list[Key]) -> Key:
     """The set that forecasts best, or one that is as good within chance, of sizes that surprise
     less, and fits better."""
     best = min(keys, key=search.error)
-    near = [
-        k for k in keys if as_good(search, k, best) and search.error(k) < NEAR * search.error(best)
-    ]
+    near = [k for k in keys if _does_as_well(search, k, best)]
     return min(near or [best], key=lambda key: (search.surprises(key), search.tried[key].merit))
+
+
+def _does_as_well(search: Search, key: Key, best: Key) -> bool:
+    """Whether a set is as good as the best within chance, or surprises less and is next to it."""
+    error, least = search.error(key), search.error(best)
+    if search.surprises(key) < search.surprises(best) and error <= (1 + ALIKE) * least:
+        return True
+    return as_good(search, key, best) and error < NEAR * least
 
 
 def _plainer(search: Search, key: Key, among: list[Key]) -> Key:
@@ -89,8 +95,7 @@ def _plainer(search: Search, key: Key, among: list[Key]) -> Key:
         for k in among
         if search.numbers(k) <= search.numbers(key)
         and search.surprises(k) < search.surprises(key)
-        and as_good(search, k, key)
-        and search.error(k) < NEAR * search.error(key)
+        and _does_as_well(search, k, key)
     ]
     return _better_fit(search, near) if near else key
 
@@ -170,4 +175,5 @@ def _worst(search: Search, key: Key, chosen: Key) -> str:
     windows, samples = blocks.windows, search.fitter.samples
     first = int((blocks.block == number).argmax())
     start = samples.times[windows.index[first, 0]]
-    return f", most at {start:.3g} s of {samples.names[windows.run[first]]}"
+    digits = 6 if start < 1e6 else 12  # of a date, counted from 1970
+    return f", most at {start:.{digits}g} s of {samples.names[windows.run[first]]}"

@@ -54,7 +54,7 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
     used = int((np.abs(residual) > 0).sum())
     freedom = max(used - fit.basis.shape[2] * len(residual) - taken, 1)
     variance = max(1.0, float((residual**2).sum()) / freedom)
-    plain = variance * np.diag(inverse)
+    plain = variance * np.maximum(np.diag(inverse), 0.0)  # of a matrix that is all but singular
     count = len(blocks)
     if count <= taken + 1:
         return np.sqrt(plain) / scale

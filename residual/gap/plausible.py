@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.fitting import Fit, Fitter
-from residual.gap.intervals import deviations
+from residual.gap.intervals import at_bound, deviations
 from residual.gap.model import Model
 from residual.gap.samples import Samples
 from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
@@ -80,6 +80,16 @@ def nearly(fit: Fit, number: int, fitter: Fitter) -> bool:
     reach = np.where(fit.model.owner == number, half, 0.0)
     nearer = fit.theta - np.clip(fit.theta, -reach, reach)
     return not absurd(fit.model, nearer, fitter.samples)[1]
+
+
+def surprises(fit: Fit) -> int:
+    """Effects of a fitted set that are larger than their kind usually is, or end at a bound.
+
+    What a bound has stopped is no optimum: the data would have it elsewhere.
+    """
+    ended = {int(fit.model.owner[j]) for j in range(len(fit.theta)) if at_bound(fit, j)}
+    own = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
+    return sum(effect.surprising or i in ended for i, effect in enumerate(own))
 
 
 def _acts_on(effect: Effect, actuator: str) -> bool:

@@ -19,7 +19,7 @@ from residual.gap.effort import Effort
 from residual.gap.fitting import UNCONVERGED, Fit, Fitter
 from residual.gap.global_search import GlobalSearch
 from residual.gap.model import Model
-from residual.gap.plausible import absurd, nearly
+from residual.gap.plausible import absurd, nearly, surprises
 from residual.gap.screening import Signatures, signatures, trials
 from residual.gap.validation import Validated, validate
 from sims.host import HostSimulator
@@ -135,9 +135,8 @@ class Search:
         return max(3, len(self.fitter.blocks.windows) // 2)
 
     def surprises(self, key: Key) -> int:
-        """Effects of a set that are larger than their kind usually is."""
-        bound = self.tried[key].model.bind(self.tried[key].theta).effects
-        return sum(effect.surprising for effect in bound[len(self.simulator.effects) :])
+        """Effects of a set that are larger than their kind usually is, or end at a bound."""
+        return surprises(self.tried[key])
 
     def usable(self) -> list[Key]:
         """Sets that converged and may be right."""

@@ -89,11 +89,13 @@ def _all(
     states[1 : 1 + len(moves)] += moves[:, None, :]
     after = model.advance(samples, states, thetas, rows)
     base = after[0]
-    if by_state is None:
-        by_state = np.stack([(after[1 + i] - base) / moves[i, i] for i in range(width)], axis=-1)
     by_knob = np.zeros((n, width, p))
     # A trial that runs away loses later on.
     with np.errstate(over="ignore", invalid="ignore"):
+        if by_state is None:
+            by_state = np.stack(
+                [(after[1 + i] - base) / moves[i, i] for i in range(width)], axis=-1
+            )
         for j in range(p):
             by_knob[:, :, j] = (after[1 + len(moves) + j] - base) / up[j]
     shown_by_state, shown_by_knob = np.ones((n, width)), np.zeros((n, width, p))

@@ -150,6 +150,7 @@ def best_forecasts(search: Search, key: Key) -> Array:
     samples, windows = fitter.samples, fitter.blocks.windows
     seen = samples.seen[windows.index][..., samples.measured]
     usual = np.sqrt(np.nanmean(search.before.foretold.squares, axis=0))
+    usual = np.where(usual > 0, usual, np.inf)  # of a channel that is hardly ever measured
     everywhere = np.zeros(len(windows), np.int64)
 
     def errors(theta: Array) -> Array:

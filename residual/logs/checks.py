@@ -254,11 +254,11 @@ def _speeds(times: Array, values: Array, span: int = 3) -> Array:
     """Mean speeds over ``span`` samples: noise counts less, and a fast swing still shows.
 
     Time stamps that come late, and then in a bunch, make nothing fast, and neither does an angle
-    that is cut at half a turn.
+    that is cut at half a turn, or at a whole one as a compass is.
     """
     good = np.isfinite(values)
     times, values = times[good], values[good]
-    if values.size and np.abs(values).max() < 1.01 * np.pi:
+    if values.size and np.ptp(values) < 1.01 * 2 * np.pi:
         values = np.unwrap(values)
     span = min(span, max(1, len(times) // 4))
     passed = times[span:] - times[:-span]

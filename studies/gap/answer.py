@@ -11,12 +11,14 @@ from studies.gap.words import (
     KINDS,
     ahead,
     capitalized,
+    duration_text,
     effect_name,
     known_effects,
     listed,
     names_of,
     number_text,
     percent,
+    plain,
     quantity_text,
     rounded,
     unit_text,
@@ -71,7 +73,7 @@ def headline(verdict: Verdict, result: GapResult) -> str:
         total = rounded(float(parameter.value) + change.value, half)
         return (
             f"{name}: {number_text(change, sign=True)}, so {total}"
-            f"{unit_text(change.unit)} in place of {float(parameter.value):g}."
+            f"{unit_text(change.unit)} in place of {plain(float(parameter.value))}."
         )
     numbers = ", ".join(_named(field, number) for field, number in verdict.parameters.items())
     if verdict.family:
@@ -201,7 +203,7 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
         times = gap.after.value / max(gap.noise_floor.value, 1e-300)
         found = [f"nothing of the library explains it: forecasts err {times:.3g} times as by noise"]
     if gap.blocks < TOO_FEW and not result.effects:
-        more = quantity_text((TOO_FEW - gap.blocks) * gap.horizon_s, "s")
+        more = duration_text((TOO_FEW - gap.blocks) * gap.horizon_s)
         found.append(
             f"nothing is named from {gap.blocks} {_blocks(gap)} of data, {TOO_FEW} are needed: "
             f"log some {more} more, or set a shorter --horizon"
@@ -219,7 +221,7 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
 def provisional(result: GapResult) -> str:
     """Why an answer is provisional, and what would do."""
     gap = result.gap
-    more = quantity_text((FEW - gap.blocks) * gap.horizon_s, "s")
+    more = duration_text((FEW - gap.blocks) * gap.horizon_s)
     return (
         f"provisional: there are {gap.blocks} {_blocks(gap)} of data to confirm it, {FEW} would "
         f"do (some {more} more)"

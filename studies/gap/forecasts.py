@@ -13,6 +13,7 @@ from studies.gap.figures import lags, profile, rollout, shrinking
 from studies.gap.words import (
     CROSS_VALIDATED,
     ahead,
+    duration_text,
     percent,
     quantity_text,
     seconds_text,
@@ -54,7 +55,7 @@ def rollouts(result: GapResult, folder: Path) -> list[Section]:
     return [
         Gallery(
             pictures,
-            f"Forecasts over {seconds_text(result.gap.horizon_s)} of data that did not fit the "
+            f"Forecasts over {duration_text(result.gap.horizon_s)} of data that did not fit the "
             "numbers. Each starts from a state fitted to its first samples.",
             heading="Before and after",
         )
@@ -82,7 +83,7 @@ def bars(result: GapResult, folder: Path) -> Figure:
         f"The error falls from {gap.before.value:.3g} to {gap.after.value:.3g}"
         f"{unit_text(gap.unit)}; noise "
         f"alone gives {gap.noise_floor.value:.3g}.",
-        f"Root mean square error of {gap.channel} over {seconds_text(gap.horizon_s)}, in "
+        f"Root mean square error of {gap.channel} over {duration_text(gap.horizon_s)}, in "
         f"{CROSS_VALIDATED}: {gap.blocks} blocks of the records, dealt over {gap.folds} groups "
         "that are left out in turn; 95 % interval over blocks. **Noise floor**: what the corrected "
         f"simulator would reach on its own data plus noise.{in_vain}",
@@ -99,7 +100,7 @@ def set_aside(result: GapResult) -> list[Section]:
         Table(
             ["channel", "nominal", "corrected", "noise floor"],
             _errors(gap),
-            f"Root mean square errors over {seconds_text(gap.horizon_s)} in the records that were "
+            f"Root mean square errors over {duration_text(gap.horizon_s)} in the records that were "
             "held out: they had no part in the answer.",
             heading="Records set aside",
         )

@@ -79,6 +79,14 @@ def rounded(value: float, half: float) -> str:
     return f"{round(value, places):.{max(places, 0)}f}"
 
 
+def plain(value: float) -> str:
+    """A number to six digits, and never as a power of ten where ``rounded`` writes zeros."""
+    text = f"{value:g}"
+    if "e-" in text and abs(value) > 1e-7:
+        return f"{value:.{5 - math.floor(math.log10(abs(value)))}f}".rstrip("0")
+    return text
+
+
 def typeset(unit: str) -> str:
     """``kg m^2`` as ``kg m\u00b2``."""
     return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(RAISED), unit)
@@ -138,9 +146,17 @@ def seconds_text(seconds: float) -> str:
     return f"{float(f'{seconds:.3g}'):g} s"
 
 
+def duration_text(seconds: float) -> str:
+    """A length of time in seconds, or in hours or days where there are two of them."""
+    for unit, size in (("d", 86400.0), ("h", 3600.0)):
+        if seconds >= 2 * size:
+            return f"{float(f'{seconds / size:.3g}'):g} {unit}"
+    return seconds_text(seconds)
+
+
 def ahead(gap: Gap) -> str:
     """``1 s error of angle``."""
-    return f"{seconds_text(gap.horizon_s)} error of {gap.channel}"
+    return f"{duration_text(gap.horizon_s)} error of {gap.channel}"
 
 
 def known_effects(result: GapResult) -> dict[str, Effect]:

@@ -7,7 +7,15 @@ import pytest
 
 from residual.gap.result import Number
 from studies.gap.progress import Heartbeat
-from studies.gap.words import number_text, percent, quantity_text, rounded, unit_text
+from studies.gap.words import (
+    duration_text,
+    number_text,
+    percent,
+    plain,
+    quantity_text,
+    rounded,
+    unit_text,
+)
 
 
 @pytest.mark.parametrize(
@@ -70,3 +78,18 @@ def test_thousandths_have_a_name_only_of_a_plain_unit(value, unit, text):
 def test_powers_are_raised():
     assert unit_text("N m s^2/rad^2") == " N m s\u00b2/rad\u00b2"
     assert unit_text("s^-1") == " s\u207b\u00b9"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.4, "0.4 s"), (697.0, "697 s"), (55_100.0, "15.3 h"), (187_000.0, "2.16 d")],
+)
+def test_long_times_are_told_in_hours_and_days(seconds, text):
+    assert duration_text(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.055, "0.055"), (1.38889e-5, "0.0000138889"), (3.2e-9, "3.2e-09")]
+)
+def test_a_nominal_value_is_written_like_what_replaces_it(value, text):
+    assert plain(value) == text

@@ -54,6 +54,13 @@ def test_what_would_be_surprisingly_large_comes_after_what_does_as_well():
     assert choose(Toy({(0,): 0.400, (3,): 0.201}, merits, surprising={3})).key == (3,)
 
 
+def test_a_surprise_has_to_be_better_by_more_than_a_tenth():
+    """Each block says the same, so that chance excuses nothing."""
+    assert choose(Toy({(0,): 0.215, (3,): 0.2})).key == (3,)
+    assert choose(Toy({(0,): 0.215, (3,): 0.2}, surprising={3})).key == (0,)
+    assert choose(Toy({(0,): 0.225, (3,): 0.2}, surprising={3})).key == (3,)
+
+
 def test_a_set_that_shrank_is_exchanged_for_one_that_surprises_less():
     """The pair does best, but either member alone does about as well."""
     errors = {(3,): 0.1000, (0,): 0.1001, (1, 3): 0.0999}

@@ -8,10 +8,17 @@ import pytest
 from residual.gap import plausible
 from residual.gap.candidates import candidates
 from residual.gap.model import Model
-from residual.gap.plausible import absurd, nearly
+from residual.gap.plausible import absurd, nearly, surprises
 from residual.gap.samples import Samples
 from residual.trajectories import Trajectory
-from sims.effects import ActuatorGain, DeadZone, ParameterChange, Saturation, ViscousFriction
+from sims.effects import (
+    ActuatorGain,
+    DeadZone,
+    LinearSpring,
+    ParameterChange,
+    Saturation,
+    ViscousFriction,
+)
 from sims.pendulum_equation import PendulumEquation
 
 
@@ -82,3 +89,12 @@ def test_a_limit_that_the_input_reaches_once_is_refused():
         number, why = absurd(model, np.array([2.0]), samples)
         assert ("only once" in why) is refused
         assert number == (0 if refused else 1)
+
+
+def test_what_ends_at_a_bound_surprises():
+    """It is no optimum: the bound has stopped it."""
+    model, theta, _ = built(LinearSpring("pivot"), stiffness=0.1, rest=0.2)
+    rest = [knob.field for knob in model.knobs].index("rest")
+    assert surprises(SimpleNamespace(model=model, theta=theta)) == 0
+    theta[rest] = model.knobs[rest].low
+    assert surprises(SimpleNamespace(model=model, theta=theta)) == 1

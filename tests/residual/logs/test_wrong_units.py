@@ -72,10 +72,12 @@ def test_stating_the_unit_settles_the_matter(csv):
     assert len(read(csv(**fast), states=stated).trajectories) == 1
 
 
-def test_an_angle_cut_at_half_a_turn_or_late_stamps_are_no_degrees(csv):
+def test_an_angle_cut_at_a_turn_or_late_stamps_are_no_degrees(csv):
     clean = swing()
     step, place = np.diff(clean["time"])[0], np.arange(200)
     spin = (2 * np.pi / 20 * place + np.pi) % (2 * np.pi) - np.pi
     read(csv(angle=spin), states={"angle": "angle"})
+    north = (0.1 * np.sin(place)) % (2 * np.pi)  # a compass that hovers about its zero
+    read(csv(time=0.2 * step * place, angle=north), states={"angle": "angle"})
     bunches = step * (4 * (place // 4) + 0.01 * (place % 4))
     read(csv(time=bunches, angle=clean["angle"]), states={"angle": "angle"})

@@ -1,0 +1,33 @@
+"""What is left of a set when a member that cannot be named has gone."""
+
+from types import SimpleNamespace
+
+from residual.gap import answer
+
+
+def test_what_cannot_be_right_without_the_others_goes_too(monkeypatch):
+    """A gain that switches its input off where nothing else of the set makes up for that."""
+
+    def claims(search, key, *_):
+        return [SimpleNamespace(number=number, needed=True) for number in key]
+
+    monkeypatch.setattr(answer, "claims", claims)
+    monkeypatch.setattr(answer, "nameable", lambda search, claim, *_: claim.number != 2)
+    monkeypatch.setattr(answer, "allow_for_parameters", lambda search, key, made, *_: made)
+    monkeypatch.setattr(answer, "other_numerics", lambda *_: [])
+    monkeypatch.setattr(answer, "in_plain_form", lambda *_: None)
+    monkeypatch.setattr(answer, "may_vanish", lambda *_: False)
+    monkeypatch.setattr(answer, "add_exchanged", lambda *_: None)
+    fit = SimpleNamespace(merit=1.0)
+    search = SimpleNamespace(
+        tried=dict.fromkeys([(), (0,), (0, 1), (0, 1, 2)], fit),
+        refused={(0, 1): "outdoor would have 0.05 of its strength"},
+        candidates=[SimpleNamespace(label=name) for name in ("load", "gain", "loss")],
+        fitter=SimpleNamespace(blocks=range(8), tie=lambda nominal: 0.0),
+        merged=lambda key, _, drop: (tuple(k for k in key if k not in drop), None),
+        add=lambda fits: None,
+    )
+    found = SimpleNamespace(search=search, key=(0, 1, 2), adequate=False)
+    left = answer.confirm(found, {})
+    assert left.key == (0,)
+    assert left.leads == ("gain", "loss")
