@@ -21,6 +21,8 @@ _WILD = 8.0
 _RARE = 0.01
 # Equal samples in a row that a moving channel does not have by chance.
 _STILL = 10
+# A sensor that thaws leaps so many times as far as it moves after that; what breaks away speeds up.
+_CATCHES_UP = 2.0
 # Samples in a row at the end of a sensor's range.
 _CLIPPED = 4
 # Part of the samples that are one step on, where the sensor's steps made the samples.
@@ -122,8 +124,9 @@ def _jumped_to(
 def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) -> list[Mask]:
     """Repeats of one value where the channel was moving until then.
 
-    A system at rest gives equal samples too. A frozen sensor stops in full motion, and has to catch
-    up when it thaws; if it does not thaw, only another sensor can tell.
+    A system at rest gives equal samples too, and dry friction stops it at once. A frozen sensor
+    does not slow down before, and has to catch up when it thaws, by more than it moves from then
+    on; if it does not thaw, only another sensor can tell.
 
     Args:
         runs: As for ``wild_samples``.
@@ -144,18 +147,27 @@ def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) 
         for a, b in _stretches(change == 0):  # samples a to b are equal
             if b - a < _STILL or a < 3:
                 continue
-            steps = np.diff(values[max(0, a - 3) : a + 1])
-            if not np.isfinite(steps).all() or len(steps) < 3:
-                continue
-            entry = abs(float(steps.mean()))
-            steady = np.all(np.sign(steps) == np.sign(steps[-1]))
             least = max(_WILD * typical, 2.1 * step)
-            thawed = b + 1 < len(values) and abs(values[b + 1] - values[b]) > least
+            leap, after = np.abs(np.diff(values[b : b + 3], append=[np.nan, np.nan]))[:2]
+            thawed = leap > least and leap > _CATCHES_UP * after > 0.0
             contradicted = float(np.abs(np.nancumsum(other[a:b])).max()) > least
-            fast = entry > max(0.3 * typical, 1.5 * step)
-            if steady and fast and (thawed or contradicted):
+            entry = max(0.3 * typical, 1.5 * step)
+            if (thawed or contradicted) and _in_full_motion(values[a - 3 : a + 1], entry, 1):
                 mask[a + 1 : b + 1] = True
     return found
+
+
+def _in_full_motion(values: Array, least: float, steps: int) -> bool:
+    """Whether four samples go one way, by ``least`` on average, and would for some steps more.
+
+    Dry friction slows down evenly before it stops, a sensor that fails does not.
+    """
+    moves = np.diff(values)
+    if len(moves) != 3 or not np.isfinite(moves).all() or np.ptp(np.sign(moves)):
+        return False
+    first, _, last = speeds = np.abs(moves)
+    ahead = last + min(0.0, steps * (last - first) / 2)
+    return bool(speeds.mean() > least and ahead > speeds.mean() / 4)
 
 
 def clipped_samples(runs: Sequence[Array]) -> list[Mask]:
@@ -175,19 +187,22 @@ def clipped_samples(runs: Sequence[Array]) -> list[Mask]:
         return found
     least = max(0.3 * float(np.median(moving)), 1.5 * rounding(runs))
     for end in (known.min(), known.max()):
-        reached = [np.zeros(len(values), bool) for values in runs]
-        times = 0
-        for values, mask in zip(runs, reached, strict=True):
-            for a, b in _stretches(values == end):
-                around = values[max(a - 3, 0) : a + 1], values[b - 1 : b + 3]
-                steps = [np.diff(part) for part in around if len(part) > 3]
-                moves = [np.ptp(np.sign(own)) == 0 and abs(own.mean()) > least for own in steps]
-                if b - a >= _CLIPPED and len(moves) == 2 and all(moves):
-                    mask[a:b] = True
-                    times += 1
+        reached = [
+            [(a, b) for a, b in _stretches(values == end) if b - a >= _CLIPPED] for values in runs
+        ]
+        # The last step to the end is cut short, and so is the first from it.
+        times = sum(
+            all(
+                _in_full_motion(part, least, 2)
+                for part in (values[max(a - 4, 0) : a], values[b : b + 4][::-1])
+            )
+            for values, stretches in zip(runs, reached, strict=True)
+            for a, b in stretches
+        )
         if times > 1:
-            for mask, its in zip(found, reached, strict=True):
-                mask |= its
+            for mask, stretches in zip(found, reached, strict=True):
+                for a, b in stretches:
+                    mask[a:b] = True
     return found
 
 
