@@ -122,7 +122,9 @@ def grow(search: Search, key: Key) -> list[Key]:
                 break
     if not key:
         # The joints of what walks and hops move, so that the screen sees what rubs there.
-        found += [] if search.simulator.has_contacts else boldly(search, parameters=False)
+        if not search.simulator.has_contacts:
+            found += boldly(search, parameters=False)
+            found += driven(search)
         for pair in [] if search.late else pair_gains(around, search.effort.pairs):
             numbers = [around.variants[v].candidate for v in pair.variants]
             fresh, theta = search.merged(key, zip(numbers, pair.values, strict=True))
@@ -151,6 +153,29 @@ def boldly(search: Search, parameters: bool) -> list[Key]:
         if (candidate.effect.enters == "parameter") != parameters:
             continue
         found += sound(search, fresh, candidate.bold)
+    return found
+
+
+def driven(search: Search) -> list[Key]:
+    """Fit every effect that holds still beside the gain of its input, or of the best other one.
+
+    When motion begins depends on both, on friction and on the drive that overcomes it; where both
+    are wrong, friction alone ends at numbers from which the linear picture is of no use.
+    """
+    screened = search.candidates[: search.screened]
+    gains = [number for number, candidate in enumerate(screened) if candidate.effect.drives]
+    if not gains:
+        return []
+    best = min(gains, key=lambda n: search.error((n,)) if (n,) in search.tried else np.inf)
+    found: list[Key] = []
+    for key in [k for k in search.tried if len(k) == 1 and k[0] < search.screened]:
+        effect = screened[key[0]].effect
+        gain = next((n for n in gains if screened[n].effect.where == effect.where), best)
+        small = 0.01 * screened[gain].trials[0].values[0]
+        start = search.own((gain,)) if (gain,) in search.tried else small
+        fresh, theta = search.merged(key, [(gain, start)])
+        if effect.holds_still and not search.late and search.fits_in(fresh):
+            found += sound(search, fresh, theta)
     return found
 
 

@@ -35,6 +35,7 @@ class Knob:
         step: A small change.
         strength: Whether the effect is absent where it is zero.
         known: Standard deviation with which it is known to be zero beforehand.
+        above: Name of another number of the effect, below which this one does nothing more.
     """
 
     field: str
@@ -44,6 +45,7 @@ class Knob:
     step: float
     strength: bool
     known: float = np.inf
+    above: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -223,7 +225,7 @@ def _candidate(effect: Effect, known: dict[str, Quantity], reach: float) -> Cand
     knobs = tuple(
         Knob(
             n, q.unit, q.low, q.high, 0.1 * q.scale,
-            q.role == "strength" and np.isfinite(q.nominal),
+            q.role == "strength" and np.isfinite(q.nominal), above=q.above,
         )
         for n, q in free.items()
     )  # fmt: skip

@@ -3,7 +3,8 @@
 Where friction holds a joint or a dead zone an input, the times at which motion begins and stops
 jump with the numbers, and where nothing moves no number matters: the method of Gauss and Newton
 ends in one of many local minima. Differential evolution on forecasts of whole windows finds where
-to begin. Source: Storn and Price, "Differential evolution", J. Global Optimization 11 (1997).
+to begin: half of its first generation lies about what slopes reached, the other half anywhere.
+Source: Storn and Price, "Differential evolution", J. Global Optimization 11 (1997).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
+from scipy.stats import qmc
 
 from residual.gap.fitting import Fit, Fitter
 from residual.gap.model import Model
@@ -21,11 +23,14 @@ from residual.gap.smooth import LOST, SmoothFitter
 Array = NDArray[np.float64]
 
 #: Part of the time for searching, at most.
-GLOBALLY = 0.2
+GLOBALLY = 0.3
 #: Residual over noise from which on a fit may have ended in a wrong minimum.
 FAR = 3.0
 #: Vectors of numbers in a generation, and generations, for every number.
 POPULATION, GENERATIONS = 12, 5
+#: Times that a set is sought, each from the best fit so far, and how far the half of a first
+#: generation that lies about it is spread, as a share of the reach of a number.
+ROUNDS, ABOUT = 2, 0.07
 #: Members of the last generation that fits begin from, and how far they are apart, as a share of
 #: the reach of a number.
 STARTS, NEAR = 8, 0.1
@@ -35,6 +40,8 @@ WINDOWS = 16
 MOST = 5
 #: Reach of a size that is not negative: parts and multiples of its scale.
 SMALLEST, LARGEST = 0.03, 100.0
+#: How many times as large as another number one is that does nothing below it, at most.
+ABOVE = 30.0
 #: Reach of what has a sign, in scales: of what cannot fall below some value, and of other numbers.
 LESS, MORE, EITHER = 0.7, 2.5, 10.0
 
@@ -62,16 +69,20 @@ class GlobalSearch:
         """
         if self.noise is None or not isinstance(fitter, SmoothFitter):
             return found
-        begun = time.process_time()
-        if begun > self.until or self._left < 0:
-            return found
-        starts = begins_elsewhere(fitter, found, self.noise, free)
-        fits = [fitter.fit(found.model, start, found) for start in starts]
-        self._left -= time.process_time() - begun
-        return min([found, *fits], key=lambda fit: fit.merit)
+        for turn in range(ROUNDS):
+            begun = time.process_time()
+            if begun > self.until or self._left < 0:
+                break
+            starts = begins_elsewhere(fitter, found, self.noise, free, turn)
+            fits = [fitter.fit(found.model, start, found) for start in starts]
+            self._left -= time.process_time() - begun
+            found = min([found, *fits], key=lambda fit: fit.merit)
+        return found
 
 
-def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) -> Array:
+def begins_elsewhere(
+    fitter: SmoothFitter, fit: Fit, noise: Array, free: int, seed: int = 0
+) -> Array:
     """Numbers from which a fit may do better, (k, p), most promising first; none if there is no
     reason to look.
 
@@ -83,6 +94,7 @@ def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) ->
         fit: The fit by slopes.
         noise: Noise of every measured channel, (m,).
         free: How many of its numbers, from the first on, are sought; the others stay.
+        seed: Of the search.
     """
     model = fit.model
     holds = any(candidate.effect.holds_still for candidate in model.chosen)
@@ -90,24 +102,21 @@ def begins_elsewhere(fitter: SmoothFitter, fit: Fit, noise: Array, free: int) ->
     if not (holds and own_step and 0 < free <= MOST and _far(fitter, fit, noise)):
         return np.zeros((0, len(fit.theta)))
     forecasts = _Forecasts(fitter, model)
-    low, high, log = _box(model, fit.theta, free)
-
-    def numbers(points: Array) -> Array:
-        """(V, free) in the space of the search -> (V, p)."""
-        found = np.repeat(fit.theta[None], len(points), axis=0)
-        found[:, :free] = np.where(log, np.exp(np.where(log, points, 0.0)), points)
-        return np.clip(found, model.low, model.high)
-
-    begin = np.where(log, np.log(np.maximum(fit.theta[:free], 1e-300)), fit.theta[:free])
-    inside = 1e-6 * (high - low)  # a bound itself may be outside by rounding
+    space = _Space(model, fit.theta, free)
+    low, high = space.low, space.high
+    begin, about = space.point(fit.theta), ABOUT * (high - low)
+    random = np.random.default_rng(seed)
+    members = qmc.scale(qmc.LatinHypercube(free, rng=random).random(POPULATION * free), low, high)
+    near = begin + about * random.standard_normal((len(members) // 2, free))
+    members[: len(near)] = space.inside(near)
     result = differential_evolution(
-        lambda points: forecasts.misses(numbers(points.T)), list(zip(low, high, strict=True)),
-        vectorized=True, updating="deferred", polish=False, tol=0.0, rng=0,
-        popsize=POPULATION, maxiter=GENERATIONS * free,
-        x0=np.clip(begin, low + inside, high - inside),
+        lambda points: forecasts.misses(space.numbers(points.T)),
+        list(zip(low, high, strict=True)),
+        vectorized=True, updating="deferred", polish=False, tol=0.0, rng=random,
+        init=members, maxiter=GENERATIONS * free, x0=begin,
     )  # fmt: skip
     ranked = result.population[np.argsort(result.population_energies)]
-    return numbers(_apart(ranked, NEAR * (high - low)))
+    return space.numbers(_apart(ranked, NEAR * (high - low)))
 
 
 def _apart(points: Array, near: Array) -> Array:
@@ -128,20 +137,62 @@ def _far(fitter: SmoothFitter, fit: Fit, noise: Array) -> bool:
     return bool((left > FAR * noise).any())
 
 
-def _box(model: Model, theta: Array, free: int) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Least and greatest of every number, and which are sought by their logarithm, (free,) each."""
-    scale, low, high = 10 * model.step[:free], model.low[:free], model.high[:free]
-    begin = theta[:free]
-    log = low >= 0
-    least = np.maximum(np.maximum(low, SMALLEST * scale), 1e-300)
-    most = np.minimum(high, LARGEST * scale)
-    one_sided = np.isfinite(low)
-    down = np.where(one_sided, -LESS, -EITHER) * scale
-    up = np.where(one_sided, MORE, EITHER) * scale
-    down = np.maximum(np.minimum(down, begin), low)
-    up = np.minimum(np.maximum(up, begin), high)
-    most = np.maximum(most, least * (1 + 1e-6))
-    return np.where(log, np.log(least), down), np.where(log, np.log(most), up), log
+class _Space:
+    """Where the first numbers of a set are sought: sizes by their logarithm, and what does nothing
+    below another number by its ratio to that, since half of all pairs would be one law otherwise.
+
+    Attributes:
+        low, high: Least and greatest of every coordinate, (free,).
+    """
+
+    def __init__(self, model: Model, theta: Array, free: int) -> None:
+        self.model, self.theta, self.free = model, theta, free
+        knobs = model.knobs[:free]
+        own = list(zip(model.owner[:free], (knob.field for knob in knobs), strict=True))
+        self.above = [
+            own.index((owner, knob.above)) if knob.above else -1
+            for owner, knob in zip(model.owner, knobs, strict=False)
+        ]
+        scale, low, high = 10 * model.step[:free], model.low[:free], model.high[:free]
+        begin, one_sided = theta[:free], np.isfinite(low)
+        self.log = low >= 0
+        least = np.maximum(np.maximum(low, SMALLEST * scale), 1e-300)
+        most = np.maximum(np.minimum(high, LARGEST * scale), least * (1 + 1e-6))
+        down = np.where(one_sided, -LESS, -EITHER) * scale
+        up = np.where(one_sided, MORE, EITHER) * scale
+        down = np.maximum(np.minimum(down, begin), low)
+        up = np.minimum(np.maximum(up, begin), high)
+        self.low, self.high = (
+            np.where(self.log, np.log(least), down),
+            np.where(self.log, np.log(most), up),
+        )
+        for number, other in enumerate(self.above):
+            if other >= 0:
+                self.low[number], self.high[number] = 0.0, np.log(ABOVE)
+
+    def inside(self, points: Array) -> Array:
+        """Points moved into the space; a bound itself may be outside by rounding."""
+        margin = 1e-6 * (self.high - self.low)
+        return np.clip(points, self.low + margin, self.high - margin)
+
+    def numbers(self, points: Array) -> Array:
+        """(V, free) in the space -> (V, p), the other numbers as they are."""
+        found = np.repeat(self.theta[None], len(points), axis=0)
+        own = np.where(self.log, np.exp(np.where(self.log, points, 0.0)), points)
+        for number, other in enumerate(self.above):
+            if other >= 0:
+                own[:, number] *= own[:, other]
+        found[:, : self.free] = own
+        return np.clip(found, self.model.low, self.model.high)
+
+    def point(self, theta: Array) -> Array:
+        """(p,) -> (free,) in the space."""
+        own = theta[: self.free]
+        found = np.where(self.log, np.log(np.maximum(own, 1e-300)), own)
+        for number, other in enumerate(self.above):
+            if other >= 0:
+                found[number] -= found[other]
+        return self.inside(found)
 
 
 class _Forecasts:

@@ -154,6 +154,7 @@ class ActuatorGain(StaticActuatorEffect):
     sentence: ClassVar[str] = "The actuator is stronger or weaker than commanded, by a share."
     needs: ClassVar[str] = "a varied input"
     stage: ClassVar[int] = 3
+    drives: ClassVar[bool] = True
 
     def shape(self, u: Value) -> Value:
         """Scaled command."""

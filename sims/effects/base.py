@@ -33,6 +33,7 @@ class Quantity:
         integer: True if only whole numbers make sense.
         bold: Value from which the effect is fitted in full whatever small trials say, if they can
             mislead: what holds a joint at rest does nothing that is in proportion to its size.
+        above: Name of a number of the effect below which this one does nothing more.
     """
 
     unit: str
@@ -44,6 +45,7 @@ class Quantity:
     starts: tuple[float, ...]
     integer: bool
     bold: float | None = None
+    above: str = ""
 
     @property
     def fitted(self) -> bool:
@@ -62,13 +64,14 @@ def number(
     starts: tuple[float, ...] = (),
     integer: bool = False,
     bold: float | None = None,
+    above: str = "",
     **dimension: int,
 ) -> Any:
     """A numeric field of an effect.
 
     Args:
         default: Value when none is given.
-        role, low, high, nominal, integer: See ``Quantity``.
+        role, low, high, nominal, integer, above: See ``Quantity``.
         bold: See ``Quantity``, as a multiple of the typical size.
         share: The scale, as a share of the typical size of the dimension.
         starts: Values worth starting a search from, as multiples of the same typical size.
@@ -85,6 +88,7 @@ def number(
         "starts": starts,
         "integer": integer,
         "bold": bold,
+        "above": above,
         "dimension": dimension,
     }
     return dataclasses.field(default=default, metadata=known)
@@ -123,6 +127,7 @@ class Effect(abc.ABC):
         upstream_of_sensor: True if it acts before an input that was measured at the actuator's
             output, so that such a record holds its consequence already.
         holds_still: True if up to a size of its own nothing moves: forces of friction, or inputs.
+        drives: True if it makes an input stronger or weaker in proportion.
     """
 
     name: ClassVar[str]
@@ -134,6 +139,7 @@ class Effect(abc.ABC):
     special_cases: ClassVar[tuple[str, ...]] = ()
     upstream_of_sensor: ClassVar[bool] = False
     holds_still: ClassVar[bool] = False
+    drives: ClassVar[bool] = False
 
     @property
     def where(self) -> str:

@@ -60,7 +60,7 @@ class StribeckFriction(DryFriction):
     """
 
     sliding: Value = number(low=0.0, force=1, share=0.1, bold=0.1)
-    breakaway: Value = number(low=0.0, force=1, share=0.1, bold=0.8)
+    breakaway: Value = number(low=0.0, force=1, share=0.1, bold=0.8, above="sliding")
     speed: Value = number(
         0.5, role="shape", low=1e-3, share=0.1, starts=(0.05, 0.15, 0.4), bold=0.15, rate=1
     )
