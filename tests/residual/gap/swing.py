@@ -1,4 +1,4 @@
-"""A swing with noise in angle and rate, and what is said about it."""
+"""A swing with noise, a servo that sticks, and what is said about such logs."""
 
 import dataclasses
 
@@ -27,3 +27,26 @@ def changed(run, column, rows, values):
     states = np.array(run.states)
     states[rows, column] = values
     return dataclasses.replace(run, states=states)
+
+
+def sticking(breakaway, gain, seed):
+    """Angle and voltage of a motor under a PI controller that sticks and overshoots."""
+    rng = np.random.default_rng(seed)
+    target, angle, rate, total = 0.0, 0.0, 0.0, 0.0
+    angles, volts = [], []
+    for row in range(1000):
+        if row % 100 == 0:
+            target = rng.uniform(-4, 4)
+        total += (target - angle) * 0.02
+        volt = np.clip(gain * (target - angle) + 60 * total - 6 * rate, -255, 255)
+        angles.append(angle)
+        volts.append(volt)
+        for _ in range(40):
+            drive = 2.8 * volt - rate / 0.15
+            holding = 2.8 * (60 + (breakaway - 60) * np.exp(-((rate / 3) ** 2)))
+            if rate == 0 and abs(drive) <= holding:
+                continue
+            new = rate + 5e-4 * (drive - holding * np.sign(rate if rate else drive))
+            rate = 0.0 if rate * new < 0 else new
+            angle += 5e-4 * rate
+    return 0.005 * np.round(np.array(angles) / 0.005), np.array(volts)

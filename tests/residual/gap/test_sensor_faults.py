@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from swing import changed, kinds, noisy
+from swing import changed, kinds, noisy, sticking
 
 from residual.gap.data import examine, findings
 from residual.logs.faults import dropped_samples
@@ -137,29 +137,6 @@ def test_rest_is_no_frozen_sensor():
     states = np.stack([angle, np.full(600, np.nan)], axis=1)
     run = Trajectory("run", times, states, np.sin(times)[:-1, None])
     assert not {kind for kind, _ in kinds(run)} & {"frozen", "dropped", "wild"}
-
-
-def sticking(breakaway, gain, seed):
-    """Angle and voltage of a motor under a PI controller that sticks and overshoots."""
-    rng = np.random.default_rng(seed)
-    target, angle, rate, total = 0.0, 0.0, 0.0, 0.0
-    angles, volts = [], []
-    for row in range(1000):
-        if row % 100 == 0:
-            target = rng.uniform(-4, 4)
-        total += (target - angle) * 0.02
-        volt = np.clip(gain * (target - angle) + 60 * total - 6 * rate, -255, 255)
-        angles.append(angle)
-        volts.append(volt)
-        for _ in range(40):
-            drive = 2.8 * volt - rate / 0.15
-            holding = 2.8 * (60 + (breakaway - 60) * np.exp(-((rate / 3) ** 2)))
-            if rate == 0 and abs(drive) <= holding:
-                continue
-            new = rate + 5e-4 * (drive - holding * np.sign(rate if rate else drive))
-            rate = 0.0 if rate * new < 0 else new
-            angle += 5e-4 * rate
-    return 0.005 * np.round(np.array(angles) / 0.005), np.array(volts)
 
 
 @given(st.floats(70, 130), st.floats(60, 150), st.integers(0, 1000))
