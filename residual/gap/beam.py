@@ -167,14 +167,15 @@ def driven(search: Search) -> list[Key]:
     if not gains:
         return []
     best = min(gains, key=lambda n: search.error((n,)) if (n,) in search.tried else np.inf)
+    singles = [key for key in search.tried if len(key) == 1 and key[0] < search.screened]
     found: list[Key] = []
-    for key in [k for k in search.tried if len(k) == 1 and k[0] < search.screened]:
-        effect = screened[key[0]].effect
-        gain = next((n for n in gains if screened[n].effect.where == effect.where), best)
+    for key in [k for k in singles if screened[k[0]].effect.holds_still]:
+        place = search.place(key[0])
+        gain = next((n for n in gains if search.place(n) == place), best)
         small = 0.01 * screened[gain].trials[0].values[0]
         start = search.own((gain,)) if (gain,) in search.tried else small
         fresh, theta = search.merged(key, [(gain, start)])
-        if effect.holds_still and not search.late and search.fits_in(fresh):
+        if not search.late and search.fits_in(fresh):
             found += sound(search, fresh, theta)
     return found
 
