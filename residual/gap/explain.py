@@ -127,9 +127,11 @@ def explain(
 
 
 def near_best(search: Search) -> list[Key]:
-    """The sets worth trying again, best first."""
+    """The sets worth trying again, best first: those that forecast best, and that fit best."""
     best = sorted(search.usable(), key=search.error)[:SEEDS]
-    return [key for key in best if search.error(key) <= HOPEFUL * search.error(best[0])]
+    good = [key for key in best if search.error(key) <= HOPEFUL * search.error(best[0])]
+    fit = sorted(search.usable(), key=lambda key: search.tried[key].merit)[: search.effort.beam]
+    return list(dict.fromkeys([*good, *fit]))
 
 
 def carried(earlier: Search, search: Search) -> Proposals:

@@ -4,6 +4,8 @@ Where friction holds a joint or a dead zone an input, the times at which motion 
 jump with the numbers, and where nothing moves no number matters: the method of Gauss and Newton
 ends in one of many local minima. Differential evolution on forecasts of whole windows finds where
 to begin: half of its first generation lies about what slopes reached, the other half anywhere.
+Forecasts of parts of windows come first: each start and stop counts by itself there, while over a
+whole window the first that is missed decides.
 Source: Storn and Price, "Differential evolution", J. Global Optimization 11 (1997).
 """
 
@@ -18,7 +20,8 @@ from scipy.stats import qmc
 
 from residual.gap.fitting import Fit, Fitter
 from residual.gap.model import Model
-from residual.gap.smooth import LOST, SmoothFitter
+from residual.gap.short_forecasts import ShortForecasts
+from residual.gap.smooth import SmoothFitter
 
 Array = NDArray[np.float64]
 
@@ -28,14 +31,14 @@ GLOBALLY = 0.3
 FAR = 3.0
 #: Vectors of numbers in a generation, and generations, for every number.
 POPULATION, GENERATIONS = 12, 5
-#: Times that a set is sought, each from the best fit so far, and how far the half of a first
-#: generation that lies about it is spread, as a share of the reach of a number.
-ROUNDS, ABOUT = 2, 0.07
+#: Parts that windows are foretold in each time that a set is sought, from the best fit so far.
+PARTS = (8, 4)
+#: How far the half of a first generation that lies about that fit is spread, as a share of the
+#: reach of a number.
+ABOUT = 0.07
 #: Members of the last generation that fits begin from, and how far they are apart, as a share of
 #: the reach of a number.
 STARTS, NEAR = 8, 0.1
-#: Windows that are foretold, at most: what is found is only where a fit begins.
-WINDOWS = 16
 #: Most numbers that are sought at once: larger sets grow from smaller ones.
 MOST = 5
 #: Reach of a size that is not negative: parts and multiples of its scale.
@@ -69,11 +72,11 @@ class GlobalSearch:
         """
         if self.noise is None or not isinstance(fitter, SmoothFitter):
             return found
-        for turn in range(ROUNDS):
+        for turn in range(len(PARTS)):
             begun = time.process_time()
             if begun > self.until or self._left < 0:
                 break
-            starts = begins_elsewhere(fitter, found, self.noise, free, turn)
+            starts = begins_elsewhere(fitter, found, self.noise, free, PARTS[turn], turn)
             fits = [fitter.fit(found.model, start, found) for start in starts]
             self._left -= time.process_time() - begun
             found = min([found, *fits], key=lambda fit: fit.merit)
@@ -81,7 +84,7 @@ class GlobalSearch:
 
 
 def begins_elsewhere(
-    fitter: SmoothFitter, fit: Fit, noise: Array, free: int, seed: int = 0
+    fitter: SmoothFitter, fit: Fit, noise: Array, free: int, parts: int = 1, seed: int = 0
 ) -> Array:
     """Numbers from which a fit may do better, (k, p), most promising first; none if there is no
     reason to look.
@@ -94,6 +97,7 @@ def begins_elsewhere(
         fit: The fit by slopes.
         noise: Noise of every measured channel, (m,).
         free: How many of its numbers, from the first on, are sought; the others stay.
+        parts: That windows are foretold in.
         seed: Of the search.
     """
     model = fit.model
@@ -101,7 +105,7 @@ def begins_elsewhere(
     own_step = model.batched and not model.simulator.own_files()
     if not (holds and own_step and 0 < free <= MOST and _far(fitter, fit, noise)):
         return np.zeros((0, len(fit.theta)))
-    forecasts = _Forecasts(fitter, model)
+    forecasts = ShortForecasts(fitter, model, parts)
     space = _Space(model, fit.theta, free)
     low, high = space.low, space.high
     begin, about = space.point(fit.theta), ABOUT * (high - low)
@@ -193,34 +197,3 @@ class _Space:
             if other >= 0:
                 found[number] -= found[other]
         return self.inside(found)
-
-
-class _Forecasts:
-    """Forecasts of windows from the measured path's own states."""
-
-    def __init__(self, fitter: SmoothFitter, model: Model) -> None:
-        windows, samples = fitter.blocks.windows, fitter.samples
-        places = np.linspace(0, len(windows) - 1, min(len(windows), WINDOWS))
-        chosen = np.unique(places.round().astype(int))
-        self.fitter, self.model = fitter, model
-        self.rows = windows.index[chosen, 0]
-        self.steps = windows.index.shape[1] - 1
-        self.seen = samples.seen[windows.index[chosen]][..., samples.measured]
-        self.valid = fitter.valid[chosen]
-        self.limit = LOST * np.nanstd(samples.seen[:, samples.measured], axis=0)
-
-    def misses(self, thetas: Array) -> Array:
-        """Logarithm of the squared error of forecasts by each vector of numbers, (V,)."""
-        model, samples, count = self.model, self.fitter.samples, len(self.rows)
-        nodes = self.fitter.nodes
-        if model.width == model.physical:
-            states = np.tile(nodes[self.rows], (len(thetas), 1))
-        else:
-            states = np.vstack([model.widen(samples, nodes, t)[self.rows] for t in thetas])
-        path = self.fitter.shown(
-            model, np.tile(self.rows, len(thetas)), states, self.steps, thetas,
-            np.repeat(np.arange(len(thetas)), count),
-        ).reshape(len(thetas), *self.seen.shape)  # fmt: skip
-        gap = np.where(np.isfinite(path), self.seen - path, self.limit)
-        gap = np.where(self.valid, np.clip(gap, -self.limit, self.limit) / self.fitter.sigma, 0.0)
-        return np.asarray(np.log((gap**2).sum(axis=(1, 2, 3)) + 1e-300))

@@ -72,11 +72,14 @@ def _reckoned(
 
 
 def variation(samples: Samples, nodes: Array, length: int = 25) -> Array:
-    """Typical variation of each state within ``length`` samples, to scale states."""
+    """Root mean square variation of each state within ``length`` samples, to scale states.
+
+    Not the usual one, which is next to nothing of a system that rests for most of a record.
+    """
     spreads = []
     for start, stop in samples.runs:
         for a in range(start, max(stop - length, start + 1), length):
             spreads.append(nodes[a : min(a + length, stop)].std(axis=0))
-    spread = np.median(spreads, axis=0)
+    spread = np.sqrt(np.square(spreads).mean(axis=0))
     typical = nodes.std(axis=0)
     return np.maximum(spread, np.maximum(1e-3 * typical, 1e-9))

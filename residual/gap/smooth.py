@@ -19,6 +19,7 @@ from residual.gap.noise import Floor, Noise
 from residual.gap.samples import Samples
 from residual.gap.screening import Signatures
 from residual.gap.slopes import observe
+from residual.gap.starts import starts
 from residual.gap.where import Where, locate
 from residual.gap.windows import carry
 
@@ -26,8 +27,6 @@ Array = NDArray[np.float64]
 
 #: Part of a window that a forecast's start state is fitted to, and its least number of samples.
 LEAD, LEAST = 0.25, 5
-#: Gauss-Newton turns of a start state.
-TURNS = 3
 #: Forecast errors count up to so many times the spread of a channel: a forecast that runs away
 #: is as wrong as one that is merely lost.
 LOST = 3.0
@@ -76,7 +75,11 @@ class SmoothFitter:
         return dataclasses.replace(self, sigma=other.sigma)
 
     def fit(self, model: Model, theta: Array, near: Fit | None = None) -> Fit:
-        """See ``Fitter.fit``; always from the measured path, since a rival's may mislead."""
+        """See ``Fitter.fit``; always from the measured path, since a rival's may mislead.
+
+        Of what holds still also from forecasts by the first guess: where motion begins and stops,
+        the measured path tells a linear picture little.
+        """
         theta = np.clip(theta, model.low, model.high)
         nodes = model.widen(self.samples, self.nodes, theta)
         known = self.by_state if model.width == self.by_state.shape[1] else None
@@ -84,7 +87,21 @@ class SmoothFitter:
         if len(theta) and not found.converged:
             again = self._shot(model, found.nodes, found.theta, None, 0.05)
             found = again if again.merit <= found.merit else found
+        if any(candidate.effect.holds_still for candidate in model.chosen):
+            again = self._shot(model, self._foretold(model, theta, found), theta, None, 0.05)
+            found = again if again.merit <= found.merit else found
         return self._as_fit(found)
+
+    def _foretold(self, model: Model, theta: Array, near: shooting.ShootingFit) -> Array:
+        """Nodes on forecasts from the lead-ins of all windows, (n, n_s)."""
+        windows, which = self.blocks.windows, np.zeros(len(self.blocks.windows), np.int64)
+        first, steps = windows.index[:, 0], windows.index.shape[1] - 1
+        begun = starts(self, model, theta[None], which, near.nodes[first])
+        path = model.roll(self.samples, first, begun, steps, theta)
+        nodes = np.array(model.widen(self.samples, self.nodes, theta))
+        sound = windows.inside & np.isfinite(path).all(axis=2)
+        nodes[windows.index[sound]] = path[sound]
+        return nodes
 
     def resumed(self, model: Model, theta: Array, near: Fit) -> Fit:
         """See ``Fitter.resumed``."""
@@ -218,49 +235,12 @@ class SmoothFitter:
 
     def foretell(self, model: Model, thetas: Array, which: NDArray[np.int64], fit: Fit) -> Foretold:
         """See ``Fitter.foretell``: start states by Gauss and Newton on the lead-ins."""
-        samples, windows, lead = self.samples, self.blocks.windows, self.lead
-        measured = samples.measured
+        samples, windows = self.samples, self.blocks.windows
         first = windows.index[:, 0]
-        inner: shooting.ShootingFit = fit.inner
-        states = np.array(inner.nodes[first])
-        free = model.free
-        moves = 1e-3 * self.scale[free]
-        seen = samples.seen[windows.index][..., measured]
-        valid = self.valid & lead[..., None]
-        length = int(lead.sum(axis=1).max())
-        best, least = states, np.full(len(windows), np.inf)
-        for turn in range(TURNS + 1):
-            variants = np.repeat(states[None], 1 + len(free), axis=0)
-            for row, column in enumerate(free):
-                variants[1 + row, :, column] += moves[row]
-            count = len(variants)
-            path = self.shown(
-                model, np.tile(first, count), variants.reshape(-1, states.shape[1]), length - 1,
-                thetas, np.tile(which, count),
-            ).reshape(count, len(windows), length, len(measured))  # fmt: skip
-            there = valid[:, :length]
-            gap = np.where(there, (seen[:, :length] - path[0]) / self.sigma, 0.0)
-            gap = np.clip(gap, -1e8, 1e8).reshape(len(windows), -1)
-            cost = (gap**2).sum(axis=1)
-            better = cost < least
-            best = np.where(better[:, None], states, best)
-            least = np.where(better, cost, least)
-            if turn == TURNS:
-                break
-            slope = (path[1:] - path[0]) / moves[:, None, None, None] / self.sigma
-            slope = np.where(there, np.clip(slope, -1e8, 1e8), 0.0)
-            slope = slope.reshape(len(free), len(windows), -1).transpose(1, 2, 0)
-            ridge = np.broadcast_to(
-                np.diag(1e-2 / self.scale[free]), (len(windows), len(free), len(free))
-            )
-            basis, triangle = np.linalg.qr(np.concatenate([slope, ridge], axis=1))
-            right = np.concatenate([gap, np.zeros((len(windows), len(free)))], axis=1)
-            step = np.linalg.solve(triangle, basis.transpose(0, 2, 1) @ right[..., None])[..., 0]
-            limit = 3 * self.scale[free]
-            states = states.copy()
-            states[:, free] += np.clip(step, -limit, limit)
-        full = self.shown(model, first, best, windows.index.shape[1] - 1, thetas, which)
-        spread = np.nanstd(samples.seen[:, measured], axis=0)
+        begun = starts(self, model, thetas, which, fit.inner.nodes[first])
+        full = self.shown(model, first, begun, windows.index.shape[1] - 1, thetas, which)
+        seen = samples.seen[windows.index][..., samples.measured]
+        spread = np.nanstd(samples.seen[:, samples.measured], axis=0)
         square = np.clip(seen - full, -LOST * spread, LOST * spread) ** 2
         # What happens within the lead-in counts too: a lag shows just after a record's start.
         lengths = windows.inside.sum(axis=1)

@@ -99,3 +99,20 @@ def test_what_is_chosen_is_never_worse_than_the_nominal(errors, seed):
     assert toy.error(found.key) <= 1.0 + 1e-9
     assert not set(found.key) & set(found.minor)
     assert set(found.reasons) == set(toy.tried) - {found.key}
+
+
+def test_what_fits_no_better_than_chance_is_not_needed_however_well_it_forecasts():
+    """What breaks away by a hair forecasts a block well or badly, whatever is known of it."""
+    errors = {(2,): 0.13, (1, 2): 0.003}
+    assert choose(Toy(errors, merits={(): 9e3, (2,): 213.6, (1, 2): 212.0})).key == (2,)
+    assert choose(Toy(errors, merits={(): 9e3, (2,): 213.6, (1, 2): 180.0})).key == (1, 2)
+
+
+@pytest.mark.parametrize(("astray", "key"), [(1, (2,)), (3, (0,))])
+def test_what_leaves_a_third_of_all_data_wins_though_a_block_or_two_go_astray(astray, key):
+    toy = Toy({(0,): 0.02, (2,): 0.005}, merits={(): 9e3, (0,): 300.0, (2,): 20.0}, blocks=8)
+    toy.validated[2,].squares[:astray] = toy.currency.nominal[:astray]
+    assert toy.error((2,)) > 3 * toy.error((0,))
+    assert choose(toy).key == key
+    toy.tried[2,].merit = 40.0
+    assert choose(toy).key == (0,)

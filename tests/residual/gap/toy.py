@@ -35,7 +35,7 @@ class Toy:
 
     Args:
         errors: By key: the error of every joint, or one for all.
-        merits: By key; if not given, the mean error.
+        merits: By key; if not given, a multiple of the squared mean error.
         joints: Number of joints, a channel each.
         blocks: Number of blocks.
         scatter: Relative spread of the blocks' errors about the given ones.
@@ -65,7 +65,7 @@ class Toy:
             for key, error in errors.items()
         }
         self.tried = {
-            key: SimpleNamespace(merit=(merits or {}).get(key, float(np.mean(error))))
+            key: SimpleNamespace(merit=(merits or {}).get(key, 1e4 * float(np.mean(error)) ** 2))
             for key, error in errors.items()
         }
         self.unfit, self.refused, self.nearly = set(), {}, set()
@@ -79,7 +79,12 @@ class Toy:
         windows = Windows.cut([(0, 4 * i, 4 * i + 4) for i in range(blocks)])
         self.fitter = SimpleNamespace(
             blocks=Blocks(windows, np.arange(blocks), np.arange(blocks) % 5),
-            samples=SimpleNamespace(times=0.1 * np.arange(4.0 * blocks), names=("run",)),
+            samples=SimpleNamespace(
+                times=0.1 * np.arange(4.0 * blocks),
+                names=("run",),
+                measured=np.array([0]),
+                seen=np.zeros((4 * blocks, 1)),
+            ),
             tie=lambda nominal: 0.05,
         )
 
