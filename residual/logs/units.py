@@ -138,11 +138,11 @@ def find_unit(unit: str, target: str) -> Unit:
     if unit in ("", plain, target):
         return Unit(target, 1.0)
     if unit not in UNITS:
-        fitting = units_of(plain) or list(UNITS)
-        near = difflib.get_close_matches(unit, fitting, 1)
+        possible = units_of(plain) or list(UNITS)
+        near = difflib.get_close_matches(unit, possible, 1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise ValueError(
-            f"unknown unit {unit!r}: {hint}expected one of {', '.join(fitting)}; or leave the unit "
+            f"unknown unit {unit!r}: {hint}expected one of {', '.join(possible)}; or leave the unit "
             f"out and give scale, the {plain} in one of it"
         )
     found = UNITS[unit]
