@@ -142,8 +142,8 @@ def find_unit(unit: str, target: str) -> Unit:
         near = difflib.get_close_matches(unit, possible, 1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise ValueError(
-            f"unknown unit {unit!r}: {hint}expected one of {', '.join(possible)}; or leave the unit "
-            f"out and give scale, the {plain} in one of it"
+            f"unknown unit {unit!r}: {hint}expected one of {', '.join(possible)}; or leave the "
+            f"unit out and give scale, the {plain} in one of it"
         )
     found = UNITS[unit]
     if found.base != plain:
