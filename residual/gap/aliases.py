@@ -9,23 +9,33 @@ import numpy as np
 from residual.gap.candidates import Candidate
 from residual.gap.result import Blind
 from residual.gap.screening import Signatures
-from sims.effects.aliases import exact_aliases
+from residual.trajectories import Trajectory
+from sims.effects.aliases import exact_aliases, probes
 from sims.effects.base import Effect
 from sims.host import HostSimulator
+from sims.simulator import Array
+
+#: Rows of a log on which twins are compared.
+ROWS = 96
 
 
 def aliases(
-    simulator: HostSimulator, offered: Sequence[Effect]
+    simulator: HostSimulator, offered: Sequence[Effect], runs: Sequence[Trajectory] = ()
 ) -> tuple[dict[str, tuple[str, ...]], tuple[tuple[str, ...], ...]]:
     """Exact aliases among the offered effects: twins by name, and dependent sets.
 
     A law with more numbers, as a spring with a free rest, does what its twin does and more: it is
     the twin's alias, and the twin is not its.
+
+    Args:
+        simulator: The nominal simulator.
+        offered: The effects.
+        runs: Where twins have to move alike, too.
     """
     effects = {str(effect): effect for effect in offered}
     groups: dict[str, tuple[str, ...]] = {}
     sets = []
-    for alias in exact_aliases(simulator):
+    for alias in exact_aliases(simulator, seen=_rows_of(simulator, runs)):
         inside = tuple(name for name in alias.effects if name in effects)
         if len(inside) < 2:
             continue
@@ -37,6 +47,23 @@ def aliases(
             for name in inside:
                 groups[name] = tuple(other for other in inside if width[other] >= width[name])
     return groups, tuple(sets)
+
+
+def _rows_of(simulator: HostSimulator, runs: Sequence[Trajectory]) -> tuple[Array, Array] | None:
+    """Rows from all over the runs, with random values for what was not measured.
+
+    None without runs, and for what touches: small changes have large effects there.
+    """
+    if not runs or simulator.has_contacts:
+        return None
+    states = np.concatenate([run.states[:-1] for run in runs])
+    actions = np.concatenate([run.actions for run in runs])
+    rows = np.linspace(0, len(states) - 1, ROWS).round().astype(int)
+    plain = simulator.with_effects(())
+    drawn, _ = probes(plain, np.random.default_rng(0))
+    drawn = drawn[np.arange(ROWS) % len(drawn)]
+    picked = states[rows]
+    return np.where(np.isfinite(picked), picked, drawn), actions[rows]
 
 
 def numbers(effect: Effect, simulator: HostSimulator) -> int:

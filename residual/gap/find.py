@@ -117,7 +117,7 @@ def find_gap(
     for says in quality:
         tell(says)
     tell("looking for effects that move alike")
-    groups, sets = aliases(simulator, offered)
+    groups, sets = aliases(simulator, offered, runs)
     kept = representatives(simulator, offered, groups)
     named = {str(effect): effect for effect in offered}
 

@@ -15,6 +15,7 @@ from residual.gap.result import ChannelGap, Gap, Rollout, Span, Step
 from residual.gap.search import Key, Search
 from residual.gap.validation import Validated, by_block, validate
 from sims.host import HostSimulator
+from sims.simulator import Channel
 
 Array = NDArray[np.float64]
 
@@ -124,11 +125,17 @@ def no_better(before: Array, after: Array, floor: Array) -> int:
 def main_channel(
     simulator: HostSimulator, measured: NDArray[np.int64], before: Array, floor: Array
 ) -> int:
-    """Place of the position (or state) whose error is largest beside its noise."""
-    kinds = [simulator.physical_channels[c].kind for c in measured]
-    places = [i for i, kind in enumerate(kinds) if kind in ("position", "other")] or [0]
+    """Place of the channel whose error is largest beside its noise, rates of others left out."""
+    channels = [simulator.physical_channels[c] for c in measured]
+    places = own_channels(channels)
     times = np.nanmean(before, axis=0) / np.maximum(np.nanmean(floor, axis=0), 1e-300)
     return max(places, key=lambda i: times[i])
+
+
+def own_channels(channels: Sequence[Channel]) -> list[int]:
+    """Places of measured channels that are not the rate of another one that was measured."""
+    names = {channel.name for channel in channels}
+    return [i for i, channel in enumerate(channels) if channel.rate_of not in names]
 
 
 def beside_noise(simulator: HostSimulator, fitter: Fitter, sigma: Array) -> float:

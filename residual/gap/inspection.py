@@ -29,6 +29,9 @@ _SLOW = 4.0
 _SPEEDS = {
     "rad/s", "deg/s", "rev/s", "rpm", "rev/min", "1/min", "m/s", "cm/s", "mm/s", "km/h", "mph",
 }  # fmt: skip
+# What is easily taken for a unit.
+_MISREAD = {"rad": "deg", "rad/s": "deg/s", "m": "mm", "m/s": "km/h", "A": "mA", "N m": "mN m",
+            "1": "%", "kW": "W"}  # fmt: skip
 # An input is in another unit if it goes beyond its bounds by this factor, or if it mostly does so.
 _FAR_BEYOND = 3.0
 # No more than this share of them are accidents.
@@ -75,8 +78,8 @@ def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list
             says = f"{reaches}, in {beyond} of {total} samples{_first(rows)}: " + (
                 "no such command can have been meant; leave those cells empty"
                 if few
-                else "another unit (mV for V), or bounds of the simulator's channel "
-                f"{channel.name!r} that are not the actuator's"
+                else f"another unit ({_misread(channel.unit)}), or bounds of the simulator's "
+                f"channel {channel.name!r} that are not the actuator's"
             )
             found.append(refusal("bounds", channel.name, says))
             continue
@@ -86,6 +89,11 @@ def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list
         numbers = {"samples": beyond, "most": most}
         found.append(Finding("bounds", channel.name, says, numbers, "warning", tuple(rows)))
     return found
+
+
+def _misread(unit: str) -> str:
+    """An example of a unit that is easily taken for this one."""
+    return f"{_MISREAD[unit]} for {unit}" if unit in _MISREAD else "mV for V"
 
 
 def speeds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:

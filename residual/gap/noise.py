@@ -49,9 +49,10 @@ class Floor(Noise):
 
 
 def driven_states(model: Model) -> list[int]:
-    """Columns a missing effect would push: rates, and states of first-order systems."""
+    """Columns a missing effect would push: rates, and states that have none (first order)."""
     channels = model.simulator.physical_channels
-    return [i for i, c in enumerate(channels) if c.kind in ("rate", "other")]
+    pushed = {c.rate_of for c in channels}
+    return [i for i, c in enumerate(channels) if c.kind != "position" or c.name not in pushed]
 
 
 def seen_driven(model: Model, samples: Samples) -> list[int]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from residual.gap.candidates import Candidate, Trial
 from residual.gap.fitting import Fit
+from residual.gap.intervals import at_bound
 
 Array = NDArray[np.float64]
 
@@ -81,13 +82,17 @@ def project_out(basis: Array, columns: Array) -> Array:
 def signatures(fit: Fit, variants: Sequence[Variant], columns: Array) -> Signatures:
     """Signatures from what each variant adds to the whitened output of every window.
 
+    A number that has come to its bound can imitate nothing more, so that what moves like it is
+    seen: drag that is 40 % off beside a parameter that may be 3 % off.
+
     Args:
         fit: The fitted model around which they were computed.
         variants: Whose columns they are.
         columns: shape (W, R, c).
     """
     columns = columns - fit.basis @ (fit.basis.transpose(0, 2, 1) @ columns)
-    chosen = flatten(fit.by_knob, fit.weights)
+    free = [j for j in range(len(fit.theta)) if not at_bound(fit, j)]
+    chosen = flatten(fit.by_knob[..., free], fit.weights)
     residual = flatten(fit.projected, fit.weights)
     return Signatures(
         tuple(variants),

@@ -44,10 +44,15 @@ UNITS: dict[str, Unit] = {
     "um": Unit("m", 1e-6),
     "in": Unit("m", 0.0254),
     "ft": Unit("m", 0.3048),
+    "nmi": Unit("m", 1852.0),
     "m/s": Unit("m/s", 1.0),
     "cm/s": Unit("m/s", 1e-2),
     "mm/s": Unit("m/s", 1e-3),
     "km/h": Unit("m/s", 1 / 3.6),
+    "kn": Unit("m/s", 1852 / 3600),
+    "mph": Unit("m/s", 0.44704),
+    "ft/s": Unit("m/s", 0.3048),
+    "ft/min": Unit("m/s", 0.3048 / 60),
     "m/s2": Unit("m/s2", 1.0),
     "cm/s2": Unit("m/s2", 1e-2),
     "mm/s2": Unit("m/s2", 1e-3),
@@ -69,12 +74,16 @@ UNITS: dict[str, Unit] = {
     "N mm": Unit("N m", 1e-3),
     "kg": Unit("kg", 1.0),
     "g": Unit("kg", 1e-3),
+    "lb": Unit("kg", 0.45359237),
     "K": Unit("K", 1.0),
     "degC": Unit("K", 1.0, 273.15),
     "degF": Unit("K", 5 / 9, 459.67 * 5 / 9),
     "Pa": Unit("Pa", 1.0),
     "kPa": Unit("Pa", 1e3),
+    "hPa": Unit("Pa", 1e2),
     "bar": Unit("Pa", 1e5),
+    "mbar": Unit("Pa", 1e2),
+    "psi": Unit("Pa", 6894.757),
 }
 
 _SPELLINGS = {
@@ -101,6 +110,13 @@ _SPELLINGS = {
     "mNm": "mN m",
     "Ncm": "N cm",
     "Nmm": "N mm",
+    "kt": "kn",
+    "kts": "kn",
+    "knot": "kn",
+    "knots": "kn",
+    "kph": "km/h",
+    "fps": "ft/s",
+    "fpm": "ft/min",
     "°C": "degC",
     "C": "degC",
     "°F": "degF",
@@ -122,10 +138,12 @@ def find_unit(unit: str, target: str) -> Unit:
     if unit in ("", plain, target):
         return Unit(target, 1.0)
     if unit not in UNITS:
-        near = difflib.get_close_matches(unit, UNITS, 1)
+        possible = units_of(plain) or list(UNITS)
+        near = difflib.get_close_matches(unit, possible, 1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise ValueError(
-            f"unknown unit {unit!r}: {hint}expected one of {', '.join(units_of(plain) or UNITS)}"
+            f"unknown unit {unit!r}: {hint}expected one of {', '.join(possible)}; or leave the "
+            f"unit out and give scale, the {plain} in one of it"
         )
     found = UNITS[unit]
     if found.base != plain:

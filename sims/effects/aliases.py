@@ -51,7 +51,10 @@ class Alias:
 
 
 def exact_aliases(
-    simulator: HostSimulator, rng: np.random.Generator | None = None, most: int = 4
+    simulator: HostSimulator,
+    rng: np.random.Generator | None = None,
+    most: int = 4,
+    seen: tuple[Array, Array] | None = None,
 ) -> tuple[Alias, ...]:
     """Sets of effects that are exactly dependent in the simulator's own equations.
 
@@ -65,12 +68,23 @@ def exact_aliases(
         simulator: A host, with or without effects.
         rng: Source of the random states; a fixed seed by default.
         most: Largest set that is looked for.
+        seen: States (n, n_s) and inputs (n, n_a) of a log, where what is alike has to be so, too:
+            random states are as large as channels' scales, and equations may change beyond.
     """
-    columns, blurs = _linear(simulator, rng or np.random.default_rng(0))
+    plain = simulator.with_effects(())
+    columns, blurs = _linear(plain, *probes(plain, rng or np.random.default_rng(0)))
+    there = _linear(plain, *seen) if seen is not None else ({}, {})
+
+    def alike_there(names: Sequence[str]) -> bool:
+        return not all(name in there[0] for name in names) or _dependent(names, *there)
+
     found: list[Alias] = []
     alike: dict[str, list[str]] = {}
     for name in columns:
-        twin = next((n for n in alike if _dependent([n, name], columns, blurs)), None)
+        twin = next(
+            (n for n in alike if _dependent([n, name], columns, blurs) and alike_there([n, name])),
+            None,
+        )
         alike.setdefault(twin or name, []).append(name)
     for twins in alike.values():
         if len(twins) > 1:
@@ -84,7 +98,7 @@ def exact_aliases(
         for names in _perhaps_dependent(involved, size, columns, blurs):
             if any(known <= set(names) for known in sets):
                 continue
-            if _dependent(names, columns, blurs):
+            if _dependent(names, columns, blurs) and alike_there(names):
                 sets.append(set(names))
                 rest = ", ".join(names)
                 found.append(Alias(names, f"{rest}: any one is a combination of the others", True))
@@ -117,7 +131,8 @@ def near_combinations(
         share: Part of the motion that may differ.
         rng: As for ``exact_aliases``, like the effects that are compared.
     """
-    columns, _ = _linear(simulator, rng or np.random.default_rng(0))
+    plain = simulator.with_effects(())
+    columns, _ = _linear(plain, *probes(plain, rng or np.random.default_rng(0)))
     if not all(name in columns for name in names):
         return ()
     size = min(len(column) for column in columns.values())
@@ -167,11 +182,9 @@ def _read_after(
 
 
 def _linear(
-    simulator: HostSimulator, rng: np.random.Generator
+    plain: HostSimulator, states: Array, inputs: Array
 ) -> tuple[dict[str, Array], dict[str, float]]:
     """Change of the motion per strength of every effect that is linear in one, of unit length."""
-    plain = simulator.with_effects(())
-    states, inputs = probes(plain, rng)
     near: dict[str, Array] = {}
     far: dict[str, Array] = {}
     # Of twins the first is named: what moves is more often off than what reads it.

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from residual.gap import GapResult
-from residual.gap.result import Gap
+from residual.gap.forecasts import own_channels
+from residual.gap.result import ChannelGap, Gap
 from residual.logs import Finding
 from studies.gap.answer import headline, is_footnote, kind_text, notes
 from studies.gap.lead import lead
@@ -46,9 +47,12 @@ def summary(result: GapResult, tolerance: float | None = None) -> str:
     gap = result.gap
     unit = f" in {typeset(gap.unit)}" if gap.unit else ""
     lines += [f"{ahead(gap)}{unit}, {CROSS_VALIDATED} (95 % interval)", *bars(gap)]
+    others = beside(result)
+    lines += [f"  {name}: {told}" for name, told in others.items()]
     blocks = f"{gap.blocks} blocks of data, {gap.folds} groups of them left out in turn"
     if result.effects and gap.no_better:
-        blocks += f"; in {gap.no_better} of them the corrected simulator forecasts no better"
+        of = f" {gap.channel}" if others else ""
+        blocks += f"; in {gap.no_better} of them the corrected simulator forecasts{of} no better"
     lines += wrapped(blocks, "  ")
     if result.held_out:
         lines += ["", *held_out(result.held_out)]
@@ -82,20 +86,27 @@ def bars(gap: Gap) -> list[str]:
     ]
 
 
+def beside(result: GapResult) -> dict[str, str]:
+    """Errors of the other channels, but of those that are the rate of one that was measured."""
+    table = result.gap.by_channel
+    channels = [c for c in result.corrected.physical_channels if c.name in table]
+    own = [channels[place].name for place in own_channels(channels)]
+    return {name: errors(table[name]) for name in own if name != result.gap.channel}
+
+
 def held_out(gap: Gap) -> list[str]:
     """The table for the records that were set aside."""
     lines = [f"records set aside with --held-out, {ahead(gap).split(' error')[0]} errors"]
-    for name, channel in gap.by_channel.items():
-        numbers = ", ".join(
-            f"{word} {span.value:.3g}"
-            for word, span in (
-                ("nominal", channel.before),
-                ("corrected", channel.after),
-                ("noise floor", channel.noise_floor),
-            )
-        )
-        lines.append(f"  {name}: {numbers}{unit_text(channel.unit)}")
-    return lines
+    return lines + [f"  {name}: {errors(channel)}" for name, channel in gap.by_channel.items()]
+
+
+def errors(channel: ChannelGap) -> str:
+    """Errors of one channel in a line."""
+    spans = {
+        "nominal": channel.before, "corrected": channel.after, "noise floor": channel.noise_floor
+    }  # fmt: skip
+    numbers = ", ".join(f"{word} {span.value:.3g}" for word, span in spans.items())
+    return f"{numbers}{unit_text(channel.unit)}"
 
 
 def found_in_data(findings: Sequence[Finding]) -> list[str]:

@@ -94,6 +94,32 @@ def test_what_a_sensor_of_a_first_order_state_does_is_told_from_no_gain_and_no_l
     assert {"constant_load@level", "actuator_bias@flow", "sensor_offset@level"} in twins
 
 
+class Boat(FirstOrderSystem):
+    """A speed whose scale says how much it varies, and drag that is left alone at low speed."""
+
+    dt = 1.0
+    state_channels = (Channel("speed", "m/s", "rate", scale=0.3),)
+    action_channels = (Channel("thrust", "N", "input", scale=40.0),)
+    parameters: ClassVar = {"drag": Parameter(3.5, "N s^2/m^2", "", low=0.1)}
+
+    def derivative(self, x, u, p):
+        return (u - p.drag * np.maximum(x, 2.0) ** 2) / 100.0
+
+
+def test_what_is_alike_in_random_states_only_is_no_twin_where_the_log_is():
+    def twins(**where):
+        return [set(alias.effects) for alias in exact_aliases(Boat(), **where)]
+
+    rng = np.random.default_rng(1)
+    seen = rng.uniform(2, 4, (96, 1)), rng.uniform(0, 80, (96, 1))
+    assert any({"constant_load@speed", "drag"} <= names for names in twins())
+    assert not any({"constant_load@speed", "drag"} <= names for names in twins(seen=seen))
+    # What is alike everywhere stays so.
+    assert any(
+        {"constant_load@speed", "actuator_bias@thrust"} <= names for names in twins(seen=seen)
+    )
+
+
 @pytest.mark.parametrize(
     ("effect", "message"),
     [

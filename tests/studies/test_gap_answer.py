@@ -109,6 +109,19 @@ def test_the_first_sentence_says_where_only_records_set_aside_have_a_gap(error, 
     ) is said
 
 
+def test_other_channels_have_their_errors_below_the_table():
+    found = result(MASS)
+    table = found.gap.by_channel | {
+        "rate": ChannelGap("rad/s", *[Span(x, x, x) for x in (5, 2, 1)])
+    }
+    both = dataclasses.replace(found, gap=dataclasses.replace(found.gap, by_channel=table))
+    assert "rate:" not in summary(both)  # the angle that it is the rate of was measured
+    alone = dataclasses.replace(found.gap, channel="volts", by_channel={"rate": table["rate"]})
+    says = summary(dataclasses.replace(found, gap=dataclasses.replace(alone, no_better=3)))
+    assert "  rate: nominal 5, corrected 2, noise floor 1 rad/s\n" in says
+    assert "the corrected simulator forecasts volts no better" in " ".join(says.split())
+
+
 @pytest.mark.parametrize(
     ("verdicts", "first"),
     [

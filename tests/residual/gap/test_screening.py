@@ -1,12 +1,14 @@
 """What a candidate adds to a fit: least squares with signs, start states projected out."""
 
+from types import SimpleNamespace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, nnls
 
 from residual.gap.bounded import bounded_step
-from residual.gap.screening import constrained, project_out
+from residual.gap.screening import constrained, project_out, signatures
 
 
 @given(st.integers(0, 10_000), st.integers(1, 3))
@@ -60,3 +62,20 @@ def test_projection_removes_what_the_basis_can_imitate():
     mixed = basis @ rng.normal(size=(3, 2))
     np.testing.assert_allclose(project_out(basis, mixed), 0, atol=1e-9)
     assert np.abs(basis.T @ project_out(basis, other)).max() < 1e-9
+
+
+def test_a_number_at_its_bound_hides_nothing_that_moves_like_it():
+    rng = np.random.default_rng(0)
+    column = rng.normal(size=(4, 30, 1))
+    knob = SimpleNamespace(low=-0.1, high=0.1, step=0.1)
+
+    def fit(value):
+        return SimpleNamespace(
+            model=SimpleNamespace(knobs=[knob]), theta=np.array([value]), weights=np.ones(4),
+            basis=np.zeros((4, 30, 0)), by_knob=column, projected=3.0 * column[..., 0],
+        )  # fmt: skip
+
+    assert np.abs(signatures(fit(0.05), [], column).matrix).max() < 1e-9
+    pinned = signatures(fit(0.1), [], column)
+    np.testing.assert_allclose(pinned.matrix[:, 0], column.ravel())
+    np.testing.assert_allclose(pinned.residual, 3.0 * column.ravel())

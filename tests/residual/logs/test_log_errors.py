@@ -93,6 +93,10 @@ def test_layout_that_fits_no_file(csv):
     assert "unknown unit 'degr': did you mean 'deg'?" in error(
         path, states={"angle": Column("angle", "degr")}
     )
+    # Nothing is offered that measures something else.
+    assert "unknown unit 'd/min': expected one of rad/s" in error(
+        path, states={"rate": Column("rate", "d/min")}
+    )
     assert "column 'angle': unit 'deg/s' is converted to rad/s, but rad is needed" in error(
         path, states={"angle": Column("angle", "deg/s")}
     )

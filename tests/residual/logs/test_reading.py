@@ -63,6 +63,8 @@ def test_units_agree_with_their_definitions():
     assert freezing.factor * 32 + freezing.offset == pytest.approx(273.15)
     assert find_unit("rpm", "rad/s").factor * 60 == pytest.approx(2 * np.pi)
     assert find_unit("km/h", "m/s").factor * 36 == pytest.approx(10)
+    assert find_unit("knots", "m/s").factor * 3600 == pytest.approx(find_unit("nmi", "m").factor)
+    assert find_unit("fpm", "m/s").factor * 60 == pytest.approx(find_unit("ft", "m").factor)
     assert find_unit("", "counts") == ("counts", 1.0, 0.0)
     for name, unit in UNITS.items():
         assert unit.base in UNITS and UNITS[unit.base].factor == 1, name
