@@ -13,9 +13,13 @@ from swing import sticking
 
 from residual.gap.candidates import candidates
 from residual.gap.find import find_gap
-from residual.gap.global_search import _Space
+from residual.gap.global_search import GlobalSearch, _Space
+from residual.gap.horizon import usual_horizon
 from residual.gap.model import Model
+from residual.gap.paths import variation
+from residual.gap.prepare import Prepared, prepare
 from residual.gap.samples import Samples
+from residual.gap.short_forecasts import ShortForecasts
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorGain, StribeckFriction
 from sims.equations import EquationOfMotion
@@ -46,6 +50,62 @@ def hunting(breakaway: float = 110.0, seed: int = 1) -> Trajectory:
     angle, volts = sticking(breakaway, 120.0, seed)
     states = np.stack([angle, np.full(len(angle), np.nan)], axis=1)
     return Trajectory("hunting", 0.02 * np.arange(len(angle)), states, volts[:-1, None])
+
+
+def true_numbers(breakaway: float) -> np.ndarray:
+    """Sliding friction and breakaway in N m, speed between them in rad/s, gain: see ``hunting``."""
+    return np.array([0.168, 2.8e-3 * breakaway, 3.0, 1.1])
+
+
+def ready(breakaway: float, seed: int) -> tuple[Prepared, Model]:
+    """The servo's log, and the servo with friction and another gain."""
+    servo, run = Servo(), hunting(breakaway, seed)
+    prepared = prepare(servo, [run], usual_horizon(servo, [run]))
+    effects = (StribeckFriction("angle"), ActuatorGain("pwm"))
+    return prepared, Model(servo, candidates(servo, effects, prepared.fitter.samples))
+
+
+@given(rest=st.integers(0, 900), seed=st.integers(0, 9))
+@settings(max_examples=30, deadline=None)
+def test_rest_does_not_make_motion_small(rest, seed):
+    moving = np.random.default_rng(seed).standard_normal((100, 2))
+    states = np.vstack([moving, np.zeros((rest, 2))])
+    times = 0.02 * np.arange(len(states))
+    samples = Samples.join([Trajectory("run", times, states, np.zeros((len(states) - 1, 1)))], 1)
+    usual, still = (variation(samples, nodes) for nodes in (np.tile(moving, (10, 1)), states))
+    assert (still > 0.5 * np.sqrt(100 / len(states)) * usual[: len(still)]).all()
+
+
+def test_the_start_of_a_forecast_is_found_where_most_of_a_record_is_rest():
+    """A record that begins at rest under the full voltage: its first difference is no rate."""
+    prepared, model = ready(110.0, 13)
+    fitter, theta = prepared.fitter, true_numbers(110.0)
+    fit = fitter.fit(model, theta)
+    every = np.zeros(len(fitter.blocks.windows), np.int64)
+    squares = fitter.foretell(model, theta[None], every, fit).squares
+    assert np.sqrt(squares.max()) < 0.05
+
+
+@pytest.mark.parametrize(("breakaway", "seed"), [(90.0, 17), (110.0, 11), (90.0, 19), (90.0, 20)])
+@pytest.mark.parametrize("parts", [1, 8])
+def test_forecasts_of_parts_tell_breakaway_from_twice_the_friction(breakaway, seed, parts):
+    """Friction without breakaway does best where it and the gain are about twice the true ones."""
+    prepared, model = ready(breakaway, seed)
+    plain = np.stack([[s, 0.0, 3.0, 6 * s - 0.15] for s in np.linspace(0.2, 0.6, 81)])
+    misses = ShortForecasts(prepared.fitter, model, parts).misses(
+        np.vstack([true_numbers(breakaway), plain])
+    )
+    assert misses[0] + np.log(9) < misses[1:].min()
+
+
+@pytest.mark.parametrize(("breakaway", "seed"), [(90.0, 41), (110.0, 42), (90.0, 43)])
+def test_friction_that_slopes_miss_is_found(breakaway, seed):
+    prepared, model = ready(breakaway, seed)
+    fitter = prepared.fitter
+    by_slopes = fitter.fit(model, np.array([0.005, 0.04, 1.5, 0.1]))
+    found = GlobalSearch(prepared.floor.sigma, np.inf).better(fitter, by_slopes, 4)
+    told, wanted = found.theta[[0, 1, 3]], true_numbers(breakaway)[[0, 1, 3]]
+    assert told == pytest.approx(wanted, rel=0.1)
 
 
 @given(
