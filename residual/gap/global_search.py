@@ -153,10 +153,12 @@ class _Space:
         self.model, self.theta, self.free = model, theta, free
         knobs = model.knobs[:free]
         own = list(zip(model.owner[:free], (knob.field for knob in knobs), strict=True))
-        self.above = [
-            own.index((owner, knob.above)) if knob.above else -1
-            for owner, knob in zip(model.owner, knobs, strict=False)
-        ]
+        above = {
+            number: own.index((owner, knob.above))
+            for number, (owner, knob) in enumerate(zip(model.owner, knobs, strict=False))
+            if knob.above
+        }
+        self.ratios, self.bases = list(above), list(above.values())
         scale, low, high = 10 * model.step[:free], model.low[:free], model.high[:free]
         begin, one_sided = theta[:free], np.isfinite(low)
         self.log = low >= 0
@@ -170,9 +172,7 @@ class _Space:
             np.where(self.log, np.log(least), down),
             np.where(self.log, np.log(most), up),
         )
-        for number, other in enumerate(self.above):
-            if other >= 0:
-                self.low[number], self.high[number] = 0.0, np.log(ABOVE)
+        self.low[self.ratios], self.high[self.ratios] = 0.0, np.log(ABOVE)
 
     def inside(self, points: Array) -> Array:
         """Points moved into the space; a bound itself may be outside by rounding."""
@@ -183,9 +183,7 @@ class _Space:
         """(V, free) in the space -> (V, p), the other numbers as they are."""
         found = np.repeat(self.theta[None], len(points), axis=0)
         own = np.where(self.log, np.exp(np.where(self.log, points, 0.0)), points)
-        for number, other in enumerate(self.above):
-            if other >= 0:
-                own[:, number] *= own[:, other]
+        own[:, self.ratios] *= own[:, self.bases]
         found[:, : self.free] = own
         return np.clip(found, self.model.low, self.model.high)
 
@@ -193,7 +191,5 @@ class _Space:
         """(p,) -> (free,) in the space."""
         own = theta[: self.free]
         found = np.where(self.log, np.log(np.maximum(own, 1e-300)), own)
-        for number, other in enumerate(self.above):
-            if other >= 0:
-                found[number] -= found[other]
+        found[self.ratios] -= found[self.bases]
         return self.inside(found)
