@@ -125,7 +125,8 @@ def confirm(
                 search, key, made, found.adequate, parameter_tolerance, until
             )
             # Now that intervals allow for the parameters, too.
-            lost = [c for c in made if not c.needed and may_vanish(search, c)]
+            doubtful = [c for c in made if not (c.needed or c.by_fit)]
+            lost = [c for c in doubtful if may_vanish(search, c)]
             plainer = None if lost or found.adequate else in_plain_form(search, key, made)
             if plainer:
                 key = plainer

@@ -8,7 +8,7 @@ on logs that the rule had not been made with; see docs/find-gap.md.
 Where motion hangs on a hair, as what sticks and breaks away does, the forecast of a block or two
 may go astray whatever is known. Fits to all data say more there: what lowers their loss no more
 than chance does is not needed, and a set that leaves a third of what another does, and forecasts
-most blocks better, comes before it.
+few blocks worse, comes before it.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ MATERIAL, AT_ONE = 0.2, 0.3
 TRIFLE = 0.005
 #: Forecasts so many times as bad are not as good, whatever the chance is.
 NEAR = 1.5
-#: Loss over that of another set from which on a fit is no match, and the part of all blocks that
-#: the other set has to forecast better.
-NO_MATCH, MOST_BLOCKS = 9.0, 0.75
+#: Loss over that of another set from which on a fit is no match, and the part of all blocks in which
+#: the other set's forecasts may be worse.
+NO_MATCH, ASTRAY = 9.0, 0.25
 #: Differences of relative errors below this are none, nor such below a part of the best error.
 SAME, ALIKE = 0.01, 0.1
 
@@ -98,11 +98,11 @@ def _fits_far_better(search: Search, key: Key, among: list[Key]) -> Key:
     """The likeliest set of those that a set is no match for, if any, or the set."""
     own = search.currency.by_block(search.validated[key].squares).mean(axis=1)
 
-    def most_better(other: Key) -> bool:
+    def seldom_behind(other: Key) -> bool:
         its = search.currency.by_block(search.validated[other].squares).mean(axis=1)
-        return bool((its < own).mean() >= MOST_BLOCKS)
+        return bool((its > own + SAME / len(own)).mean() <= ASTRAY)
 
-    far = [k for k in among if no_match(search, key, k) and most_better(k)]
+    far = [k for k in among if no_match(search, key, k) and seldom_behind(k)]
     return min(far, key=lambda k: score(search, k), default=key)
 
 

@@ -38,6 +38,8 @@ class Claim:
         slight: Whether they are without these, too: the parameters do nothing of its work.
         unasked: Whether there was no time to ask that.
         brief: Whether it is a time too short for the log's own clock.
+        by_fit: Whether a fit to all data leaves three times as much without it: forecasts of single
+            blocks may go astray all the same, where motion hangs on a hair.
         meant: Numbers of its twins in its place.
         beside: Its own numbers beside twins of the others, where they differ.
     """
@@ -57,6 +59,7 @@ class Claim:
     slight: bool = False
     unasked: bool = False
     brief: bool = False
+    by_fit: bool = False
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
 

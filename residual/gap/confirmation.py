@@ -76,6 +76,7 @@ def claims(
                 any(at_bound(fit, j) for j in strengths),
                 taken,
                 brief=brief(search, number, fit.theta[own]),
+                by_fit=by_fit(search, key, number),
             )
         )
     return sorted(found, key=lambda claim: -claim.share[0])
@@ -213,6 +214,12 @@ def needed(search: Search, key: Key, number: int, adequate: bool) -> bool:
         return score(search, rest) - score(search, key) > tie(search) and lost > 0
     gone = 1 - 1 / max(_ratio(search, without, own, group), 1e-12)
     return gone > 0.5 * AT_ONE and search.currency.clearly(without, own, group, True) > WORSE
+
+
+def by_fit(search: Search, key: Key, number: int) -> bool:
+    """Whether a set without one of its effects is no match for it."""
+    rest = all_but(key, number)
+    return rest in search.tried and no_match(search, rest, key)
 
 
 def steady(search: Search, key: Key, j: int) -> bool:

@@ -24,12 +24,13 @@ MOVED = 1e-3
 def nameable(search: Search, claim: Claim, blocks: int, adequate: bool) -> bool:
     """Whether an effect has few enough rivals, a size, and data enough, to be named at all.
 
-    Nor is one named that makes forecasts worse, unless chance decides.
+    Nor is one named that makes forecasts worse, unless chance decides, or fits to all data.
     """
-    if not adequate and claim.share[0] <= 0:
+    if not adequate and claim.share[0] <= 0 and not claim.by_fit:
         return False
     few = len(families(search, claim)) <= (MOST_FAMILIES if claim.needed else UNNEEDED)
-    return few and blocks >= TOO_FEW and not may_vanish(search, claim)
+    there = claim.by_fit or not may_vanish(search, claim)
+    return few and blocks >= TOO_FEW and there
 
 
 def may_vanish(search: Search, claim: Claim) -> bool:
@@ -131,6 +132,8 @@ def effect_verdict(
         says.append("its size may be zero")
     if not claim.gains:
         says.append("its share of the gap may be zero")
+    if claim.by_fit and not (claim.needed and claim.gains):
+        says.append("a fit to all data leaves three times as much without it")
     return Verdict(
         kind, effect.name, effect.where, claim.numbers,
         tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,

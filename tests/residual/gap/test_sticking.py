@@ -125,20 +125,15 @@ def test_friction_is_sought_where_it_breaks_away_harder_than_it_slides(sliding, 
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("breakaway", "seed"),
-    [
-        (110.0, 1),
-        (90.0, 2),
-        pytest.param(
-            110.0, 5, marks=pytest.mark.xfail(strict=True, reason="a dead zone is certain")
-        ),
-    ],
-)
+@pytest.mark.parametrize(("breakaway", "seed"), [(110.0, 1), (90.0, 2), (110.0, 5), (110.0, 6)])
 def test_of_a_servo_that_hunts_nothing_wrong_is_certain(breakaway, seed):
-    found = find_gap(Servo(), [hunting(breakaway, seed)])
-    certain = {v.effect: v for v in found.verdicts if v.kind == "confirmed"}
-    assert set(certain) <= {"stribeck_friction", "coulomb_friction", "actuator_gain", "gain"}
-    if "stribeck_friction" in certain:
-        told = certain["stribeck_friction"].parameters["breakaway"].value
-        assert told == pytest.approx(2.8e-3 * breakaway, rel=0.05)
+    """The same servo's other motion is foretold, however few blocks of the log can be."""
+    found = find_gap(Servo(), [hunting(breakaway, seed)], held=[hunting(breakaway, 100 + seed)])
+    told = {v.effect: v for v in found.verdicts if v.kind == "confirmed"}
+    assert set(told) <= {"stribeck_friction", "actuator_gain", "gain"}
+    named = {v.effect for v in found.verdicts if v.kind in ("confirmed", "ambiguous")}
+    assert "stribeck_friction" in named
+    assert found.held_out.after.value < 0.02 * found.held_out.before.value
+    if "stribeck_friction" in told:
+        breaking = told["stribeck_friction"].parameters["breakaway"].value
+        assert breaking == pytest.approx(2.8e-3 * breakaway, rel=0.05)
