@@ -31,8 +31,8 @@ MATERIAL, AT_ONE = 0.2, 0.3
 TRIFLE = 0.005
 #: Forecasts so many times as bad are not as good, whatever the chance is.
 NEAR = 1.5
-#: Loss over that of another set from which on a fit is no match, and the part of all blocks in which
-#: the other set's forecasts may be worse.
+#: Loss over that of another set from which on a fit is no match, and the part of all blocks that
+#: the other set may forecast worse.
 NO_MATCH, ASTRAY = 9.0, 0.25
 #: Differences of relative errors below this are none, nor such below a part of the best error.
 SAME, ALIKE = 0.01, 0.1
