@@ -46,11 +46,12 @@ def test_blocks_in_which_nothing_was_gained_are_counted():
     assert no_better(before, np.array([1.0, 5.0, 4.0, 1.5]), floor) == 2
 
 
-@pytest.mark.parametrize(("adequate", "share", "named"), [
-    (False, -0.1, False), (False, 0.1, True), (True, -0.1, True),
+@pytest.mark.parametrize(("adequate", "share", "by_fit", "named"), [
+    (False, -0.1, False, False), (False, 0.1, False, True), (True, -0.1, False, True),
+    (False, -0.1, True, True),
 ])  # fmt: skip
-def test_what_makes_forecasts_worse_is_not_named_where_chance_does_not_decide(
-    adequate, share, named
+def test_what_makes_forecasts_worse_is_not_named_where_neither_chance_nor_fits_decide(
+    adequate, share, by_fit, named
 ):
     knob = SimpleNamespace(field="change", strength=True)
     search = SimpleNamespace(
@@ -58,6 +59,6 @@ def test_what_makes_forecasts_worse_is_not_named_where_chance_does_not_decide(
     )
     claim = SimpleNamespace(
         number=0, share=(share, share - 0.1, share + 0.1), rivals=(), needed=True,
-        numbers={"change": Number(0.1, 0.05, 0.15, "kg")},
+        numbers={"change": Number(0.1, 0.05, 0.15, "kg")}, by_fit=by_fit,
     )  # fmt: skip
     assert nameable(search, claim, 20, adequate) is named
