@@ -21,7 +21,7 @@ from residual.gap.global_search import GlobalSearch
 from residual.gap.model import Model
 from residual.gap.plausible import absurd, nearly, surprises
 from residual.gap.screening import Signatures, signatures, trials
-from residual.gap.validation import Validated, validate
+from residual.gap.validation import validate
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -89,8 +89,7 @@ class Search:
         self._from_longer_leads: dict[Key, Array] = {}
         self._signatures: dict[Key, Signatures] = {}
         channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
-        found = validate(fitter, base) if free else self.before
-        self.validated: dict[Key, Validated] = {(): found}
+        self.validated = {(): validate(fitter, base) if free else self.before}
         self.currency = Currency(self.before.squares, groups(channels))
 
     # -- what is known of a set -----------------------------------------------------------
@@ -175,14 +174,9 @@ class Search:
         self, key: Key, additions: Iterable[tuple[int, Array]], drop: Key = ()
     ) -> tuple[Key, Array]:
         """Sorted key and start vector of a set with some candidates added and some dropped."""
-        values: dict[int, Array] = {}
-        at = 0
-        for number in key:
-            width = len(self.candidates[number].knobs)
-            values[number] = self.tried[key].theta[at : at + width]
-            at += width
-        for number in drop:
-            values.pop(number)
+        fit = self.tried[key]
+        kept = [(place, number) for place, number in enumerate(key) if number not in drop]
+        values = {number: fit.theta[fit.model.owner == place] for place, number in kept}
         values.update(dict(additions))
         fresh = tuple(sorted(values))
         return fresh, np.concatenate([values[i] for i in fresh]) if fresh else np.zeros(0)
@@ -274,6 +268,14 @@ class Search:
         """Candidates that move exactly as one does."""
         return list(self.twins.get(self.candidates[number].label, ()))
 
+    def _stands_for(self, number: int) -> int:
+        """The screened candidate that moves exactly as a twin does; itself if it is one."""
+        effect = self.candidates[number].effect
+        alike = (
+            i for i in range(self.screened) if effect in [twin.effect for twin in self.twins_of(i)]
+        )
+        return number if number < self.screened else next(alike)
+
     def contains(self, one: int, other: int) -> bool:
         """Whether an effect is a special case of another at the same place."""
         return self.candidates[one].effect.contains(self.candidates[other].effect)
@@ -288,9 +290,10 @@ class Search:
         """Whether two effects make the same motion in these data beside some others."""
         around = self.signatures(rest)
         columns = {v.candidate: v.columns for v in around.variants}
-        if any(len(columns[number]) != 1 for number in (one, other)):
+        pair = [columns.get(self._stands_for(number), ()) for number in (one, other)]
+        if any(len(places) != 1 for places in pair):
             return False
-        a, b = (around.matrix[:, columns[number][0]] for number in (one, other))
+        a, b = (around.matrix[:, places[0]] for places in pair)
         lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
         return lengths > 0 and abs(float(a @ b)) > SAME_MOTION * lengths
 
