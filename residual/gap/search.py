@@ -21,7 +21,7 @@ from residual.gap.global_search import GlobalSearch
 from residual.gap.model import Model
 from residual.gap.plausible import absurd, nearly, surprises
 from residual.gap.screening import Signatures, signatures, trials
-from residual.gap.validation import validate
+from residual.gap.validation import Validated, validate
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -47,13 +47,11 @@ class Search:
         beside: Candidates that are free beside every set, the empty one included, and that no set
             is charged for: parameters within their tolerance.
         nominal: The simulator as it was given; ``before``: its forecasts.
-        tried: Every fitted set: sorted candidate numbers -> fit.
-        unfit: Sets that did not converge.
+        tried: Every fitted set: sorted candidate numbers -> fit; ``unfit``: not converged.
         refused: Sets that cannot be right whatever they take off, and why.
         nearly: Those of them that could be, as far as their numbers are known.
         halved: Those that were fitted at half the step, too, see ``numerics.at_half_step``.
-        validated: Cross-validated forecasts of the sets.
-        currency: Relative errors.
+        validated: Cross-validated forecasts of the sets; ``currency``: relative errors.
     """
 
     def __init__(
@@ -89,7 +87,7 @@ class Search:
         self._from_longer_leads: dict[Key, Array] = {}
         self._signatures: dict[Key, Signatures] = {}
         channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
-        self.validated = {(): validate(fitter, base) if free else self.before}
+        self.validated: dict[Key, Validated] = {(): validate(fitter, base) if free else self.before}
         self.currency = Currency(self.before.squares, groups(channels))
 
     # -- what is known of a set -----------------------------------------------------------

@@ -7,7 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from residual.gap import find_gap
+from residual.gap.candidates import candidates
+from residual.gap.prepare import prepare
+from residual.gap.search import Search
 from residual.trajectories import Trajectory
+from sims.effects import ConstantLoad, ParameterChange
 from sims.effects.library import library
 from sims.equations import EquationOfMotion
 from sims.simulator import Channel, Parameter
@@ -94,3 +98,15 @@ def test_a_twin_of_a_believable_size_stands_for_one_that_is_not():
     assert rotor.parameters["change"].value == pytest.approx(ROTOR - 0.001, rel=0.02)
     friction = named(found, "viscous_friction").parameters["coefficient"]
     assert friction.value == pytest.approx(FRICTION, rel=0.02)
+
+
+def test_a_twin_that_no_screen_knows_moves_as_what_it_is_a_twin_of():
+    ready = prepare(Arm(), [swing(0.8), swing(1.4)], 0.4)
+    mass, rotor, load = candidates(
+        Arm(), (ParameterChange("mass"), ParameterChange("rotor"), ConstantLoad("angle")),
+        ready.fitter.samples,
+    )  # fmt: skip
+    search = Search(Arm(), [mass, load], ready.fitter, twins={"mass": [rotor]})
+    twin = search.candidates.index(rotor)
+    assert search.same_motion((), 0, twin)
+    assert not search.same_motion((), 1, twin)
