@@ -62,13 +62,14 @@ class GlobalSearch:
         self.noise, self.until = noise, until
         self._left = GLOBALLY * (until - time.process_time())
 
-    def better(self, fitter: Fitter, found: Fit, free: int) -> Fit:
+    def better(self, fitter: Fitter, found: Fit, free: int, begun_from: Array) -> Fit:
         """A fit, or the same set's from elsewhere where that is better.
 
         Args:
             fitter: Holds the windows.
             found: The fit by slopes.
             free: How many of its numbers, from the first on, are sought; the others stay.
+            begun_from: Numbers that it began from, (p,): they may have been better.
         """
         if self.noise is None or not isinstance(fitter, SmoothFitter):
             return found
@@ -77,7 +78,10 @@ class GlobalSearch:
             if begun > self.until or self._left < 0:
                 break
             starts = begins_elsewhere(fitter, found, self.noise, free, PARTS[turn], turn)
-            fits = [fitter.fit(found.model, start, found) for start in starts]
+            if len(starts) and not turn:
+                starts = np.vstack([begun_from, starts])
+            ways = (fitter.from_forecasts, fitter.fit)
+            fits = [way(found.model, start, found) for start in starts for way in ways]
             self._left -= time.process_time() - begun
             found = min([found, *fits], key=lambda fit: fit.merit)
         return found

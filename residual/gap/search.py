@@ -214,7 +214,7 @@ class Search:
                 start = self._from_nested(key, near, theta)
                 again = self.fitter.fit(self.model(key), start, self.tried[near])
                 found = again if again.merit < found.merit else found
-            found = self._globally.better(self.fitter, found, self.numbers(key))
+            found = self._globally.better(self.fitter, found, self.numbers(key), theta)
         if key in self.tried and found.merit >= self.tried[key].merit:
             return
         self._forget(key)

@@ -75,11 +75,7 @@ class SmoothFitter:
         return dataclasses.replace(self, sigma=other.sigma)
 
     def fit(self, model: Model, theta: Array, near: Fit | None = None) -> Fit:
-        """See ``Fitter.fit``; always from the measured path, since a rival's may mislead.
-
-        Of what holds still also from forecasts by the first guess: where motion begins and stops,
-        the measured path tells a linear picture little.
-        """
+        """See ``Fitter.fit``; always from the measured path, since a rival's may mislead."""
         theta = np.clip(theta, model.low, model.high)
         nodes = model.widen(self.samples, self.nodes, theta)
         known = self.by_state if model.width == self.by_state.shape[1] else None
@@ -87,10 +83,14 @@ class SmoothFitter:
         if len(theta) and not found.converged:
             again = self._shot(model, found.nodes, found.theta, None, 0.05)
             found = again if again.merit <= found.merit else found
-        if any(candidate.effect.holds_still for candidate in model.chosen):
-            again = self._shot(model, self._foretold(model, theta, found), theta, None, 0.05)
-            found = again if again.merit <= found.merit else found
         return self._as_fit(found)
+
+    def from_forecasts(self, model: Model, theta: Array, near: Fit) -> Fit:
+        """Numbers of least loss from ``theta`` and its forecasts of all windows on: where motion
+        begins and stops, the measured path tells a linear picture little."""
+        theta = np.clip(theta, model.low, model.high)
+        nodes = self._foretold(model, theta, near.inner)
+        return self._as_fit(self._shot(model, nodes, theta, None, 0.05))
 
     def _foretold(self, model: Model, theta: Array, near: shooting.ShootingFit) -> Array:
         """Nodes on forecasts from the lead-ins of all windows, (n, n_s)."""

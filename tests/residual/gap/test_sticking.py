@@ -102,8 +102,9 @@ def test_forecasts_of_parts_tell_breakaway_from_twice_the_friction(breakaway, se
 def test_friction_that_slopes_miss_is_found(breakaway, seed):
     prepared, model = ready(breakaway, seed)
     fitter = prepared.fitter
-    by_slopes = fitter.fit(model, np.array([0.005, 0.04, 1.5, 0.1]))
-    found = GlobalSearch(prepared.floor.sigma, np.inf).better(fitter, by_slopes, 4)
+    small = np.array([0.005, 0.04, 1.5, 0.1])
+    by_slopes = fitter.fit(model, small)
+    found = GlobalSearch(prepared.floor.sigma, np.inf).better(fitter, by_slopes, 4, small)
     told, wanted = found.theta[[0, 1, 3]], true_numbers(breakaway)[[0, 1, 3]]
     assert told == pytest.approx(wanted, rel=0.1)
 
