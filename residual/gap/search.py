@@ -272,7 +272,7 @@ class Search:
         alike = (
             i for i in range(self.screened) if effect in [twin.effect for twin in self.twins_of(i)]
         )
-        return number if number < self.screened else next(alike)
+        return number if number < self.screened else next(alike, number)
 
     def contains(self, one: int, other: int) -> bool:
         """Whether an effect is a special case of another at the same place."""
