@@ -82,7 +82,8 @@ def gap(
         by_channel[channel.name] = ChannelGap(
             channel.unit, span(before.squares[:, i]), span(after.squares[:, i]), span(floor[:, i])
         )
-    main = main_channel(simulator, samples.measured, before.squares, floor)
+    shrunk = before.squares - after.squares if key else before.squares
+    main = main_channel(simulator, samples.measured, shrunk, floor)
     name = simulator.physical_channels[samples.measured[main]].name
     steps = [Step("", by_channel[name].before)]
     if search.beside:
@@ -123,12 +124,13 @@ def no_better(before: Array, after: Array, floor: Array) -> int:
 
 
 def main_channel(
-    simulator: HostSimulator, measured: NDArray[np.int64], before: Array, floor: Array
+    simulator: HostSimulator, measured: NDArray[np.int64], squares: Array, floor: Array
 ) -> int:
-    """Place of the channel whose error is largest beside its noise, rates of others left out."""
+    """Place of the channel whose squared error, or what is gained of it, is largest beside its
+    noise, (B, m) both; rates of others are left out."""
     channels = [simulator.physical_channels[c] for c in measured]
     places = own_channels(channels)
-    times = np.nanmean(before, axis=0) / np.maximum(np.nanmean(floor, axis=0), 1e-300)
+    times = np.nanmean(squares, axis=0) / np.maximum(np.nanmean(floor, axis=0), 1e-300)
     return max(places, key=lambda i: times[i])
 
 
