@@ -21,6 +21,7 @@ from residual.measured import fit_measured
 from residual.trajectories import Transitions
 from residual.uncertainty_penalty import PenalisedTask
 from simgap_files import jsonable
+from sims.episodes import refuse_ended_at_once
 from sims.rates import refuse_unrelated_rates
 from sims.simulator import Simulator
 from sims.system import System
@@ -102,7 +103,8 @@ class Steps:
                 runs = collect(policy.policy, env, samples, seed, noise)
                 tell(samples, "")
             steps = [(visited(self.system, run), run.actions) for run in runs]
-            refuse_unrelated_rates("the true system", self.system.nominal, steps)
+            for refuse in (refuse_ended_at_once, refuse_unrelated_rates):
+                refuse("the true system", self.system.nominal, steps)
             return Samples(transitions(self.system, runs))
 
         settings: dict[str, Any] = {"policy": policy.key, "samples": samples, "update": update}
