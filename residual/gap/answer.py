@@ -17,13 +17,14 @@ from residual.gap.exchange import add_exchanged
 from residual.gap.explain import FOOTNOTE, Explanation
 from residual.gap.forecasts import fitted_floor, gap, held_out, main_channel, noise_floor, rollouts
 from residual.gap.imitation import imitated
+from residual.gap.known import KNOWN
 from residual.gap.model import Model
 from residual.gap.numerics import other_numerics, own_substeps, with_enough_substeps
 from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import Blind, Gap, GapResult, Rival, Verdict
 from residual.gap.search import Key, Search
 from residual.gap.smooth import SmoothFitter
-from residual.gap.tolerance import KNOWN, allow_for_parameters
+from residual.gap.tolerance import allow_for_parameters
 from residual.gap.verdicts import (
     blind_verdict,
     calibrated_verdict,

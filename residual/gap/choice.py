@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.currency import Currency
+from residual.gap.known import departures
 from residual.gap.search import Key, Search
 from residual.gap.significance import score
 
@@ -108,10 +109,17 @@ def _fits_far_better(search: Search, key: Key, among: list[Key]) -> Key:
 
 def _better_fit(search: Search, keys: list[Key]) -> Key:
     """The set that forecasts best, or one that is as good within chance, of sizes that surprise
-    less, and fits better."""
+    less, and fits better; of sets that no data tell apart the one with the least to be otherwise
+    than was known."""
     best = min(keys, key=search.error)
-    near = [k for k in keys if _does_as_well(search, k, best)]
-    return min(near or [best], key=lambda key: (search.surprises(key), search.tried[key].merit))
+    near = [k for k in keys if _does_as_well(search, k, best)] or [best]
+    fewest = min(search.surprises(k) for k in near)
+    near = sorted(
+        (k for k in near if search.surprises(k) == fewest), key=lambda k: search.tried[k].merit
+    )
+    most = search.tried[near[0]].merit + search.fitter.tie(search.tried[()])
+    alike = [k for k in near if search.tried[k].merit <= most]
+    return min(alike, key=lambda k: departures(search, k))
 
 
 def _does_as_well(search: Search, key: Key, best: Key) -> bool:

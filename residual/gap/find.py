@@ -20,6 +20,7 @@ from residual.gap.explain import Explanation, explain
 from residual.gap.forecasts import beside_noise
 from residual.gap.free_parameters import better, worth_freeing
 from residual.gap.horizon import longest_horizon, usual_horizon
+from residual.gap.known import KNOWN
 from residual.gap.numerics import (
     fits_better,
     forecast_error,
@@ -32,7 +33,6 @@ from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import GapResult
 from residual.gap.search import Search
 from residual.gap.smooth import LEAD
-from residual.gap.tolerance import KNOWN
 from residual.gap.twins import exact_twins, with_twins
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory

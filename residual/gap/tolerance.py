@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap import known
 from residual.gap.bounded import bounded_step
 from residual.gap.candidates import Candidate, candidates
 from residual.gap.claim import Claim
@@ -31,8 +32,6 @@ from sims.effects.parameter import ParameterChange
 
 Array = NDArray[np.float64]
 
-#: How well a parameter is taken to be known, as a share of it.
-KNOWN = 0.03
 #: Rivals that are given another chance, parameters free.
 RIVALS = 4
 #: Squared residual that linear parameters promise a rival, over that of the chosen set, from which
@@ -40,8 +39,6 @@ RIVALS = 4
 HOPELESS = 10.0
 #: Part of an effect's work that free parameters do without it, from which on it may be theirs.
 WORK = 0.2
-#: Units of which the zero means nothing: of 298 K a share is no accuracy.
-ANY_ZERO = ("degC", "°C", "K", "degF", "°F")
 #: Parameters that are allowed for, those that matter most.
 MOST = 12
 
@@ -152,7 +149,7 @@ def within(search: Search, claim: Claim, tolerance: float) -> bool:
     effect = search.candidates[claim.number].effect
     if not isinstance(effect, ParameterChange):
         return False
-    size = tolerance * _size(search, effect.parameter)
+    size = tolerance * known.size(search, effect.parameter)
     (change,) = claim.numbers.values()
     return change.low < size and change.high > -size
 
@@ -184,7 +181,7 @@ def allowed(search: Search, tolerance: float) -> list[Candidate]:
     found, reach = [], []
     for candidate in candidates(simulator, changes, search.fitter.samples):
         assert isinstance(candidate.effect, ParameterChange)
-        most = tolerance * _size(search, candidate.effect.parameter)
+        most = tolerance * known.size(search, candidate.effect.parameter)
         (knob,) = candidate.knobs
         if most > 0:
             bounded = dataclasses.replace(
@@ -199,19 +196,6 @@ def allowed(search: Search, tolerance: float) -> list[Candidate]:
     trials = np.array([candidate.trials[0].values[0, 0] for candidate in found])
     matters = np.linalg.norm(columns, axis=(0, 1)) * np.array(reach) / np.abs(trials)
     return [found[i] for i in np.sort(np.argsort(-matters)[:MOST])]
-
-
-def _size(search: Search, parameter: str) -> float:
-    """What a parameter is known to a share of: its value, or, where zero means nothing, the range
-    over which the log has that quantity."""
-    known = search.simulator.parameters[parameter]
-    value = float(np.max(np.abs(known.value)))
-    if known.unit not in ANY_ZERO:
-        return value
-    samples, channels = search.fitter.samples, search.simulator.physical_channels
-    columns = [c for c in samples.measured if channels[c].unit in ANY_ZERO]
-    spans = [float(np.ptp(seen[np.isfinite(seen)])) for seen in samples.seen[:, columns].T]
-    return min(value, max(spans)) if spans else value
 
 
 @dataclasses.dataclass(frozen=True)

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from toy import Toy
 
 from residual.gap.choice import choose
+from sims.pendulum_equation import PendulumEquation
 
 
 @pytest.mark.parametrize(("second", "key"), [(0.41, (0,)), (0.39, (0, 1))])
@@ -46,6 +47,15 @@ def test_ties_go_to_the_better_fit():
     assert choose(toy).key == (3,)
     worse = Toy({(0,): 0.2, (3,): 0.4}, merits={(0,): 50.0, (3,): 20.0})
     assert choose(worse).key == (0,)
+
+
+def test_of_what_no_data_tell_apart_the_least_is_otherwise_than_was_known():
+    # One effect, and a mass that is 2 % off; or that mass off by a third, and another effect.
+    sets = {(0, 3): 0.2, (1, 3): 0.2, (0, 1): 0.2}
+    merits = {(0, 3): 20.01, (1, 3): 20.0, (0, 1): 30.0}
+    known = PendulumEquation().parameters["mass"].value
+    assert choose(Toy(sets, merits, mass=0.02 * known)).key == (0, 3)
+    assert choose(Toy(sets, merits, mass=0.33 * known)).key == (1, 3)
 
 
 def test_what_would_be_surprisingly_large_comes_after_what_does_as_well():

@@ -41,12 +41,15 @@ class Toy:
         scatter: Relative spread of the blocks' errors about the given ones.
         half: Errors at half the horizon, if not the same.
         surprising: Numbers of effects that are larger than usual.
+        mass: Change of the mass, in kg.
     """
 
     def __init__(
-        self, errors, merits=None, joints=1, blocks=20, scatter=0.0, half=None, surprising=()
-    ):
+        self, errors, merits=None, joints=1, blocks=20, scatter=0.0, half=None, surprising=(),
+        mass=0.02,
+    ):  # fmt: skip
         self.surprising = set(surprising)
+        fitted = (ParameterChange("mass", mass), *EFFECTS[1:])
         rng = np.random.default_rng(0)
         drive = rng.uniform(0.5, 2.0, (blocks, joints))
         errors = {(): 1.0, **errors}
@@ -65,7 +68,14 @@ class Toy:
             for key, error in errors.items()
         }
         self.tried = {
-            key: SimpleNamespace(merit=(merits or {}).get(key, 1e4 * float(np.mean(error)) ** 2))
+            key: SimpleNamespace(
+                merit=(merits or {}).get(key, 1e4 * float(np.mean(error)) ** 2),
+                theta=np.zeros(len(key)),
+                model=SimpleNamespace(
+                    simulator=PendulumEquation(),
+                    bind=lambda _, key=key: SimpleNamespace(effects=[fitted[n] for n in key]),
+                ),
+            )
             for key, error in errors.items()
         }
         self.unfit, self.refused, self.nearly = set(), {}, set()
