@@ -18,9 +18,9 @@ from studies.gap.words import (
     names_of,
     number_text,
     percent,
-    plain,
     quantity_text,
     rounded,
+    six_digits,
     unit_text,
 )
 
@@ -73,7 +73,7 @@ def headline(verdict: Verdict, result: GapResult) -> str:
         total = rounded(float(parameter.value) + change.value, half)
         return (
             f"{name}: {number_text(change, sign=True)}, so {total}"
-            f"{unit_text(change.unit)} in place of {plain(float(parameter.value))}."
+            f"{unit_text(change.unit)} in place of {six_digits(float(parameter.value))}."
         )
     numbers = ", ".join(_named(field, number) for field, number in verdict.parameters.items())
     if verdict.family:

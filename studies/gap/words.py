@@ -79,7 +79,7 @@ def rounded(value: float, half: float) -> str:
     return f"{round(value, places):.{max(places, 0)}f}"
 
 
-def plain(value: float) -> str:
+def six_digits(value: float) -> str:
     """A number to six digits, and never as a power of ten where ``rounded`` writes zeros."""
     text = f"{value:g}"
     if "e-" in text and abs(value) > 1e-7:

@@ -37,7 +37,7 @@ class Mean:
 
     def __str__(self) -> str:
         if self.count == 1:
-            return plain(self.value)
+            return return_text(self.value)
         larger = max(abs(self.value), float(np.nan_to_num(self.half_width)))
         if abs(self.value) >= 100:
             return self._decimals(0)
@@ -75,6 +75,6 @@ def mean(values: Sequence[float]) -> Mean:
     return Mean(float(sample.mean()), half, float(sample.min()), len(sample))
 
 
-def plain(value: float) -> str:
+def return_text(value: float) -> str:
     """A return as people write it: five digits, and of what is large the units."""
     return f"{value:.0f}" if 1e5 <= abs(value) < 1e9 else f"{value:.5g}"

@@ -14,7 +14,7 @@ import pandas as pd
 
 from studies.learnt.errors import by_group, model_errors, no_gap
 from studies.learnt.pairs import above, starts
-from studies.learnt.statistics import Mean, mean, plain
+from studies.learnt.statistics import Mean, mean, return_text
 from studies.learnt.words import NEAR, POLICY_WORDS, duration
 from studies.reporting import KeyValues, Section, Verdict
 
@@ -104,9 +104,7 @@ def headline(
     start, learnt = _value(before), kinds.get("difference", kinds.get("corrected"))
     if learnt is None:
         good = target is not None and before["return_true"].min() >= target
-        says = (
-            f"Trained on the simulator alone, the policy returns {plain(start)} on the true system."
-        )
+        says = f"Trained on the simulator alone, the policy returns {return_text(start)} on the true system."
         return [Verdict(says, tone="neutral" if target is None else "good" if good else "bad")]
     chosen, reached = _chosen(learnt, target)
     samples, estimator, update = chosen.iloc[0][_PLACE]
@@ -128,14 +126,14 @@ def headline(
     )
     by = f"{estimator}, update {update}" if "difference" in kinds else POLICY_WORDS["corrected"]
     needed = f"{samples} true samples, {duration(samples * about['dt'])}"
-    gone = f"from {plain(start)} to {plain(value)} ({by}, {needed})"
+    gone = f"from {return_text(start)} to {return_text(value)} ({by}, {needed})"
     went = f"On the true system the return went {gone}."
     alone = _value(control) if control is not None else None
     text = [went] if found.same else []
     text += [_of_gain(found, starts(chosen)), *_of_target(found, target)]
     text += [*_of_cause(found, alone), *_of_rest(found, true, best)]
     tiles = {
-        "idealised policy": plain(start), f"after update {update}": plain(value),
+        "idealised policy": return_text(start), f"after update {update}": return_text(value),
         "gain": str(found.gain), "true interaction": duration(samples * about["dt"]),
     }  # fmt: skip
     if found.error is not None and not found.same:
@@ -179,7 +177,7 @@ def _of_cause(found: Evidence, control: float | None) -> list[str]:
     if found.worth is not None and control is not None:
         by = "seed by seed" if found.seeds > 1 else "in pairs"
         return [
-            f"As much training without a difference model ends at {plain(control)}; {by} the "
+            f"As much training without a difference model ends at {return_text(control)}; {by} the "
             f"model is worth {found.worth}."
         ]
     if found.same or found.unchanged or found.gain.low <= 0:
@@ -201,7 +199,7 @@ def _of_rest(found: Evidence, true: float | None, best: float | None) -> list[st
             f"{found.worst}: the gap is not closed, whatever the return."
         )
     if true is not None:
-        text.append(f"Learnt on the true system: {plain(true)}.")
+        text.append(f"Learnt on the true system: {return_text(true)}.")
     if best is not None:
         text.append(f"The best that is possible is {best:.0f}.")
     return text
