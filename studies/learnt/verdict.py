@@ -104,7 +104,10 @@ def headline(
     start, learnt = _value(before), kinds.get("difference", kinds.get("corrected"))
     if learnt is None:
         good = target is not None and before["return_true"].min() >= target
-        says = f"Trained on the simulator alone, the policy returns {return_text(start)} on the true system."
+        says = (
+            f"Trained on the simulator alone, the policy returns {return_text(start)} on the true "
+            "system."
+        )
         return [Verdict(says, tone="neutral" if target is None else "good" if good else "bad")]
     chosen, reached = _chosen(learnt, target)
     samples, estimator, update = chosen.iloc[0][_PLACE]

@@ -11,9 +11,9 @@ from studies.gap.words import (
     duration_text,
     number_text,
     percent,
-    plain,
     quantity_text,
     rounded,
+    six_digits,
     unit_text,
 )
 
@@ -92,4 +92,4 @@ def test_long_times_are_told_in_hours_and_days(seconds, text):
     ("value", "text"), [(0.055, "0.055"), (1.38889e-5, "0.0000138889"), (3.2e-9, "3.2e-09")]
 )
 def test_a_nominal_value_is_written_like_what_replaces_it(value, text):
-    assert plain(value) == text
+    assert six_digits(value) == text
