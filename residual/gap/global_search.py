@@ -2,10 +2,11 @@
 
 Where friction holds a joint or a dead zone an input, the times at which motion begins and stops
 jump with the numbers, and where nothing moves no number matters: the method of Gauss and Newton
-ends in one of many local minima. Differential evolution on forecasts of whole windows finds where
-to begin: half of its first generation lies about what slopes reached, the other half anywhere.
-Forecasts of parts of windows come first: each start and stop counts by itself there, while over a
-whole window the first that is missed decides.
+ends in one of many local minima. (Friction of a joint that never stands still is left to it.)
+Differential evolution on forecasts of whole windows finds where to begin: half of its first
+generation lies about what slopes reached, the other half anywhere. Forecasts of parts of windows
+come first: each start and stop counts by itself there, while over a whole window the first that is
+missed decides.
 Source: Storn and Price, "Differential evolution", J. Global Optimization 11 (1997).
 """
 
@@ -22,6 +23,7 @@ from residual.gap.fitting import Fit, Fitter
 from residual.gap.model import Model
 from residual.gap.short_forecasts import ShortForecasts
 from residual.gap.smooth import SmoothFitter
+from residual.gap.standstill import may_stick
 
 Array = NDArray[np.float64]
 
@@ -105,9 +107,12 @@ def begins_elsewhere(
         seed: Of the search.
     """
     model = fit.model
-    holds = any(candidate.effect.holds_still for candidate in model.chosen)
+    sticks = any(
+        may_stick(candidate.effect, model.simulator, fitter.samples, fitter.nodes)
+        for candidate in model.chosen
+    )
     own_step = model.batched and not model.simulator.own_files()
-    if not (holds and own_step and 0 < free <= MOST and _far(fitter, fit, noise)):
+    if not (sticks and own_step and 0 < free <= MOST and _far(fitter, fit, noise)):
         return np.zeros((0, len(fit.theta)))
     forecasts = ShortForecasts(fitter, model, parts)
     space = _Space(model, fit.theta, free)
