@@ -20,8 +20,13 @@ def bounded_step(
         matrix, right: Normal equations, (p, p) and (p,).
         low, high: Bounds of the step.
         damping: Added to the diagonal of the scaled matrix.
+
+    Returns:
+        The step; none where the equations have overflowed, as of a trial that runs away.
     """
     p = len(right)
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+        return np.zeros(p)
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     matrix = matrix / np.outer(size, size) + damping * np.eye(p)
     right, least, most = right / size, low * size, high * size

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, nnls
@@ -79,3 +80,12 @@ def test_a_number_at_its_bound_hides_nothing_that_moves_like_it():
     pinned = signatures(fit(0.1), [], column)
     np.testing.assert_allclose(pinned.matrix[:, 0], column.ravel())
     np.testing.assert_allclose(pinned.residual, 3.0 * column.ravel())
+
+
+@pytest.mark.parametrize("overflown", [np.inf, np.nan])
+def test_equations_that_overflow_give_no_step(overflown):
+    matrix, right = np.eye(2), np.ones(2)
+    none = np.zeros(2)
+    for broken in (np.array([[1.0, 0.0], [0.0, overflown]]), matrix):
+        aims = right if broken is not matrix else np.array([1.0, overflown])
+        np.testing.assert_array_equal(bounded_step(broken, aims, -right, right), none)
