@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from residual.gap import GapResult
-from residual.gap.result import Verdict
+from residual.gap.forecasts import own_channels
+from residual.gap.result import ChannelGap, Verdict
 from studies.gap.answer import rivals
 from studies.gap.words import (
     ahead,
@@ -25,6 +26,8 @@ TRIFLE = 0.05
 WORSE = 1.05
 #: The same over that by noise, from which on there is a gap.
 OFF = 1.5
+#: Difference between channels' shares from which on they are told one by one, so many at most.
+UNLIKE, FEW_CHANNELS = 0.2, 3
 
 
 def lead(result: GapResult, tolerance: float | None = None) -> str:
@@ -42,13 +45,38 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
         return f"Nothing that matters: the {ahead(gap)} is {before}, allowed is {allowed}.{smaller}"
     kinds = {verdict.kind for verdict in result.verdicts}
     if kinds & {"confirmed", "ambiguous", "calibrated"}:
-        share = f"{capitalized(percent(gap.share.value))} of the gap is {_what(result)}."
-        return share + _but_worse_apart(result)
+        share = f"{capitalized(percent(gap.share.value))} of the gap is {_what(result)}"
+        return f"{share}{_by_channel(result)}.{_but_worse_apart(result)}"
     if "unexplained" in kinds:
         return f"The gap has no name: the {ahead(gap)} is {before}."
     floor = quantity_text(gap.noise_floor.value, gap.unit)
     none = f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
     return none + _but_off_apart(result)
+
+
+def own_errors(result: GapResult) -> dict[str, ChannelGap]:
+    """Errors of all measured channels, but of those that are the rate of another one."""
+    table = result.gap.by_channel
+    channels = [c for c in result.corrected.physical_channels if c.name in table]
+    return {channels[i].name: table[channels[i].name] for i in own_channels(channels)}
+
+
+def _by_channel(result: GapResult) -> str:
+    """The share of every channel's own gap, where they differ: the share is a mean over them."""
+    errors = own_errors(result)
+    shares = {
+        name: 1 - (error.after.value / error.before.value) ** 2
+        for name, error in errors.items()
+        if error.before.value > OFF * error.noise_floor.value
+    }
+    if len(shares) < 2 or max(shares.values()) - min(shares.values()) < UNLIKE:
+        return ""
+    told = [f"{name} {percent(share)}" for name, share in shares.items()]
+    if len(told) > FEW_CHANNELS:
+        ends = [min(shares, key=lambda name: shares[name]), max(shares, key=lambda n: shares[n])]
+        told = [f"{name} {percent(shares[name])}" for name in ends]
+        return f" (between {' and '.join(told)})"
+    return f" ({', '.join(told)})"
 
 
 def _but_off_apart(result: GapResult) -> str:

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from residual.gap import GapResult
-from residual.gap.forecasts import own_channels
 from residual.gap.result import ChannelGap, Gap
 from residual.logs import Finding
 from studies.gap.answer import headline, is_footnote, kind_text, notes
-from studies.gap.lead import lead
+from studies.gap.lead import lead, own_errors
 from studies.gap.words import CROSS_VALIDATED, ahead, gap_rows, span_text, typeset, unit_text
 
 #: Width of the text, and of the column of kinds.
@@ -87,11 +86,9 @@ def bars(gap: Gap) -> list[str]:
 
 
 def beside(result: GapResult) -> dict[str, str]:
-    """Errors of the other channels, but of those that are the rate of one that was measured."""
-    table = result.gap.by_channel
-    channels = [c for c in result.corrected.physical_channels if c.name in table]
-    own = [channels[place].name for place in own_channels(channels)]
-    return {name: errors(table[name]) for name in own if name != result.gap.channel}
+    """Errors of the other channels in a line each."""
+    own = own_errors(result)
+    return {name: errors(own[name]) for name in own if name != result.gap.channel}
 
 
 def held_out(gap: Gap) -> list[str]:

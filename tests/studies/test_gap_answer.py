@@ -1,6 +1,7 @@
 """The sentences of find_gap: by kind, share and fields, never by other sentences."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from residual.gap.result import (
     Verdict,
     Where,
 )  # fmt: skip
+from sims import Channel
 from sims.effects import CoulombFriction, ParameterChange
 from sims.pendulum_equation import PendulumEquation
 from studies.gap.answer import headline, notes
@@ -94,6 +96,36 @@ def test_the_first_sentence_says_where_the_corrected_simulator_is_no_better(afte
         "and 1 rad without." in says
     ) is not (helps or worse)
     assert ("records set aside" in says) is not helps
+
+
+def boats(*errors):
+    """A result about several quantities, each with these errors before and after."""
+
+    names = "abcdefg"[: len(errors)]
+    corrected = SimpleNamespace(
+        physical_channels=[Channel(name, "m/s", "rate") for name in names], joints=(), parameters={}
+    )
+    table = {
+        name: ChannelGap("m/s", Span(before, 0, 9), Span(after, 0, 9), Span(0.1, 0, 9))
+        for name, (before, after) in zip(names, errors, strict=True)
+    }
+    found = result(MASS, share=0.46)
+    gap = dataclasses.replace(found.gap, channel="a", by_channel=table)
+    return dataclasses.replace(found, gap=gap, corrected=corrected)
+
+
+@pytest.mark.parametrize(
+    ("errors", "told"),
+    [
+        ([(1.0, 0.3), (1.0, 1.1)], " (a 91 %, b 0 %)."),
+        # Alike; one without a gap to take anything off; many.
+        ([(1.0, 0.3), (1.0, 0.4)], "."),
+        ([(1.0, 0.3), (0.12, 0.12)], "."),
+        ([(1.0, 0.5), (1.0, 0.1), (1.0, 0.9), (1.0, 0.5)], " (between c 19 % and b 99 %)."),
+    ],
+)
+def test_the_first_sentence_tells_channels_apart_where_they_differ(errors, told):
+    assert lead(boats(*errors)) == f"46 % of the gap is mass{told}"
 
 
 @pytest.mark.parametrize(("error", "said"), [(1.2, False), (2.0, True)])
