@@ -189,7 +189,8 @@ def together(search: Search, key: Key, grown: list[Key]) -> list[Key]:
     for group in range(len(base)):
         best, reached = None, (1 - 2 * search.effort.stale) * base[group]
         for fresh in grown:
-            if len(fresh) != len(key) + 1:
+            # A set that stands for an absurd one may lack a member, replaced by its twin.
+            if len(fresh) != len(key) + 1 or not set(key) < set(fresh):
                 continue
             error = search.currency.by_group(search.validated[fresh].squares)[group]
             if error < reached:

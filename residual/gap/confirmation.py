@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from residual.gap.choice import AT_ONE, no_match
 from residual.gap.claim import Claim, other_than
 from residual.gap.exchange import exchanged, split
-from residual.gap.intervals import at_bound, bounded, deviations
+from residual.gap.intervals import bounded, deviations, ended
 from residual.gap.numerics import at_half_step
 from residual.gap.search import Key, Search, all_but
 from residual.gap.significance import BETTER, score
@@ -73,7 +73,7 @@ def claims(
                 needed(search, key, number, adequate) and not (adequate and taken[1] < 0),
                 all(steady(search, key, j) for j in strengths),
                 all(survives(fit.theta[j], half[j], [n[j] for n in limits]) for j in strengths),
-                any(at_bound(fit, j) for j in strengths),
+                any(ended(fit, j) for j in strengths),
                 taken,
                 brief=brief(search, number, fit.theta[own]),
                 by_fit=by_fit(search, key, number),

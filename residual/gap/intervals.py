@@ -22,12 +22,21 @@ def at_bound(fit: Fit, j: int) -> bool:
     return bool(abs(value - knob.low) <= close or abs(value - knob.high) <= close)
 
 
+def ended(fit: Fit, j: int) -> bool:
+    """Whether a number lies at its bound, or so far that nothing depends on it any longer.
+
+    Where the simulator itself cuts off what the number changes, such as a wind that cannot be less
+    than none, any further number does as well: no interval would mean anything there either.
+    """
+    return at_bound(fit, j) or not fit.by_knob[..., j].any()
+
+
 def bounded(fit: Fit, j: int, half: float, numerics: Sequence[Array]) -> Number:
     """A number with its interval, widened to what half the step makes of it."""
     knob, value = fit.model.knobs[j], float(fit.theta[j])
     fine = float(numerics[0][j]) if len(numerics) else value
     low, high = min(value, fine) - half, max(value, fine) + half
-    return Number(value, max(low, knob.low), min(high, knob.high), knob.unit, at_bound(fit, j))
+    return Number(value, max(low, knob.low), min(high, knob.high), knob.unit, ended(fit, j))
 
 
 def deviations(fit: Fit, blocks: Blocks) -> Array:

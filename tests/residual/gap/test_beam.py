@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from residual.gap.beam import _best, plainer
+from residual.gap.beam import _best, plainer, together
 from residual.gap.screening import Gain
 
 LAW, CASE, OTHER = 0, 1, 2
@@ -30,3 +30,23 @@ def test_sets_with_room_for_more_keep_their_place():
         effort=SimpleNamespace(beam=2),
     )  # fmt: skip
     assert _best(search, list(errors)) == [(1, 2), (3,), (0,)]
+
+
+def test_a_set_that_stands_for_an_absurd_one_adds_nothing_for_its_joint():
+    key, stand_in, sound = (0, 1), (0, 2, 3), (0, 1, 4)
+    errors = {key: (1.0, 1.0), stand_in: (0.1, 1.0), sound: (1.0, 0.1)}
+    merged = []
+    search = SimpleNamespace(
+        currency=SimpleNamespace(groups=((0,), (1,)), by_group=np.array),
+        validated={k: SimpleNamespace(squares=error) for k, error in errors.items()},
+        tried={
+            sound: SimpleNamespace(
+                theta=np.array([1.0, 2.0, 3.0]), model=SimpleNamespace(owner=np.array([0, 1, 2]))
+            )
+        },
+        effort=SimpleNamespace(stale=0.05),
+        merged=lambda key, additions: (merged.append(list(additions)) or sound, np.zeros(3)),
+        fits_in=lambda key: True,
+    )
+    assert together(search, key, [stand_in, sound]) == []
+    assert [number for number, _ in merged[0]] == [4]

@@ -164,7 +164,10 @@ def test_a_number_at_its_bound_is_said_to_be_there():
     pool = candidates(simulator, [DeadZone("voltage")], Samples.join([run], 5))
     model = Model(simulator, pool)
     for value, there in ((0.0, True), (0.2, False)):
-        fit = dataclasses.make_dataclass("Fit", ["model", "theta"])(model, np.array([value]))
+        fields = ["model", "theta", "by_knob"]
+        fit = dataclasses.make_dataclass("Fit", fields)(
+            model, np.array([value]), np.ones((1, 1, 1))
+        )
         assert at_bound(fit, 0) is there
         number = bounded(fit, 0, 0.05, [])
         assert number.at_bound is there
