@@ -20,7 +20,7 @@ STRETCH = 1000
 
 def excerpt(
     runs: Sequence[Trajectory], stride: int, most: int = MOST
-) -> tuple[tuple[Trajectory, ...], str]:
+) -> tuple[tuple[Trajectory, ...], list[str]]:
     """The runs as they are, or stretches of them if they are longer than can be searched.
 
     Args:
@@ -29,11 +29,11 @@ def excerpt(
         most: Rows to be searched.
 
     Returns:
-        Runs of together about ``most`` rows, and a sentence on what was left out; empty if nothing.
+        Runs of together about ``most`` rows, and a sentence on what was left out, if anything.
     """
     total = sum(len(run) for run in runs)
     if total <= most * stride:
-        return tuple(runs), ""
+        return tuple(runs), []
     length = STRETCH * stride
     pieces = [
         Trajectory(run.name, run.times[a : b + 1], run.states[a : b + 1], run.actions[a:b])
@@ -45,6 +45,6 @@ def excerpt(
     chosen = np.linspace(0, len(pieces) - 1, count).round().astype(int)
     kept = tuple(pieces[i] for i in chosen)
     steps = sum(len(piece) for piece in kept)
-    return kept, (
+    return kept, [
         f"{steps} of {total} steps are searched: {len(kept)} stretches, evenly spread over the runs"
-    )
+    ]

@@ -46,6 +46,8 @@ Array = NDArray[np.float64]
 
 #: Error of nominal forecasts over that by noise, from which on it is seen well enough.
 SEEN = 3.0
+#: Part of the wanted length that most windows have, below which they are another length.
+SHORT = 0.5
 #: Part of the time budget after which nothing new is tried.
 SEARCHING = 0.7
 
@@ -113,8 +115,7 @@ def find_gap(
     chosen_by_user = horizon is not None
     horizon = horizon or usual_horizon(simulator, runs)
     runs, left_out = excerpt(runs, stride_for(runs, horizon))
-    quality += [left_out] if left_out else []
-    for says in quality:
+    for says in [*quality, *left_out]:
         tell(says)
     tell("looking for effects that move alike")
     groups, sets = aliases(simulator, offered, runs)
@@ -148,8 +149,15 @@ def find_gap(
         tell("fitting the nominal simulator")
         prepared = prepare(simulator, runs, horizon)
         if not chosen_by_user and not simulator.has_contacts:
+            shorter = horizon_of_windows(prepared)
+            if stride_for(runs, shorter) < stride_for(runs, horizon):
+                tell(f"motion is unstable: forecasts over {shorter:.3g} s")
+                every = examined.trajectories
+                runs, left_out = excerpt(every, stride_for(every, shorter))
+                prepared = prepare(simulator, runs, shorter)
             prepared = beyond_noise(simulator, runs, prepared)
             horizon = prepared.horizon
+        quality += left_out
         found = explained(simulator, prepared)
         other = held_otherwise(simulator) if hold is None else None
         if other is not None and fits_better(found.search, found.key, other):
@@ -195,6 +203,16 @@ def clearly_better(one: Explanation, other: Explanation) -> bool:
     """Whether one explanation's forecasts are so much better that the other's are excluded."""
     errors = [forecast_error(found.search, found.key) for found in (one, other)]
     return CLEARLY**2 * errors[0] < errors[1]
+
+
+def horizon_of_windows(prepared: Prepared) -> float:
+    """The horizon for which rows should be close enough, in s: less than what was wanted if most
+    windows are less than half as long, since they end where motion is unstable."""
+    fitter = prepared.fitter
+    windows, times = fitter.blocks.windows, fitter.samples.times
+    spans = times[windows.index[:, -1]] - times[windows.index[:, 0]]
+    usual = (1 - LEAD) * float(np.median(spans))
+    return usual if usual < SHORT * prepared.horizon else prepared.horizon
 
 
 def beyond_noise(

@@ -21,7 +21,7 @@ def test_short_records_are_taken_as_they_are():
 @pytest.mark.parametrize("stride", [1, 4])
 def test_stretches_lie_all_over_a_long_record_and_are_what_was_recorded(stride):
     steps = 100 * STRETCH * stride + 17
-    kept, says = excerpt([run(steps)], stride, most=10 * STRETCH)
+    kept, (says,) = excerpt([run(steps)], stride, most=10 * STRETCH)
     rows = sum(len(piece) for piece in kept)
     assert f"{rows} of {steps} steps" in says
     assert 8 * STRETCH < rows / stride < 12 * STRETCH

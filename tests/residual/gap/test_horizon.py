@@ -129,3 +129,47 @@ def test_noise_is_no_less_than_what_was_rounded():
     for log, step in ((fine, 1e-6), (coarse, 5e-4)):
         floor = prepare(Frame(), [log], 0.25).floor
         assert floor.sigma[0] >= step / np.sqrt(12) * (1 - 1e-9)
+
+
+class Lever(EquationOfMotion):
+    """An arm held above its hinge, without friction: it falls within a fraction of a second."""
+
+    dt = 0.01
+    state_channels = (
+        Channel("angle", "rad", "position", scale=0.3),
+        Channel("rate", "rad/s", "rate", rate_of="angle", scale=0.3),
+    )
+    action_channels = (Channel("torque", "N m", "input", scale=10.0, low=-100.0, high=100.0),)
+    parameters: ClassVar = {
+        "inertia": Parameter(0.1, "kg m^2", "of the arm", low=0.01),
+        "weight": Parameter(20.0, "N m", "of the arm held out level", low=0.0),
+    }
+
+    def acceleration(self, q, v, u, force, p):
+        return ((u[:, 0] + p.weight * np.sin(q[:, 0]) + force[:, 0]) / p.inertia)[:, None]
+
+
+def test_of_a_slow_motion_that_is_unstable_without_what_is_missing_rows_are_close_enough():
+    friction, times = 30.0, np.arange(0.0, 60.0, 0.01)
+    levels = np.random.default_rng(3).uniform(-0.5, 0.5, 21)
+
+    def slowly(t, q):
+        # So much friction that its rate follows at once; a controller holds it up.
+        aim = np.interp(t, np.linspace(0.0, 60.0, 21), levels)
+        return (200.0 * (aim - q) + 20.0 * np.sin(q)) / friction
+
+    solved = solve_ivp(slowly, (0, 60), [0.0], t_eval=times, rtol=1e-8, atol=1e-10)
+    angle = solved.y[0]
+    rate = np.array([slowly(t, q) for t, q in zip(times, angle, strict=True)])
+    torque = friction * rate - 20.0 * np.sin(angle) + 0.1 * np.gradient(rate, times)
+    noise = np.random.default_rng(4).normal(0, [2e-4, 2e-3], (len(times), 2))
+    states = np.stack([angle, rate], axis=1) + noise
+    log = [Trajectory("log", times, states, torque[:-1, None])]
+    wanted = usual_horizon(Lever(), log)
+    effects = ["viscous_friction", "coulomb_friction", "actuator_gain", "delay"]
+    found = find_gap(Lever(), log, effects=effects, hold="linear")
+    assert found.gap.horizon_s < 0.5 * wanted
+    assert np.median([len(forecast.times) for forecast in found.rollouts]) > 9
+    first = found.verdicts[0]
+    assert (first.kind, first.effect) == ("confirmed", "viscous_friction")
+    assert first.parameters["coefficient"].low < friction < first.parameters["coefficient"].high
