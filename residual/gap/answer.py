@@ -270,14 +270,15 @@ def within_noise(table: Gap) -> bool:
 def minor(answer: Answer) -> dict[int, tuple[float, float, float]]:
     """Candidates that help the chosen set by too little, and the share that they would add.
 
-    What helped only in another set's company is none: it is part of another explanation.
+    What helped only in another set's company is none: it is part of another explanation; nor is
+    what would do the work of one that could be too many others.
     """
     search, key = answer.found.search, answer.key
     shares = {}
     for number in answer.found.choice.minor:
         larger = tuple(sorted({*key, number}))
         tried = larger != key and larger in search.validated and search.sound(larger)
-        if tried and helps(search, key, larger):
+        if tried and helps(search, key, larger) and not material(search, key, larger):
             shares[number] = share(search, larger, number)
     return shares
 

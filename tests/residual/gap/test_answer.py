@@ -2,6 +2,8 @@
 
 from types import SimpleNamespace
 
+from toy import Toy
+
 from residual.gap import answer
 
 
@@ -31,3 +33,11 @@ def test_what_cannot_be_right_without_the_others_goes_too(monkeypatch):
     left = answer.confirm(found, {})
     assert left.key == (0,)
     assert left.leads == ("gain", "loss")
+
+
+def test_what_takes_most_of_the_gap_is_not_minor():
+    """It was one of many that a chosen effect could not be told from, and went with that."""
+    toy = Toy({(1,): 0.95, (3,): 0.9, (4,): 0.3})
+    found = SimpleNamespace(search=toy, choice=SimpleNamespace(minor=(1, 4)))
+    toy.sound = lambda key: True
+    assert list(answer.minor(SimpleNamespace(found=found, key=()))) == [1]
