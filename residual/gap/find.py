@@ -17,9 +17,8 @@ from residual.gap.confirmation import CLEARLY
 from residual.gap.data import examine
 from residual.gap.excerpt import excerpt
 from residual.gap.explain import Explanation, explain
-from residual.gap.forecasts import beside_noise
 from residual.gap.free_parameters import better, worth_freeing
-from residual.gap.horizon import longest_horizon, usual_horizon
+from residual.gap.horizon import usual_horizon
 from residual.gap.known import KNOWN
 from residual.gap.numerics import (
     fits_better,
@@ -33,6 +32,7 @@ from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import GapResult
 from residual.gap.search import Search
 from residual.gap.smooth import LEAD
+from residual.gap.suited import beyond_noise, horizon_of_windows, needs_closer_rows
 from residual.gap.twins import exact_twins, with_twins
 from residual.gap.workers import workers
 from residual.trajectories import Trajectory
@@ -44,10 +44,6 @@ from sims.simulator import Hold
 
 Array = NDArray[np.float64]
 
-#: Error of nominal forecasts over that by noise, from which on it is seen well enough.
-SEEN = 3.0
-#: Part of the wanted length that most windows have, below which they are another length.
-SHORT = 0.5
 #: Part of the time budget after which nothing new is tried.
 SEARCHING = 0.7
 
@@ -149,12 +145,12 @@ def find_gap(
         tell("fitting the nominal simulator")
         prepared = prepare(simulator, runs, horizon)
         if not chosen_by_user and not simulator.has_contacts:
-            shorter = horizon_of_windows(prepared)
-            if stride_for(runs, shorter) < stride_for(runs, horizon):
-                tell(f"motion is unstable: forecasts over {shorter:.3g} s")
+            if needs_closer_rows(runs, prepared):
+                horizon = horizon_of_windows(prepared)
+                tell(f"windows end early, where motion is unstable: rows for {horizon:.3g} s")
                 every = examined.trajectories
-                runs, left_out = excerpt(every, stride_for(every, shorter))
-                prepared = prepare(simulator, runs, shorter)
+                runs, left_out = excerpt(every, stride_for(every, horizon))
+                prepared = prepare(simulator, runs, horizon)
             prepared = beyond_noise(simulator, runs, prepared)
             horizon = prepared.horizon
         quality += left_out
@@ -203,33 +199,6 @@ def clearly_better(one: Explanation, other: Explanation) -> bool:
     """Whether one explanation's forecasts are so much better that the other's are excluded."""
     errors = [forecast_error(found.search, found.key) for found in (one, other)]
     return CLEARLY**2 * errors[0] < errors[1]
-
-
-def horizon_of_windows(prepared: Prepared) -> float:
-    """The horizon for which rows should be close enough, in s: less than what was wanted if most
-    windows are less than half as long, since they end where motion is unstable."""
-    fitter = prepared.fitter
-    windows, times = fitter.blocks.windows, fitter.samples.times
-    spans = times[windows.index[:, -1]] - times[windows.index[:, 0]]
-    usual = (1 - LEAD) * float(np.median(spans))
-    return usual if usual < SHORT * prepared.horizon else prepared.horizon
-
-
-def beyond_noise(
-    simulator: HostSimulator, runs: Sequence[Trajectory], prepared: Prepared
-) -> Prepared:
-    """The same over forecasts twice as long, if those of the nominal simulator hardly err by more
-    than noise does: a small push takes time to show.
-
-    No longer, since of a log without a gap errors of the integrator would then be one, where
-    motion is unstable: of 27 such logs of a pendulum at three times the usual horizon in 6.
-    """
-    farther = min(2 * prepared.horizon, longest_horizon(runs))
-    if farther <= prepared.horizon:
-        return prepared
-    if beside_noise(simulator, prepared.fitter, prepared.floor.sigma) > SEEN:
-        return prepared
-    return prepare(simulator, runs, farther)
 
 
 class Clock:

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from residual.gap import find_gap
-from residual.gap.find import beyond_noise
 from residual.gap.horizon import SAMPLES, WINDOWS, longest_horizon, usual_horizon
 from residual.gap.prepare import prepare
 from residual.gap.smooth import LEAD
+from residual.gap.suited import beyond_noise
 from residual.trajectories import Trajectory
 from sims.equations import EquationOfMotion
 from sims.leo import Leo
