@@ -40,7 +40,7 @@ from studies.gap.files import CORRECTED, REPORT, write_gap
 from studies.gap.progress import Heartbeat
 from studies.gap.summary import found_in_data, summary
 from studies.running.command import Parser
-from studies.running.ending import check_output, fail, guarded
+from studies.running.ending import check_output, fail, guarded, on_purpose
 
 
 @dataclasses.dataclass(frozen=True)
@@ -256,7 +256,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         with Heartbeat(60 * settings["minutes"]) as tell:
             result = run(settings, output, jobs, tell)
     except (ValueError, OSError) as error:
-        fail(str(error))
+        if on_purpose(error):
+            fail(str(error))
+        raise
     print(f"\n{summary(result, settings['tolerance'])}\n\nreport:              {output / REPORT}")
     print(f"corrected simulator: {output / CORRECTED}")
     if strange := foreign(settings["simulator"]):

@@ -14,6 +14,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
+import numpy as np
+
 from sims.trust import named_packages, trusting
 from sims.unsound import Unsound
 
@@ -99,6 +101,22 @@ def guarded(
     return decorate
 
 
+def on_purpose(error: Exception) -> bool:
+    """Whether an error tells the user something: a library's, or one that our code raised so.
+
+    What happens inside a line of ours, as where a sequence has another length than that line
+    takes for granted, is a fault of ours, and so is linear algebra that fails.
+    """
+    frames = traceback.extract_tb(error.__traceback__)
+    if isinstance(error, np.linalg.LinAlgError):
+        return False
+    # An operating system names the file, and tells enough.
+    if isinstance(error, OSError) or not frames or not Path(frames[-1].filename).is_file():
+        return True
+    last = frames[-1]
+    return not _ours(Path(last.filename)) or (last.line or "").lstrip().startswith("raise")
+
+
 def users_code(error: BaseException) -> str:
     """File, line and function of the user's that an error comes from; empty if it is ours.
 
@@ -111,13 +129,18 @@ def users_code(error: BaseException) -> str:
         path = Path(frame.filename)
         if not path.is_file() or any(path.is_relative_to(place) for place in _LIBRARIES):
             continue
-        ours = path.parent == _HOME or (path.is_relative_to(_HOME) and (
-            path.relative_to(_HOME).parts[0] in ("sims", "policy", "residual", "studies")
-        ))  # fmt: skip
-        if not ours:
+        if not _ours(path):
             return f"{path}, line {frame.lineno}, in {frame.name}"
         break
     return users_code(error.__cause__) if error.__cause__ else ""
+
+
+def _ours(path: Path) -> bool:
+    """Whether a file is this project's, beside whatever else may be installed."""
+    if not path.is_relative_to(_HOME):
+        return False
+    first = path.relative_to(_HOME).parts[0]
+    return path.parent == _HOME or first in ("sims", "policy", "residual", "studies")
 
 
 def typed(error: BaseException) -> str:

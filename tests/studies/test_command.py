@@ -11,15 +11,18 @@ import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from residual.gap.windows import Windows
+from residual.logs.units import find_unit
 from studies import learn
 from studies.learning.settings import build_parser
 from studies.pendulum_gap import STUDY
 from studies.running import ending
-from studies.running.ending import check_output, fail, guarded
+from studies.running.ending import check_output, fail, guarded, on_purpose
 from studies.running.grids import expand_grid
 
 BASE = {"seed": 0, "budget": {"true_samples": 3750, "iterations": 2}, "estimator": {}}
@@ -104,6 +107,27 @@ def test_a_fault_of_the_users_code_is_one_line_that_says_where(capsys):
     code, said = ended(capsys, ZeroDivisionError("deliberate"))
     assert code == 2 and said.count("\n") == 1
     assert f"{__file__}, line" in said and "ZeroDivisionError: deliberate" in said
+
+
+def users_own():
+    raise ValueError("no such valve")
+
+
+@pytest.mark.parametrize(
+    ("act", "told"),
+    [
+        pytest.param(lambda: find_unit("parsec", "m"), True, id="raised by ours"),
+        pytest.param(lambda: Windows.cut([(0, 4)]), False, id="inside a line of ours"),
+        pytest.param(lambda: np.linalg.inv(np.zeros((2, 2))), False, id="linear algebra"),
+        pytest.param(lambda: np.zeros(3).reshape(2, 2), True, id="called by the user"),
+        pytest.param(users_own, True, id="raised by the user"),
+        pytest.param(lambda: Path("/no/such").read_text(), True, id="operating system"),
+    ],
+)
+def test_what_was_raised_on_purpose_is_told_from_a_fault_of_ours(act, told):
+    with pytest.raises((ValueError, OSError)) as caught:
+        act()
+    assert on_purpose(caught.value) is told
 
 
 @pytest.mark.parametrize("how", ["option", "variable"])
