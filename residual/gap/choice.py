@@ -14,7 +14,7 @@ few blocks worse, comes before it.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,14 +66,19 @@ def choose(search: Search, enough: Callable[[Key], bool] = lambda _: False) -> C
     fewest = min(search.numbers(key) for key in open_ if as_good(search, key, best))
     key = _better_fit(search, [key for key in open_ if search.numbers(key) <= fewest])
     minor: list[int] = []
+    passed: list[Key] = []
     while key:
-        smaller = _smaller(search, key, open_)
-        short = next((k for k in smaller if enough(k) or not asked_for(search, k, key)), None)
-        if short is None:
+        passed.append(key)
+        smaller = [
+            k
+            for k in _smaller(search, key, open_)
+            if enough(k) or not (asked_for(search, k, key) or gives_up(search, k, passed))
+        ]
+        if not smaller:
             break
-        if helps(search, short, key):
-            minor += sorted(set(key) - set(short))
-        key = short
+        if helps(search, smaller[0], key):
+            minor += sorted(set(key) - set(smaller[0]))
+        key = smaller[0]
     if key:
         key = _fits_far_better(search, _plainer(search, key, open_), open_)
     if key and not helps(search, (), key):
@@ -88,6 +93,18 @@ def asked_for(search: Search, smaller: Key, larger: Key) -> bool:
     if nested and score(search, smaller) <= score(search, larger):
         return False
     return material(search, smaller, larger)
+
+
+def gives_up(search: Search, key: Key, passed: Sequence[Key]) -> bool:
+    """Whether the steps from one set to a smaller one have given up more together than a fifth for
+    each effect, although no single one did."""
+    for larger in passed:
+        if set(key) < set(larger) and score(search, key) <= score(search, larger):
+            continue
+        steps, least = max(len(larger) - len(key), 1), search.error(larger)
+        if search.error(key) > max(least / (1 - MATERIAL) ** steps, least + steps * TRIFLE):
+            return True
+    return False
 
 
 def no_match(search: Search, key: Key, other: Key) -> bool:

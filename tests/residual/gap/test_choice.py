@@ -49,6 +49,16 @@ def test_ties_go_to_the_better_fit():
     assert choose(worse).key == (0,)
 
 
+def test_steps_that_give_up_less_than_a_fifth_each_do_not_add_up():
+    # A law of two numbers with a mass; a fifth worse, two effects of one number; a single one.
+    errors = {(0, 2): 0.607, (1, 3): 0.757, (4,): 0.818}
+    toy = Toy(errors)
+    toy.numbers = lambda key: len(key) + (2 in key)
+    assert choose(toy).key == (1, 3)
+    toy = Toy({key: error for key, error in errors.items() if key != (0, 2)})
+    assert choose(toy).key == ()
+
+
 def test_of_what_no_data_tell_apart_the_least_is_otherwise_than_was_known():
     # One effect, and a mass that is 2 % off; or that mass off by a third, and another effect.
     sets = {(0, 3): 0.2, (1, 3): 0.2, (0, 1): 0.2}
