@@ -70,7 +70,8 @@ def headlines(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
         lambda r: set(r["wrong_sure"]) - set(r["truly_off"]))  # fmt: skip
     add("held-out error at most 1.3 times the oracle's", "95 %", hidden, _close)
     add("95 % intervals with the oracle's strength", "85 %", known, lambda r: r["covered"])
-    add("or with the true strength", "", known, lambda r: r.get("covered_truth"))
+    add("with the true strength", "", known, lambda r: r.get("covered_truth"))
+    add("with one of the two", "", known, lambda r: r["covered"] or r.get("covered_truth"))
     add("removed from the library: a confirmed wrong name", "at most 2 %", removed,
         lambda r: r["wrong_sure"])  # fmt: skip
     add("the same, parameters that are truly off left out", "", removed,
