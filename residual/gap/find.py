@@ -166,6 +166,11 @@ def find_gap(
                     f"inputs were taken to {how_held(other)}: the data fit better so; set hold to "
                     "say otherwise"
                 )
+            elif again.search.late:
+                quality.append(
+                    f"the data fit better with inputs taken to {how_held(other)}, but there was no "
+                    "time to search so: set hold to say which it is, or give more --minutes"
+                )
         clock.lap("search")
         tell("confirming")
         asked = matters(found, tolerance)

@@ -169,9 +169,10 @@ def rounded(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
     for channel, runs in measured(simulator, trajectories):
         step = rounding(runs)
         if step:
+            unit = "" if channel.unit == "1" else f" {channel.unit}"
             says = (
-                f"was rounded to steps of {step:.4g} {channel.unit}, which alone is a noise of "
-                f"{step / np.sqrt(12):.2g} {channel.unit}"
+                f"was rounded to steps of {step:.4g}{unit}, which alone is a noise of "
+                f"{step / np.sqrt(12):.2g}{unit}"
             )
             found.append(Finding("rounded", channel.name, says, {"step": step}))
     return found

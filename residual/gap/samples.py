@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.merging import merged
 from residual.trajectories import Trajectory
 
 Array = NDArray[np.float64]
@@ -131,19 +132,10 @@ class Samples:
         whole = driven[:, : (count - 1) * self.stride]
         whole = whole.reshape(variants, count - 1, total, inputs, 2)
         last = np.repeat(driven[:, -1:, -1:], total, axis=2)
-        return _merged(np.concatenate([whole, last], axis=1), total // self.substeps)
-
-
-def _merged(driven: Array, count: int) -> Array:
-    """Every ``count`` sub-steps as one, with the same integral and the same first moment."""
-    if count == 1:
-        return driven
-    variants, rows, fine, inputs, _ = driven.shape
-    parts = driven.reshape(variants, rows, fine // count, count, inputs, 2)
-    place = (np.arange(count) - 0.5 * (count - 1))[:, None]
-    mean = parts[..., 0].mean(axis=3)
-    rise = (12 * (parts[..., 0] * place).sum(axis=3) + parts[..., 1].sum(axis=3)) / count**2
-    return np.stack([mean, rise], axis=-1)
+        durations = self.recorded[run].durations[: (count - 1) * self.stride]
+        each = np.repeat(durations.reshape(count - 1, self.stride) / fine, fine, axis=1)
+        each = np.vstack([each, np.ones((1, total))])
+        return merged(np.concatenate([whole, last], axis=1), each, self.substeps)
 
 
 def _content(run: Trajectory) -> bytes:

@@ -242,7 +242,8 @@ def sentence(label: str, result: GapResult) -> str:
     effect = known_effects(result).get(label)
     parameter = result.corrected.parameters.get(label)
     if parameter is not None:
-        return f"The {parameter.meaning} differs from what the simulator says."
+        meaning = f" ({parameter.meaning})" if parameter.meaning else ""
+        return f"The parameter {label}{meaning} differs from what the simulator says."
     return effect.sentence if effect else ""
 
 

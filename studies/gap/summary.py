@@ -11,7 +11,7 @@ from residual.gap.result import ChannelGap, Gap
 from residual.logs import Finding
 from studies.gap.answer import headline, is_footnote, kind_text, notes
 from studies.gap.lead import lead, own_errors
-from studies.gap.words import CROSS_VALIDATED, ahead, gap_rows, span_text, typeset, unit_text
+from studies.gap.words import CROSS_VALIDATED, ahead, gap_rows, span_text, unit_text
 
 #: Width of the text, and of the column of kinds.
 WIDTH, KIND = 100, 16
@@ -44,7 +44,7 @@ def summary(result: GapResult, tolerance: float | None = None) -> str:
     if lines[-1]:
         lines.append("")
     gap = result.gap
-    unit = f" in {typeset(gap.unit)}" if gap.unit else ""
+    unit = f" in{unit_text(gap.unit)}" if unit_text(gap.unit) else ""
     lines += [f"{ahead(gap)}{unit}, {CROSS_VALIDATED} (95 % interval)", *bars(gap)]
     others = beside(result)
     lines += [f"  {name}: {told}" for name, told in others.items()]
