@@ -13,6 +13,7 @@ from residual.gap.aliases import hidden
 from residual.gap.choice import helps, material
 from residual.gap.claim import Claim
 from residual.gap.confirmation import claims, in_plain_form, share
+from residual.gap.evidence import evidence
 from residual.gap.exchange import add_exchanged
 from residual.gap.explain import FOOTNOTE, Explanation
 from residual.gap.forecasts import fitted_floor, gap, held_out, main_channel, noise_floor, rollouts
@@ -21,7 +22,7 @@ from residual.gap.known import KNOWN
 from residual.gap.model import Model
 from residual.gap.numerics import other_numerics, own_substeps, with_enough_substeps
 from residual.gap.prepare import Prepared, prepare
-from residual.gap.result import Blind, Gap, GapResult, Rival, Verdict
+from residual.gap.result import Blind, Gap, GapResult, Verdict
 from residual.gap.search import Key, Search
 from residual.gap.smooth import SmoothFitter
 from residual.gap.tolerance import allow_for_parameters
@@ -40,8 +41,6 @@ from residual.gap.verdicts import (
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
-#: Sets listed as evidence.
-EVIDENCE = 40
 #: Effects tried in place of each that is left when one cannot be named.
 RIVALS = 3
 #: Forecast error over that by noise alone up to which there may be no gap.
@@ -198,7 +197,7 @@ def told(
         gap=table,
         held_out=apart,
         where=where,
-        evidence=evidence(answer),
+        evidence=evidence(found, key, answer.leads),
         rollouts=rollouts(search, search.before, search.validated[key]),
         effects=tuple(corrected.effects[len(simulator.effects) :]),
         corrected=corrected,
@@ -281,19 +280,3 @@ def minor(answer: Answer) -> dict[int, tuple[float, float, float]]:
         if tried and helps(search, key, larger) and not material(search, key, larger):
             shares[number] = share(search, larger, number)
     return shares
-
-
-def evidence(answer: Answer) -> tuple[Rival, ...]:
-    """What was tried, the chosen set first, then by error."""
-    search, found = answer.found.search, answer.found
-    reasons = found.choice.reasons
-    if found.key != answer.key:
-        reasons = {**reasons, found.key: "holds effects that too many others could replace"}
-    rows = [
-        Rival(
-            search.labels(key), search.error(key), key == answer.key,
-            "" if key == answer.key else reasons.get(key, "tried against the chosen ones"),
-        )
-        for key in search.tried
-    ]  # fmt: skip
-    return tuple(sorted(rows, key=lambda row: (not row.chosen, row.error))[:EVIDENCE])

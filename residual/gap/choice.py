@@ -219,7 +219,9 @@ def reasons(search: Search, chosen: Key) -> dict[Key, str]:
             )
         elif set(chosen) < set(key):
             taken = 1 - search.error(key) / max(own, 1e-12)
-            found[key] = f"takes only {100 * max(taken, 0):.2g} % off what remains"
+            more = len(key) - len(chosen)
+            by = f" with {more} effects more" if more > 1 else ""
+            found[key] = f"takes only {100 * max(taken, 0):.2g} % off what remains{by}"
         else:
             found[key] = "as good, with as many or more numbers"
     return found

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 from toy import Toy
 
 from residual.gap import answer
+from residual.gap.evidence import evidence
 
 
 def test_what_cannot_be_right_without_the_others_goes_too(monkeypatch):
@@ -41,3 +42,14 @@ def test_what_takes_most_of_the_gap_is_not_minor():
     found = SimpleNamespace(search=toy, choice=SimpleNamespace(minor=(1, 4)))
     toy.sound = lambda key: True
     assert list(answer.minor(SimpleNamespace(found=found, key=()))) == [1]
+
+
+def test_reasons_are_those_of_the_set_that_is_left():
+    toy = Toy({(0,): 0.6, (0, 3): 0.4, (0, 1): 0.57, (0, 1, 4): 0.5})
+    toy.labels = lambda key: tuple("abcde"[n] for n in key)
+    found = SimpleNamespace(search=toy, key=(0, 3), choice=SimpleNamespace(reasons={}))
+    told = {one.effects: one.reason for one in evidence(found, (0,), ("d",))}
+    assert told["a", "d"] == "holds effects that too many others could replace"
+    assert told["a", "b"] == "takes only 5 % off what remains"
+    assert told["a", "b", "e"] == "takes only 17 % off what remains with 2 effects more"
+    assert told["a",] == ""
