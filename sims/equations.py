@@ -212,7 +212,7 @@ class FirstOrderSystem(HostSimulator):
         forces = [(names.index(e.joint), e) for e in self.joint_effects()]
 
         def rates(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
-            return _by_joint(self.derivative(v.T, u.T, p), v.shape, "derivative") + f
+            return _by_joint(self.derivative(v.T, u.T, p), v.shape, "derivative", "x") + f
 
         motion = Motion(
             rates,
@@ -247,7 +247,7 @@ def substep_ends(inputs: Array) -> Array:
     return np.ascontiguousarray(ends.transpose(2, 0, 3, 1))
 
 
-def _by_joint(found: Any, shape: tuple[int, ...], what: str) -> Array:
+def _by_joint(found: Any, shape: tuple[int, ...], what: str, column: str = "q") -> Array:
     """What the system's author returned, rows last; checked, since broadcasting hides errors."""
     if np.iscomplexobj(found):
         raise ValueError(f"{what} returned complex numbers, expected real ones")
@@ -255,7 +255,7 @@ def _by_joint(found: Any, shape: tuple[int, ...], what: str) -> Array:
     if found.shape != shape[::-1]:
         raise ValueError(
             f"{what} returned shape {found.shape}, expected {shape[::-1]}: one row for each "
-            "state. Compute with columns such as q[:, 0], since parameters are scalars or "
+            f"state. Compute with columns such as {column}[:, 0], since parameters are scalars or "
             "shape (n,), and stack the results on axis 1"
         )
     # A copy, since it may be one of the arrays that the author was given.

@@ -119,11 +119,13 @@ def check_layout(columns: LogFormat, states: Sequence[Channel], actions: Sequenc
         )
     if columns.skip < 0:
         raise LogError(f"skip is {columns.skip}, expected the number of lines above the table")
-    if columns.decimal not in (".", ",") or not columns.gap > 1 or columns.minimum_samples < 3:
-        raise LogError(
-            f"decimal {columns.decimal!r}, gap {columns.gap!r}, minimum_samples "
-            f"{columns.minimum_samples!r}: expected '.' or ',', more than 1, at least 3"
-        )
+    for setting, said, fits, expected in (
+        ("decimal", columns.decimal, columns.decimal in (".", ","), "'.' or ','"),
+        ("gap", columns.gap, columns.gap > 1, "more than 1"),
+        ("minimum_samples", columns.minimum_samples, columns.minimum_samples >= 3, "at least 3"),
+    ):
+        if not fits:
+            raise LogError(f"{setting} is {said!r}, expected {expected}")
 
 
 def named_column(given: str | int | Column, name: str) -> Column:

@@ -147,7 +147,7 @@ def _ordered(run: Run, minimum: int, findings: list[Finding]) -> Run:
     if len(ordered) < minimum:
         raise LogError(
             f"a trajectory of {len(ordered)} samples ({run.name!r}), expected at least {minimum}; "
-            "leave it out or log longer",
+            "leave it out, log longer, or set minimum_samples (3 or more) in the columns' file",
             run.path,
             int(run.rows[0]) if len(run) else None,
         )

@@ -105,7 +105,8 @@ def test_layout_that_fits_no_file(csv):
         path, states={"angle": Column(value=1.0)}
     )
     assert "delimiter 'ab' is not usable" in error(path, delimiter="ab")
-    assert "expected '.' or ','" in error(path, decimal="x")
+    assert "decimal is 'x', expected '.' or ','" in error(path, decimal="x")
+    assert "minimum_samples is 2, expected at least 3" in error(path, minimum_samples=2)
 
 
 def test_uneven_rows(csv):
