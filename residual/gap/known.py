@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from residual.gap.search import Key, Search
+from sims.effects.base import Effect
 from sims.effects.parameter import ParameterChange
 
 #: How well a parameter is taken to be known, as a share of it.
 KNOWN = 0.03
+#: Times that, beyond which a parameter surely is otherwise.
+SURELY = 3.0
 #: Units of which the zero means nothing: of 298 K a share is no accuracy.
 ANY_ZERO = ("degC", "°C", "K", "degF", "°F")
 
@@ -26,13 +29,16 @@ def size(search: Search, parameter: str) -> float:
     return min(value, max(spans)) if spans else value
 
 
-def departures(search: Search, key: Key) -> int:
-    """How many things of a fitted set are otherwise than was known: each of its effects, and each
-    parameter that is off by more than it is known to."""
+def departures(search: Search, key: Key) -> float:
+    """How much of a fitted set is otherwise than was known: one for each of its effects, and for
+    each parameter that is off by more than three times what it is known to; less for less."""
     fit = search.tried[key]
     own = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
-    return sum(
-        not isinstance(effect, ParameterChange)
-        or abs(float(effect.change)) > KNOWN * size(search, effect.parameter)
-        for effect in own
-    )
+    return sum(_departure(search, effect) for effect in own)
+
+
+def _departure(search: Search, effect: Effect) -> float:
+    if not isinstance(effect, ParameterChange):
+        return 1.0
+    known = KNOWN * size(search, effect.parameter)
+    return min(abs(float(effect.change)) / max(SURELY * known, 1e-300), 1.0)

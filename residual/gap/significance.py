@@ -9,8 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from residual.gap.exchange import add_without_each
+from residual.gap.known import departures
 from residual.gap.search import Key, Search, all_but
 
+#: Difference of costs that says nothing.
+NO_DIFFERENCE = 1.0
 #: Forecast error with an effect over that without, below which it forecasts better.
 BETTER = 0.95
 
@@ -38,12 +41,26 @@ def significant(search: Search, needed: float) -> Key:
         needed: See ``threshold``.
     """
     key = pruned(search, min(search.usable(), key=lambda k: score(search, k)), needed)
-    if not key or not search.simulator.has_contacts:
+    if not key:
         return key
+    if not search.simulator.has_contacts:
+        return least_otherwise(search, key)
     most = score(search, key) + search.fitter.tie(search.tried[()])
     alike = [k for k in search.usable() if score(search, k) <= most]
     other = min((k for k in alike if search.numbers(k) <= search.numbers(key)), key=search.error)
     return other if pruned(search, other, needed) == other else key
+
+
+def least_otherwise(search: Search, key: Key) -> Key:
+    """Of sets that no data tell from one, as where effects move alike in an exact proportion, the
+    one with the least to be otherwise than was known."""
+    merit, numbers = search.tried[key].merit, search.numbers(key)
+    alike = [
+        k
+        for k in search.usable()
+        if search.numbers(k) == numbers and search.tried[k].merit <= merit + NO_DIFFERENCE
+    ]
+    return min([key, *alike], key=lambda k: departures(search, k))
 
 
 def pruned(search: Search, key: Key, needed: float) -> Key:

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from toy import Toy
 
 from residual.gap.choice import choose
+from residual.gap.significance import least_otherwise
 from sims.pendulum_equation import PendulumEquation
 
 
@@ -136,3 +137,11 @@ def test_what_leaves_a_third_of_all_data_wins_though_a_block_or_two_go_astray(as
     assert choose(toy).key == key
     toy.tried[2,].merit = 40.0
     assert choose(toy).key == (0,)
+
+
+@pytest.mark.parametrize(("merit", "key"), [(20.5, (0, 3)), (25.0, (1, 3))])
+def test_down_to_the_noise_the_same_counts_among_what_fits_no_worse(merit, key):
+    sets = {(0, 3): 0.2, (1, 3): 0.2, (0, 1): 0.2}
+    known = PendulumEquation().parameters["mass"].value
+    toy = Toy(sets, {(0, 3): merit, (1, 3): 20.0, (0, 1): 90.0}, mass=0.02 * known)
+    assert least_otherwise(toy, (1, 3)) == key
