@@ -69,22 +69,25 @@ def choose(search: Search, enough: Callable[[Key], bool] = lambda _: False) -> C
     passed: list[Key] = []
     while key:
         passed.append(key)
-        smaller = [
-            k
-            for k in _smaller(search, key, open_)
-            if enough(k) or not (asked_for(search, k, key) or gives_up(search, k, passed))
-        ]
-        if not smaller:
+        smaller = _smaller(search, key, open_)
+        short = next((k for k in smaller if enough(k) or _spared(search, k, passed)), None)
+        if short is None:
             break
-        if helps(search, smaller[0], key):
-            minor += sorted(set(key) - set(smaller[0]))
-        key = smaller[0]
+        if helps(search, short, key):
+            minor += sorted(set(key) - set(short))
+        key = short
     if key:
         key = _fits_far_better(search, _plainer(search, key, open_), open_)
     if key and not helps(search, (), key):
         key = ()
     kept = tuple(number for number in dict.fromkeys(minor) if number not in key)
     return Choice(key, reasons(search, key), kept)
+
+
+def _spared(search: Search, key: Key, passed: Sequence[Key]) -> bool:
+    """Whether nothing is asked for that the last set holds beyond a smaller one, nor that the
+    steps to it have given up together."""
+    return not (asked_for(search, key, passed[-1]) or gives_up(search, key, passed))
 
 
 def asked_for(search: Search, smaller: Key, larger: Key) -> bool:

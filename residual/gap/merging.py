@@ -17,17 +17,18 @@ def merged(driven: Array, durations: Array, count: int) -> Array:
 
     Args:
         driven: Mean and rise in every sub-step of the recorded intervals, (V, rows, s, n_a, 2).
-        durations: Of the sub-steps, (rows, s).
+        durations: Of the recorded intervals, each of as many sub-steps, (rows, stride).
         count: Sub-steps of a row.
 
     Returns:
         (V, rows, count, n_a, 2).
     """
-    total = durations.shape[1]
+    total = driven.shape[2]
     uneven = np.ptp(durations, axis=1) > EVEN * durations.mean(axis=1)
     found = _alike(driven, total // count)
     if uneven.any():
-        found[:, uneven] = _by_time(driven[:, uneven], durations[uneven], count)
+        steps = np.repeat(durations[uneven], total // durations.shape[1], axis=1)
+        found[:, uneven] = _by_time(driven[:, uneven], steps, count)
     return found
 
 

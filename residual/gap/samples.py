@@ -133,8 +133,7 @@ class Samples:
         whole = whole.reshape(variants, count - 1, total, inputs, 2)
         last = np.repeat(driven[:, -1:, -1:], total, axis=2)
         durations = self.recorded[run].durations[: (count - 1) * self.stride]
-        each = np.repeat(durations.reshape(count - 1, self.stride) / fine, fine, axis=1)
-        each = np.vstack([each, np.ones((1, total))])
+        each = np.vstack([durations.reshape(count - 1, self.stride), np.ones((1, self.stride))])
         return merged(np.concatenate([whole, last], axis=1), each, self.substeps)
 
 
