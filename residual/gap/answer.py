@@ -60,7 +60,7 @@ class Answer:
         found: Search and choice.
         key: What goes into the corrected simulator: chosen effects that can be named.
         claims: What bears on each of them.
-        leads: Chosen effects that could be too many others.
+        leads: Chosen effects that could not be named.
     """
 
     found: Explanation
@@ -270,7 +270,7 @@ def minor(answer: Answer) -> dict[int, tuple[float, float, float]]:
     """Candidates that help the chosen set by too little, and the share that they would add.
 
     What helped only in another set's company is none: it is part of another explanation; nor is
-    what would do the work of one that could be too many others.
+    what would do the work of one that could not be named.
     """
     search, key = answer.found.search, answer.key
     shares = {}

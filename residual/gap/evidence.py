@@ -18,14 +18,14 @@ def evidence(found: Explanation, left: Key, leads: Sequence[str]) -> tuple[Rival
 
     Args:
         found: Search and choice.
-        left: What is left of the choice, without what could be too many others.
+        left: What is left of the choice, without what could not be named.
         leads: Labels of that.
     """
     search, why = found.search, found.choice.reasons
     if found.key != left:
         gone = {key for key in search.tried if set(search.labels(key)) & set(leads)}
-        too_many = dict.fromkeys(gone, "holds effects that too many others could replace")
-        why = reasons(search, left) | too_many
+        unnamed = dict.fromkeys(gone, "holds effects that these data do not establish")
+        why = reasons(search, left) | unnamed
     rows = [
         Rival(
             search.labels(key), search.error(key), key == left,

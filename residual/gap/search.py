@@ -1,4 +1,4 @@
-"""Sets of effects worth a fit: a linear screen, then a beam that grows by single effects.
+"""Sets of effects that were fitted, and how well they forecast.
 
 Every set is fitted from the numbers of the set it grew from. A larger set that ends worse than one
 that it contains has not converged; it is fitted again from there, and never counts as evidence if
@@ -19,6 +19,7 @@ from residual.gap.effort import Effort
 from residual.gap.fitting import UNCONVERGED, Fit, Fitter
 from residual.gap.global_search import GlobalSearch
 from residual.gap.model import Model
+from residual.gap.nested import absent, from_nested
 from residual.gap.plausible import absurd, nearly, surprises
 from residual.gap.screening import Signatures, signatures, trials
 from residual.gap.validation import Validated, validate
@@ -211,7 +212,8 @@ class Search:
             floor = self.tried[near].merit
             # What strikes the ground is fitted from nothing as long as nothing is there.
             if found.merit > floor and (near or not self.simulator.has_contacts):
-                start = self._from_nested(key, near, theta)
+                inner = self.tried[near]
+                start = from_nested(self.model(key), key, theta, inner.model, near, inner.theta)
                 again = self.fitter.fit(self.model(key), start, self.tried[near])
                 found = again if again.merit < found.merit else found
             found = self._globally.better(self.fitter, found, self.numbers(key), theta)
@@ -229,6 +231,10 @@ class Search:
                 self.nearly.add(key)
             if number < len(key):
                 self._with_twins(key, key[number])
+        for gone in absent(found.model, key, found.theta):
+            smaller, start = self.merged(key, (), drop=(gone,))
+            if smaller:  # the same motion with fewer numbers
+                self.fit(smaller, start)
 
     def _forget(self, key: Key) -> None:
         """Forget what was worked out from an earlier fit of a set."""
@@ -246,21 +252,6 @@ class Search:
             start = 0.01 * twin.trials[0].values[0]
             fresh, theta = self.merged(key, [(known.index(twin.effect), start)], drop=(gone,))
             self.add({fresh: theta})
-
-    def _from_nested(self, key: Key, nested: Key, theta: Array) -> Array:
-        """Numbers of a nested set, what it lacks hardly there."""
-        model = self.model(key)
-        start = np.array(theta)
-        for place, number in enumerate(key):
-            own = np.flatnonzero(model.owner == place)
-            if number in nested:
-                inner = self.model(nested)
-                start[own] = self.tried[nested].theta[inner.owner == nested.index(number)]
-                continue
-            for j in own:
-                if model.knobs[j].strength:
-                    start[j] = np.clip(0.01 * model.knobs[j].step, model.low[j], model.high[j])
-        return start
 
     def twins_of(self, number: int) -> list[Candidate]:
         """Candidates that move exactly as one does."""

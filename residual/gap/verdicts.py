@@ -12,9 +12,9 @@ from residual.gap.fitting import Left
 from residual.gap.result import Blind, Doubt, Gap, Kind, Number, Span, Verdict
 from residual.gap.search import Key, Search
 
-#: Families of which an effect may be one and still be worth a name, and one that forecasts do not
-#: clearly need: any of them makes a better simulator, and which it is may be asked of better data.
-MOST_FAMILIES, UNNEEDED = 5, 3
+#: Families of which an effect may be one and still be worth a name, if forecasts do not clearly
+#: need it. What they do need makes a better simulator, whichever of many it is.
+UNNEEDED = 3
 #: Part of a strength below which an effect hardly acts.
 NEARLY_NONE = 0.1
 #: Part of what a parameter may change by that is a change.
@@ -28,7 +28,7 @@ def nameable(search: Search, claim: Claim, blocks: int, adequate: bool) -> bool:
     """
     if not adequate and claim.share[0] <= 0 and not claim.by_fit:
         return False
-    few = len(families(search, claim)) <= (MOST_FAMILIES if claim.needed else UNNEEDED)
+    few = claim.needed or len(families(search, claim)) <= UNNEEDED
     there = claim.by_fit or not may_vanish(search, claim)
     return few and blocks >= TOO_FEW and there
 
@@ -36,7 +36,9 @@ def nameable(search: Search, claim: Claim, blocks: int, adequate: bool) -> bool:
 def may_vanish(search: Search, claim: Claim) -> bool:
     """Whether none of an effect's strengths is known to be other than zero."""
     numbers = _strengths(search, claim)
-    return bool(numbers) and all(n.low <= 0 <= n.high and not n.at_bound for n in numbers)
+    return bool(numbers) and all(
+        n.low <= 0 <= n.high and (not n.at_bound or n.value == 0) for n in numbers
+    )
 
 
 def hardly_known(search: Search, claim: Claim) -> bool:
@@ -191,7 +193,7 @@ def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdic
     if left.force:
         says += f"; it looks like something that follows {left.force}"
     if leads:
-        says += f"; {', '.join(leads)} would take some of it, and so would many others"
+        says += f"; {', '.join(leads)} might take some of it, but these data do not show that"
     return Verdict("unexplained", "", "", {}, tuple(leads), "", says, share, follows=left.force)
 
 
@@ -204,7 +206,7 @@ def parted_verdict(gap: Gap, leads: Sequence[str] = ()) -> Verdict:
         "noise, and nothing of the library explains it"
     )
     if leads:
-        says += f"; {', '.join(leads)} would take some of it, and so would many others"
+        says += f"; {', '.join(leads)} might take some of it, but these data do not show that"
     return Verdict("unexplained", "", "", {}, tuple(leads), "", says, share)
 
 

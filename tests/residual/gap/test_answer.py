@@ -49,7 +49,7 @@ def test_reasons_are_those_of_the_set_that_is_left():
     toy.labels = lambda key: tuple("abcde"[n] for n in key)
     found = SimpleNamespace(search=toy, key=(0, 3), choice=SimpleNamespace(reasons={}))
     told = {one.effects: one.reason for one in evidence(found, (0,), ("d",))}
-    assert told["a", "d"] == "holds effects that too many others could replace"
+    assert told["a", "d"] == "holds effects that these data do not establish"
     assert told["a", "b"] == "takes only 5 % off what remains"
     assert told["a", "b", "e"] == "takes only 17 % off what remains with 2 effects more"
     assert told["a",] == ""

@@ -210,22 +210,33 @@ def test_few_blocks_confirm_families_for_the_time_being_and_fewer_than_four_noth
     assert not nameable(toy, claim(1), 3, True)
 
 
-@pytest.mark.parametrize(("low", "named"), [(0.001, True), (-0.001, False)])
-def test_what_may_have_no_size_has_no_name(low, named):
+@pytest.mark.parametrize(("value", "low", "at_bound", "named"), [
+    (0.01, 0.001, False, True), (0.01, -0.001, False, False),
+    (0.02, 0.0, True, True), (0.0, 0.0, True, False),  # full size, and none at all
+])  # fmt: skip
+def test_what_may_have_no_size_has_no_name(value, low, at_bound, named):
     toy = Toy({(0,): 0.3})
-    small = claim(numbers={"change": Number(0.01, low, 0.02, "kg")})
+    small = claim(numbers={"change": Number(value, low, 0.02, "kg", at_bound)})
     assert nameable(toy, small, 20, True) is named
 
 
-def test_what_could_be_too_many_others_has_no_name():
+def test_what_forecasts_need_is_named_whatever_else_it_could_be():
+    """Any of many makes a better simulator, and a user is told of which ones it is one."""
     toy = Toy({(0,): 0.3})
     some = ("constant_load@pivot", "viscous_friction@pivot", "coulomb_friction@pivot")
-    assert nameable(toy, claim(rivals=some), 20, True)  # two forms of dissipation count once
     many = (*some, "actuator_gain@voltage", "delay@voltage", "sensor_offset@angle")
-    assert not nameable(toy, claim(rivals=many), 20, True)
-    # What forecasts do not clearly need has to be one of fewer.
-    assert nameable(toy, claim(rivals=many[:4]), 20, True)
-    assert not nameable(toy, claim(rivals=many[:4], needed=False), 20, True)
+    assert nameable(toy, claim(rivals=many), 20, True)
+    verdict = effect_verdict(toy, claim(rivals=many), 20)
+    assert verdict.kind == "ambiguous"
+    assert set(many) <= set(verdict.alternatives)
+
+
+def test_what_forecasts_do_not_need_has_to_be_one_of_few():
+    toy = Toy({(0,): 0.3})
+    some = ("viscous_friction@pivot", "coulomb_friction@pivot", "delay@voltage")
+    assert nameable(toy, claim(rivals=some, needed=False), 20, True)  # dissipation counts once
+    more = (*some, "actuator_gain@voltage")
+    assert not nameable(toy, claim(rivals=more, needed=False), 20, True)
 
 
 def test_minor_effects_carry_their_share_and_no_number():
