@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.logs.checks import Finding
-from residual.logs.layout import Column, LogFormat, named_column
+from residual.logs.headers import TIME, columns_of, time_column
+from residual.logs.layout import Column, LogFormat
 from residual.logs.table import LogError, Table
 from residual.logs.timing import Run
 from residual.logs.units import find_unit
@@ -18,15 +19,6 @@ Array = NDArray[np.float64]
 
 # Beyond it, in SI, sums of squares lose all meaning; nanoseconds since 1970 are well below.
 _LARGEST = 1e15
-
-
-def _layout(
-    table: Table, given: Mapping[str, str | int | Column], channels: Sequence[Channel]
-) -> dict[str, Column]:
-    """The column of every channel that this file holds."""
-    if given:
-        return {name: named_column(column, name) for name, column in given.items()}
-    return {c.name: Column(c.name) for c in channels if c.name in table.columns}
 
 
 def runs_of(
@@ -43,13 +35,14 @@ def runs_of(
         columns: Its layout.
         states: State channels that a log can hold.
         actions: Action channels.
-        findings: Trajectories that ``start`` and ``stop`` leave out are added here.
+        findings: Converted columns, and trajectories that ``start`` and ``stop`` leave out, are
+            added here.
 
     Raises:
         LogError: A column is missing or holds no numbers, or the time goes backwards.
     """
-    found = _layout(table, columns.states, states)
-    inputs = _layout(table, columns.actions, actions)
+    found = columns_of(table, columns.states, states, findings)
+    inputs = columns_of(table, columns.actions, actions, findings)
     if not found:
         wanted = ", ".join(repr(channel.name) for channel in states)
         raise LogError(
@@ -65,8 +58,8 @@ def runs_of(
             "give it a constant value, with --columns FILE",
             table.path,
         )
-    time = named_column(columns.time, "time")
-    times = _si(table, time, Channel("time", "s", "other"), columns.decimal)
+    time = time_column(table, columns.time, findings)
+    times = _si(table, time, TIME, columns.decimal)
     seen = [
         _si(table, found[channel.name], channel, columns.decimal)
         if channel.name in found
