@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from residual.gap.answer import Answer
+from residual.gap.answer import Answer, summed_up, within_noise
 from residual.gap.candidates import Candidate
 from residual.gap.choice import takes_off
 from residual.gap.explain import FOOTNOTE
@@ -15,8 +15,9 @@ from residual.gap.tolerance import allowed, calibrated
 def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
     """Parameters within their tolerance, if they hide something or explain much of what is left.
 
-    They do where nothing could be named, or where they take a material part of the error off,
-    free beside what was named. Parameters that were named are none of them.
+    They do where nothing could be named, though forecasts err by more than noise, or where they
+    take a material part of the error off, free beside what was named. Parameters that were named
+    are none of them.
 
     Args:
         answer: What was found with all parameters at their values.
@@ -25,6 +26,8 @@ def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
     search, key = answer.found.search, answer.key
     left = search.fitter.left(search.tried[key], answer.found.floor)
     if not tolerance or left.adequate or left.ratio <= FOOTNOTE:
+        return []
+    if not key and within_noise(summed_up(answer)):
         return []
     named = search.labels(key)
     free = [one for one in allowed(search, tolerance) if one.label not in named]

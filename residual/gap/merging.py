@@ -17,7 +17,8 @@ def merged(driven: Array, durations: Array, count: int) -> Array:
 
     Args:
         driven: Mean and rise in every sub-step of the recorded intervals, (V, rows, s, n_a, 2).
-        durations: Of the recorded intervals, each of as many sub-steps, (rows, stride).
+        durations: Of the recorded intervals, each of as many sub-steps, (rows, intervals); of a
+            row that has fewer, the others take no time.
         count: Sub-steps of a row.
 
     Returns:
@@ -53,7 +54,8 @@ def _by_time(driven: Array, durations: Array, count: int) -> Array:
     # What lies of each sub-step (rows, s) before each edge: up to x, begun at ``begin``.
     begin = (end - width)[..., None]
     x = np.clip(edges, begin, end[..., None])
-    slant = ((x - middle[..., None]) ** 2 - (0.5 * width[..., None]) ** 2) / (2 * width[..., None])
+    wide = np.maximum(width, np.finfo(float).tiny)[..., None]  # those without width hold nothing
+    slant = ((x - middle[..., None]) ** 2 - (0.5 * width[..., None]) ** 2) / (2 * wide)
     cubes = (x**3 - begin**3) / 3 - middle[..., None] * (x**2 - begin**2) / 2
     mean, rise = driven[..., 0], driven[..., 1]
 
@@ -62,6 +64,6 @@ def _by_time(driven: Array, durations: Array, count: int) -> Array:
         return by_mean + np.einsum("vrsn,rse->vren", rise, of_rise)
 
     area = np.diff(before(x - begin, slant), axis=2)
-    moment = np.diff(before((x**2 - begin**2) / 2, cubes / width[..., None]), axis=2)
+    moment = np.diff(before((x**2 - begin**2) / 2, cubes / wide), axis=2)
     centre = (np.arange(count) + 0.5)[:, None] / count
     return np.stack([area * count, 12 * (moment - centre * area) * count**2], axis=-1)

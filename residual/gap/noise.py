@@ -15,6 +15,8 @@ from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
+#: Readings in the short windows that tell noise from motion.
+READINGS = 8
 #: Windows that are fitted in one batch: a long record takes little memory beside its own rows.
 AT_ONCE = 4096
 
@@ -87,7 +89,6 @@ def estimate(
     theta: Array,
     sigma: Array,
     scale: Array,
-    length: int = 8,
     terms: int | None = None,
     iterations: int = 4,
 ) -> Floor:
@@ -106,6 +107,9 @@ def estimate(
     free = model.free
     if terms is None:
         terms = 4 if set(measured) & set(driven) else 3
+    # Rows may be without a reading: as many of the channel that was read most are to be in each.
+    read = float(np.isfinite(samples.seen[:, measured]).mean(axis=0).max())
+    length = round(READINGS / read)
     windows = fixed(samples, length, shortest=length - 1)
     start = np.zeros((nodes.shape[1], len(free)))
     start[free, range(len(free))] = 1.0
@@ -223,13 +227,13 @@ def local_noise(samples: Samples, length: int = 9) -> Array:
     for column in samples.measured:
         squares: list[float] = []
         for start, stop in samples.runs:
-            for a in range(start, stop - length + 1, length):
-                t = samples.times[a : a + length]
-                y = samples.seen[a : a + length, column]
-                if np.isfinite(y).all():
-                    basis = np.vander((t - t.mean()) / max(np.ptp(t), 1e-12), 4)
-                    rest = y - basis @ np.linalg.lstsq(basis, y, rcond=None)[0]
-                    squares.append(float(rest @ rest) / (length - 4))
+            read = start + np.flatnonzero(np.isfinite(samples.seen[start:stop, column]))
+            for a in range(0, len(read) - length + 1, length):
+                t = samples.times[read[a : a + length]]
+                y = samples.seen[read[a : a + length], column]
+                basis = np.vander((t - t.mean()) / max(np.ptp(t), 1e-12), 4)
+                rest = y - basis @ np.linalg.lstsq(basis, y, rcond=None)[0]
+                squares.append(float(rest @ rest) / (length - 4))
         spread = np.nanstd(samples.seen[:, column])
         guess = np.sqrt(np.median(squares)) if squares else 1e-3 * spread
         guesses.append(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import itertools
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -23,18 +24,21 @@ class Recorded:
     Attributes:
         actions: Action held from each sample to the next, shape (n, n_a).
         durations: Seconds to the next sample, shape (n,).
+        rows: Which of the samples are rows of the table.
     """
 
     actions: Array
     durations: Array
+    rows: NDArray[np.int64]
 
 
 @dataclasses.dataclass(frozen=True)
 class Samples:
     """Samples of all runs, one row each, runs one after the other.
 
-    A log that is sampled much faster than the system moves is thinned: every ``stride``-th sample
-    is a row, and a row's interval spans ``stride`` recorded ones. Inputs are kept as recorded.
+    A log that is sampled much faster than the system moves is thinned: of every ``stride`` samples
+    one is a row, the first of those with the most readings, and an interval spans the recorded
+    ones up to the next row. Inputs are kept as recorded.
 
     Attributes:
         seen: Measured state channels, shape (n, n_s); NaN where not measured.
@@ -44,7 +48,7 @@ class Samples:
         runs: First and one-past-last row of every run.
         names: Name of every run.
         substeps: Sub-steps to integrate between two rows.
-        stride: Recorded samples in an interval.
+        stride: Recorded samples for a row.
         recorded: Inputs of every run as recorded.
     """
 
@@ -69,9 +73,10 @@ class Samples:
         usable = sorted((t for t in trajectories if len(t) >= stride), key=_content)
         if not usable:
             raise ValueError("no trajectory to look at: give at least one with a step")
-        parts, ends = [], [0]
+        parts, ends, kept = [], [0], []
         for run in usable:
-            rows = np.arange(0, len(run) + 1, stride)
+            rows = _rows(run.states, stride)
+            kept.append(rows)
             actions = np.vstack([run.actions, run.actions[-1:]])[rows]
             steps = np.diff(run.times[rows])
             parts.append((run.states[rows], actions, np.append(steps, steps[-1]), run.times[rows]))
@@ -90,8 +95,9 @@ class Samples:
                 Recorded(
                     np.vstack([t.actions, t.actions[-1:]]),
                     np.append(t.durations, t.durations[-1]),
+                    rows,
                 )
-                for t in usable
+                for t, rows in zip(usable, kept, strict=True)
             ),
         )
 
@@ -124,17 +130,28 @@ class Samples:
         Returns:
             (V, rows, ``self.substeps``, n_a, 2).
         """
-        start, stop = self.runs[run]
         if self.stride == 1:
             return driven
         variants, _, fine, inputs, _ = driven.shape
-        count, total = stop - start, self.stride * fine
-        whole = driven[:, : (count - 1) * self.stride]
-        whole = whole.reshape(variants, count - 1, total, inputs, 2)
-        last = np.repeat(driven[:, -1:, -1:], total, axis=2)
-        durations = self.recorded[run].durations[: (count - 1) * self.stride]
-        each = np.vstack([durations.reshape(count - 1, self.stride), np.ones((1, self.stride))])
+        recorded = self.recorded[run]
+        first, end = recorded.rows[:-1, None], recorded.rows[1:, None]
+        # Where readings are rare, intervals differ; the shorter ones end with some of no length.
+        times = int((end - first).max(initial=1))
+        width = self.stride * 2 ** max(0, math.ceil(math.log2(times / self.stride)))
+        at = first + np.arange(width)
+        durations = np.where(at < end, recorded.durations[np.minimum(at, end - 1)], 0.0)
+        whole = driven[:, np.minimum(at, end - 1)]
+        whole = whole.reshape(variants, len(first), width * fine, inputs, 2)
+        last = np.repeat(driven[:, -1:, -1:], width * fine, axis=2)
+        each = np.vstack([durations, np.ones((1, width))])
         return merged(np.concatenate([whole, last], axis=1), each, self.substeps)
+
+
+def _rows(states: Array, stride: int) -> NDArray[np.int64]:
+    """Of every ``stride`` samples the first of those with the most readings."""
+    told = np.isfinite(states).sum(axis=1)
+    begins = range(0, len(states), stride)
+    return np.array([begin + int(told[begin : begin + stride].argmax()) for begin in begins])
 
 
 def _content(run: Trajectory) -> bytes:

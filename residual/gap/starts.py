@@ -56,7 +56,8 @@ def starts(
         least = np.where(better, cost, least)
         if turn == TURNS:
             break
-        slope = (path[1:] - path[0]) / moves[:, None, None, None] / fitter.sigma
+        with np.errstate(over="ignore"):  # of paths that run away; clipped below
+            slope = (path[1:] - path[0]) / moves[:, None, None, None] / fitter.sigma
         slope = np.where(there, np.clip(slope, -1e8, 1e8), 0.0)
         slope = slope.reshape(len(free), len(windows), -1).transpose(1, 2, 0)
         basis, triangle = np.linalg.qr(np.concatenate([slope, ridges], axis=1))

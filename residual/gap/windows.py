@@ -81,30 +81,36 @@ def cut(
         jacobians: Derivative of every next state by its state, shape (n, n_s, n_s).
         scale: Typical variation of each state, to make states of different units comparable.
         seconds: Wanted length of a window.
-        shortest: Fewest samples in a window.
+        shortest: Fewest samples with a reading in a window.
         growth: Largest allowed norm of the product of the scaled Jacobians.
 
     Raises:
         ValueError: No run has samples enough for a window.
     """
     scaled = jacobians * scale[None, None, :] / scale[None, :, None]
+    before = np.append(0, np.cumsum(np.isfinite(samples.seen).any(axis=1)))
+
+    def readings(first: int, end: int) -> int:
+        return int(before[end] - before[first])
+
     pieces = []
     for run, (start, stop) in enumerate(samples.runs):
-        if stop - start < shortest:
+        if readings(start, stop) < shortest:
             continue
         spans = samples.times[stop - 1] - samples.times[start]
-        count = max(1, min(round(float(spans) / seconds), (stop - start) // shortest))
+        count = max(1, min(round(float(spans) / seconds), readings(start, stop) // shortest))
         edges = np.linspace(start, stop, count + 1).round().astype(int)
         for first, last in itertools.pairwise(edges.tolist()):
             a = first
-            while last - a >= shortest:
+            while readings(a, last) >= shortest:
                 product, size = np.eye(len(scale)), 1
                 while a + size < last:
                     product = scaled[a + size - 1] @ product
-                    if size >= shortest and np.linalg.norm(product, 2) > growth:
+                    enough = readings(a, a + size) >= shortest
+                    if enough and np.linalg.norm(product, 2) > growth:
                         break
                     size += 1
-                if 0 < last - a - size < shortest:
+                if readings(a + size, last) < shortest:
                     size = last - a
                 pieces.append((run, a, a + size))
                 a += size

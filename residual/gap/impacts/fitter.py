@@ -167,7 +167,9 @@ class ImpactFitter:
             # Rows beyond a run's end are its last one again, so times are counted anew.
             times=np.tile(samples.step * np.arange(length), count), names=("drawn",) * count,
             runs=tuple((int(a), int(a) + length) for a in begins),
-            recorded=tuple(Recorded(samples.actions[r], samples.durations[r]) for r in rows),
+            recorded=tuple(
+                Recorded(samples.actions[r], samples.durations[r], np.arange(length)) for r in rows
+            ),
         )  # fmt: skip
         size = self.data.windows.index.shape[1]
         cut = [(k, int(a), int(a) + size) for k, a in enumerate(begins)]
