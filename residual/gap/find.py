@@ -14,6 +14,7 @@ from residual.gap.aliases import aliases, representatives
 from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
 from residual.gap.candidates import Candidate, candidates
 from residual.gap.confirmation import CLEARLY
+from residual.gap.conventions import otherwise
 from residual.gap.data import examine
 from residual.gap.excerpt import excerpt
 from residual.gap.explain import Explanation, explain
@@ -31,7 +32,7 @@ from residual.gap.numerics import (
 from residual.gap.prepare import Prepared, prepare
 from residual.gap.result import GapResult
 from residual.gap.search import Search
-from residual.gap.smooth import LEAD
+from residual.gap.smooth import LEAD, SmoothFitter
 from residual.gap.suited import beyond_noise, horizon_of_windows, needs_closer_rows
 from residual.gap.twins import exact_twins, with_twins
 from residual.gap.workers import workers
@@ -153,6 +154,11 @@ def find_gap(
                 prepared = prepare(simulator, runs, horizon)
             prepared = beyond_noise(simulator, runs, prepared)
             horizon = prepared.horizon
+        if isinstance(prepared.fitter, SmoothFitter):
+            counted = otherwise(simulator, prepared.fitter)
+            quality = [*counted, *quality]
+            for says in counted:
+                tell(says)
         quality += left_out
         found = explained(simulator, prepared)
         other = held_otherwise(simulator) if hold is None else None
