@@ -45,7 +45,8 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
     One is Gauss-Newton's with start states projected out, times the residual variance; the other
     the sandwich over blocks, which allows for errors that go together within a block, with
     Student's t for few blocks. Source: White, "Maximum likelihood estimation of misspecified
-    models", Econometrica 50 (1982). What is known of a number beforehand counts as an observation.
+    models", Econometrica 50 (1982). What is known of a number beforehand counts as an observation,
+    and is known as well however large the residuals are.
     """
     p = len(fit.theta)
     if not p:
@@ -56,20 +57,25 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
     unit = rows / scale
     # Of a number that moves nothing, no more is known than what is known for certain.
     known = np.maximum(np.array([knob.known for knob in fit.model.knobs]) * scale, 1e-6)
-    matrix = np.einsum("wri,wrj->ij", unit, unit) + np.diag(known**-2)
-    inverse = np.linalg.pinv(matrix, rcond=1e-12)
-    # A number that is known beforehand takes less of the data than a whole one.
-    taken = float(np.clip(1 - np.diag(inverse) * known**-2, 0.0, 1.0).sum())
-    used = int((np.abs(residual) > 0).sum())
-    freedom = max(used - fit.basis.shape[2] * len(residual) - taken, 1)
-    variance = max(1.0, float((residual**2).sum()) / freedom)
+    matrix, prior = np.einsum("wri,wrj->ij", unit, unit), np.diag(known**-2)
+    freedom = int((np.abs(residual) > 0).sum()) - fit.basis.shape[2] * len(residual)
+    variance = 1.0
+    for _ in range(2):
+        inverse = np.linalg.pinv(matrix + variance * prior, rcond=1e-12)
+        # A number that is known beforehand takes less of the data than a whole one.
+        taken = float(np.clip(1 - variance * np.diag(inverse) * known**-2, 0.0, 1.0).sum())
+        variance = max(1.0, float((residual**2).sum()) / max(freedom - taken, 1))
     plain = variance * np.maximum(np.diag(inverse), 0.0)  # of a matrix that is all but singular
     count = len(blocks)
     if count <= taken + 1:
         return np.sqrt(plain) / scale
     per_window = np.einsum("wri,wr->wi", unit, residual)
     scores = np.stack([per_window[blocks.block == b].sum(axis=0) for b in range(count)])
-    sandwich = np.diag(inverse @ (scores.T @ scores) @ inverse) * count / (count - taken)
+    meat = scores.T @ scores * count / (count - taken)
+    # Errors that go together count for more, so that less is left to say of what is known.
+    variance = max(variance, float(np.diag(meat).mean()))
+    inverse = np.linalg.pinv(matrix + variance * prior, rcond=1e-12)
+    sandwich = np.diag(inverse @ (meat + variance**2 * prior) @ inverse)
     return np.sqrt(np.maximum(plain, sandwich)) * _student(count - taken) / scale
 
 

@@ -11,6 +11,8 @@ Array = NDArray[np.float64]
 ENOUGH = 20
 #: Rounding below this part of a period is of no consequence.
 COARSE = 0.05
+#: Rounding takes less than itself off a step or adds it; a row that was lost adds a period.
+LOST = 1.05
 #: Decimals of a second that are looked at.
 DECIMALS = 6
 
@@ -19,7 +21,8 @@ def even_clock(times: Array) -> tuple[Array, float]:
     """Evenly spaced times that agree with rounded ones, and to what these were rounded, in s.
 
     Rows that come every 8.3 ms with times printed to 0.01 s seem to repeat some times and to leave
-    others out. Where one even clock is within the rounding of every time, it is the better one.
+    others out. Where one even clock is within the rounding of every time, it is the better one,
+    unless a step differs from its period by more than rounding makes it: then a row is missing.
 
     Args:
         times: In s, not decreasing, (n,).
@@ -38,9 +41,9 @@ def even_clock(times: Array) -> tuple[Array, float]:
     if not uneven or rounding < COARSE * period:
         return times, 0.0
     even = start + period * place
-    if np.abs(times - even).max() > rounding:
-        return times, 0.0
-    return even, rounding
+    far = np.abs(times - even).max() > rounding
+    lost = np.abs(steps - period).max() > LOST * rounding
+    return (times, 0.0) if far or lost else (even, rounding)
 
 
 def _rounding(times: Array) -> float:

@@ -61,6 +61,15 @@ def test_a_row_written_twice_is_no_rounded_clock(tmp_path):
     assert "repeated" in kinds(data) and "rounded_clock" not in kinds(data)
 
 
+def test_a_lost_row_is_no_rounded_clock(tmp_path):
+    columns = {name: np.delete(values, 124) for name, values in swing(250, dt=0.02).items()}
+    columns["time"] = np.round(columns["time"], 2)
+    data = read(write(tmp_path / "log.csv", columns))
+    (run,) = data.trajectories
+    assert "rounded_clock" not in kinds(data)
+    assert np.array_equal(run.times, columns["time"])
+
+
 def test_jitter_is_kept_and_reported(tmp_path):
     rng = np.random.default_rng(0)
     t = np.cumsum(rng.uniform(0.03, 0.07, 200))
