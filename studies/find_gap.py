@@ -40,7 +40,7 @@ from studies.gap.files import CORRECTED, REPORT, write_gap
 from studies.gap.progress import Heartbeat
 from studies.gap.summary import found_in_data, summary
 from studies.running.command import Parser
-from studies.running.ending import check_output, fail, guarded, on_purpose
+from studies.running.ending import check_output, guarded
 
 
 @dataclasses.dataclass(frozen=True)
@@ -252,13 +252,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     settings = yaml.safe_load(parser.dump(given, format="yaml", skip_unset=False))
     output, jobs = Path(settings.pop("output")), settings.pop("jobs")
     settings.pop("config", None)
-    try:
-        with Heartbeat(60 * settings["minutes"]) as tell:
-            result = run(settings, output, jobs, tell)
-    except (ValueError, OSError) as error:
-        if on_purpose(error):
-            fail(str(error))
-        raise
+    with Heartbeat(60 * settings["minutes"]) as tell:
+        result = run(settings, output, jobs, tell)
     print(f"\n{summary(result, settings['tolerance'])}\n\nreport:              {output / REPORT}")
     print(f"corrected simulator: {output / CORRECTED}")
     if strange := foreign(settings["simulator"]):
