@@ -23,7 +23,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-import yaml
 from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
@@ -139,7 +138,7 @@ def run(
     chosen = parser.parse_object(
         {**copy.deepcopy(dict(settings)), "output": str(output), "jobs": jobs}
     )
-    plain = yaml.safe_load(parser.dump(chosen, format="yaml", skip_unset=False))
+    plain = parser.plain(chosen)
     config = {key: plain[key] for key in (*_FIELDS, "logs", "held_out", "effects")}
     made = parser.instantiate(chosen)
     study = GapStudy(**{name: made[name] for name in _FIELDS})
@@ -249,7 +248,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     parser = build_parser()
     given = parser.parse_args(arguments)
-    settings = yaml.safe_load(parser.dump(given, format="yaml", skip_unset=False))
+    settings = parser.plain(given)
     output, jobs = Path(settings.pop("output")), settings.pop("jobs")
     settings.pop("config", None)
     with Heartbeat(60 * settings["minutes"]) as tell:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import importlib.util
-import json
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -49,7 +48,7 @@ def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
     """The command of a study: one trial, or the grid of a config file."""
     parser = build_parser(study)
     given = parser.parse_args(arguments)
-    settings = json.loads(parser.dump(given, format="json", skip_unset=False))
+    settings = parser.plain(given)
     output, grid = settings.pop("output"), settings.pop("grid")
     execution = Execution(
         **{name: settings.pop(name) for name in ("backend", "jobs", "scheduler")},
