@@ -164,17 +164,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if given.mujoco:
         robots(given.output)
         return
+    data, complete = measure(given.quick) if not given.read else (read_json(given.read), True)
     try:
-        data, complete = measure(given.quick) if not given.read else (read_json(given.read), True)
         found = records(data)
-        picture = Path(given.output).parent / FIGURE if given.output else None
-        page = document(data, picture is not None and write_figure(found, picture) is not None)
-        if given.output and Path(given.output).is_file():
-            page = with_robots(page, robots_in(Path(given.output).read_text(encoding="utf-8")))
     except ValueError as problem:
         fail(f"{given.read}: {problem}" if given.read else str(problem))
-    except OSError as problem:
-        fail(str(problem))
+    picture = Path(given.output).parent / FIGURE if given.output else None
+    page = document(data, picture is not None and write_figure(found, picture) is not None)
+    if given.output and Path(given.output).is_file():
+        page = with_robots(page, robots_in(Path(given.output).read_text(encoding="utf-8")))
     print(page)
     if given.json:
         atomic_write_json(given.json, data)

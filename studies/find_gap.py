@@ -23,7 +23,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-import yaml
 from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
@@ -40,7 +39,7 @@ from studies.gap.files import CORRECTED, REPORT, write_gap
 from studies.gap.progress import Heartbeat
 from studies.gap.summary import found_in_data, summary
 from studies.running.command import Parser
-from studies.running.ending import check_output, fail, guarded, on_purpose
+from studies.running.ending import check_output, guarded
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,7 +138,7 @@ def run(
     chosen = parser.parse_object(
         {**copy.deepcopy(dict(settings)), "output": str(output), "jobs": jobs}
     )
-    plain = yaml.safe_load(parser.dump(chosen, format="yaml", skip_unset=False))
+    plain = parser.plain(chosen)
     config = {key: plain[key] for key in (*_FIELDS, "logs", "held_out", "effects")}
     made = parser.instantiate(chosen)
     study = GapStudy(**{name: made[name] for name in _FIELDS})
@@ -249,16 +248,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     parser = build_parser()
     given = parser.parse_args(arguments)
-    settings = yaml.safe_load(parser.dump(given, format="yaml", skip_unset=False))
+    settings = parser.plain(given)
     output, jobs = Path(settings.pop("output")), settings.pop("jobs")
     settings.pop("config", None)
-    try:
-        with Heartbeat(60 * settings["minutes"]) as tell:
-            result = run(settings, output, jobs, tell)
-    except (ValueError, OSError) as error:
-        if on_purpose(error):
-            fail(str(error))
-        raise
+    with Heartbeat(60 * settings["minutes"]) as tell:
+        result = run(settings, output, jobs, tell)
     print(f"\n{summary(result, settings['tolerance'])}\n\nreport:              {output / REPORT}")
     print(f"corrected simulator: {output / CORRECTED}")
     if strange := foreign(settings["simulator"]):

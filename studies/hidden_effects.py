@@ -147,10 +147,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     study = HiddenStudy(**{name: made[name] for name in fields})
     output = Path(given.output) if given.output else RESULTS
     check_output(output)
-    try:
-        cells = trials_of(study)
-    except ValueError as error:
-        fail(str(error))
+    cells = trials_of(study)
     if not cells:
         fail("nothing to run: expected blocks or dirty, as in studies/configs/hidden_effects/")
     folders = {trial_folder(output / "sets", _title(c), c): c for c in cells}

@@ -16,7 +16,7 @@ import numpy as np
 from residual.logs.clocks import Signal
 from residual.logs.sources import signals_of
 from studies.running.command import Parser
-from studies.running.ending import fail, guarded
+from studies.running.ending import guarded
 
 
 def build_parser() -> Parser:
@@ -52,10 +52,7 @@ def _line(name: str, signal: Signal, width: int) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     given = build_parser().parse_args(arguments)
-    try:
-        print("\n\n".join(describe(path) for path in given.files))
-    except (ValueError, OSError) as error:
-        fail(str(error))
+    print("\n\n".join(describe(path) for path in given.files))
 
 
 if __name__ == "__main__":

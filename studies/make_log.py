@@ -89,15 +89,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     folder, system, policy = given.pop("output"), given.pop("system"), given.pop("policy")
     walk, seed = given.pop("walk"), given.pop("seed")
     check_output(folder)
-    try:
-        if system == "pendulum":
-            paths = write_logs(folder, **vars(given), seed=seed)
-        elif policy is None:
-            raise ValueError("--system leo needs --policy, an agent that walks (docs/leo.md)")
-        else:
-            paths = write_walks(folder, policy, **vars(walk), seed=seed)
-    except (ValueError, OSError) as error:
-        fail(str(error))
+    if system == "pendulum":
+        paths = write_logs(folder, **vars(given), seed=seed)
+    elif policy is None:
+        fail("--system leo needs --policy, an agent that walks (docs/leo.md)")
+    else:
+        paths = write_walks(folder, policy, **vars(walk), seed=seed)
     print(f"{len(paths)} runs: {paths[0]} to {paths[-1].name}")
 
 

@@ -77,7 +77,8 @@ def headline(verdict: Verdict, result: GapResult) -> str:
         )
     numbers = ", ".join(_named(field, number) for field, number in verdict.parameters.items())
     if verdict.family:
-        return f"{capitalized(verdict.family)}, form undecided: as {_lower(name)}, {numbers}."
+        own = effect_name(verdict.label)
+        return f"{capitalized(verdict.family)}, form undecided: as {own}, {numbers}."
     return f"{name}{shape(verdict)}: {numbers}{_times(verdict)}."
 
 
@@ -262,7 +263,3 @@ def experiment(label: str, others: Sequence[str], result: GapResult, same: bool)
 def kind_text(verdict: Verdict) -> str:
     """The kind in words, provisional ones marked."""
     return KINDS[verdict.kind] + (", provisional" if verdict.provisional else "")
-
-
-def _lower(text: str) -> str:
-    return text if text.startswith(("Coulomb", "Stribeck")) else text[:1].lower() + text[1:]

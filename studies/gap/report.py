@@ -11,6 +11,7 @@ import yaml
 from residual.gap import GapResult
 from studies.gap.forecasts import bars, rollouts, set_aside, tiles, where
 from studies.gap.verdicts import apart, banners, blind, evidence
+from studies.gap.words import found_once
 from studies.reporting import Code, Prose, Report, Section, Table
 
 # Findings beyond these are in gap.json.
@@ -56,14 +57,8 @@ def write_report(
 
 def quality(result: GapResult, record: Mapping[str, Any]) -> list[Section]:
     """Findings about the data, and the noise."""
-    places: dict[tuple[str, str], list[str]] = {}
-    for found in record["quality"]:
-        place = Path(found["where"]).name
-        places.setdefault((found["kind"], found["says"]), []).append(place)
-    rows = [
-        [kind, where[0] + (f" and {len(where) - 1} more" if len(where) > 1 else ""), says]
-        for (kind, says), where in places.items()
-    ]
+    found = (((one["kind"], one["says"]), one["where"]) for one in record["quality"])
+    rows = [[kind, where, says] for (kind, says), where in found_once(found)]
     noise = ", ".join(
         f"{name} {sigma:.3g} ± {error:.2g} {dict(result.channels)[name]}".strip()
         for name, (sigma, error) in result.noise.items()

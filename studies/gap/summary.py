@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from pathlib import Path
 
 from residual.gap import GapResult
 from residual.gap.result import ChannelGap, Gap
 from residual.logs import Finding
 from studies.gap.answer import headline, is_footnote, kind_text, notes
 from studies.gap.lead import lead, own_errors
-from studies.gap.words import CROSS_VALIDATED, ahead, gap_rows, span_text, unit_text
+from studies.gap.words import CROSS_VALIDATED, ahead, found_once, gap_rows, span_text, unit_text
 
 #: Width of the text, and of the column of kinds.
 WIDTH, KIND = 100, 16
@@ -108,10 +107,4 @@ def errors(channel: ChannelGap) -> str:
 
 def found_in_data(findings: Sequence[Finding]) -> list[str]:
     """What stands out in the logs, equal findings of several files in one line."""
-    places: dict[str, list[str]] = {}
-    for found in findings:
-        places.setdefault(found.says, []).append(Path(found.where).name)
-    return [
-        f"{where[0]}{f' and {len(where) - 1} more' if len(where) > 1 else ''}: {says}"
-        for says, where in places.items()
-    ]
+    return [f"{where}: {says}" for says, where in found_once((f.says, f.where) for f in findings)]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
 
 from residual.gap import GapResult
 from residual.gap.result import Gap, Number, Span
@@ -65,6 +67,17 @@ def capitalized(text: str) -> str:
 def names_of(labels: Sequence[str], last: str = "or") -> str:
     """Effects in words: ``a, b or c``."""
     return listed([effect_name(label) for label in labels], last)
+
+
+def found_once(findings: Iterable[tuple[Any, str]]) -> list[tuple[Any, str]]:
+    """What was found in files, equal findings as one: of ``run.csv and 2 more``."""
+    places: dict[Any, list[str]] = {}
+    for what, where in findings:
+        places.setdefault(what, []).append(Path(where).name)
+    return [
+        (what, names[0] + (f" and {len(names) - 1} more" if len(names) > 1 else ""))
+        for what, names in places.items()
+    ]
 
 
 def rounded(value: float, half: float) -> str:

@@ -22,6 +22,8 @@ Excitation = Literal["strong", "weak", "policy"]
 
 DT = 0.05
 LIMIT = 3.0
+#: Largest input in V under each excitation.
+REACH: Mapping[Excitation, float] = {"strong": LIMIT, "weak": 0.8, "policy": LIMIT}
 INERTIA, MASS, LENGTH, GRAVITY = 1.91e-4, 0.055, 0.042, 9.81
 DAMPING, TORQUE_CONSTANT, RESISTANCE = 3e-6, 0.0536, 9.5
 #: Speed below which dry friction of the truth is smoothed, in rad/s.
@@ -195,8 +197,7 @@ def simulate(
     states[1] = 0.0 if hanging else rng.uniform(-5, 5, runs)
     states[3:] = states[:2]
     gaps = np.zeros(runs)
-    limit = {"strong": 3.0, "weak": 0.8, "policy": 3.0}[excitation]
-    volts = random_steps(rng, runs, steps, limit, 8)
+    volts = random_steps(rng, runs, steps, REACH[excitation], 8)
     policy = swing_up(rng, runs)
     path = np.empty((runs, steps + 1, 2))
     path[:, 0] = states[:2].T

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from residual.gap import GapResult
-from sims.effects.aliases import exact_aliases, exact_twins
+from sims.effects.aliases import exact_aliases
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.strengths import HIDDEN
 
@@ -16,17 +16,13 @@ TWINS: tuple[frozenset[str], ...] = (
     frozenset({"coulomb_friction", "stribeck_friction", "directional_friction"}),
 )
 
-_GROUPS = [
-    frozenset(label.split("@")[0] for label in twins)
-    for twins in exact_twins(PendulumEquation()).values()
+_ALIASES = [
+    (alias.combination, frozenset(label.split("@")[0] for label in alias.effects))
+    for alias in exact_aliases(PendulumEquation())
 ]
 #: For every effect with a twin the names that no data could tell from it, its own included.
-_SAME = {name: names for names in _GROUPS for name in names}
-_COMBINED = [
-    {label.split("@")[0] for label in alias.effects}
-    for alias in exact_aliases(PendulumEquation())
-    if alias.combination
-]
+_SAME = {name: names for combined, names in _ALIASES if not combined for name in names}
+_COMBINED = [names for combined, names in _ALIASES if combined]
 
 
 def same(name: str) -> frozenset[str]:

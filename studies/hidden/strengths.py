@@ -36,6 +36,7 @@ from studies.hidden.data import (
     LIMIT,
     MASS,
     NOISES,
+    REACH,
     Excitation,
     Truth,
     measure,
@@ -43,9 +44,6 @@ from studies.hidden.data import (
 )
 
 Array = NDArray[np.float64]
-#: Largest input in V under each excitation.
-REACH: Mapping[str, float] = {"strong": LIMIT, "weak": 0.8, "policy": LIMIT}
-COGGING_ORDER, COGGING_PHASE, STRIBECK_SPEED = 5, 0.4, 1.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,8 +64,9 @@ class Hidden:
 
 
 def _cogging(strength: float) -> Effect:
-    sine, cosine = strength * math.cos(COGGING_PHASE), strength * math.sin(COGGING_PHASE)
-    return known.Cogging("pivot", sine, cosine, COGGING_ORDER)
+    phase = Truth.cogging_phase
+    sine, cosine = strength * math.cos(phase), strength * math.sin(phase)
+    return known.Cogging("pivot", sine, cosine, Truth.cogging_order)
 
 
 def _parameter(name: str, nominal: float) -> Callable[[float], Effect]:
@@ -79,7 +78,7 @@ HIDDEN: Mapping[str, Hidden] = {
     "viscous_friction": Hidden(lambda s: known.ViscousFriction("pivot", s), 1e-5),
     "coulomb_friction": Hidden(lambda s: known.CoulombFriction("pivot", s), 2e-4),
     "stribeck_friction": Hidden(
-        lambda s: known.StribeckFriction("pivot", 0.0, s, STRIBECK_SPEED), 5e-4
+        lambda s: known.StribeckFriction("pivot", 0.0, s, Truth.stribeck_speed), 5e-4
     ),
     "quadratic_drag": Hidden(lambda s: known.QuadraticDrag("pivot", s), 1e-6),
     "linear_spring": Hidden(lambda s: known.LinearSpring("pivot", s), 1e-4),
@@ -105,12 +104,7 @@ def truth(strengths: Mapping[str, float]) -> Truth:
     values: dict[str, Any] = dict(strengths)
     if "saturation" in values:
         values["saturation"] = LIMIT * (1 - values["saturation"])
-    return Truth(
-        **values,
-        stribeck_speed=STRIBECK_SPEED,
-        cogging_order=COGGING_ORDER,
-        cogging_phase=COGGING_PHASE,
-    )
+    return Truth(**values)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -157,7 +151,7 @@ def sizes(name: str, strengths: Array, excitation: Excitation, noise: str) -> Ar
     (candidate,) = (
         c
         for c in candidates(simulator, [bound[0]], ground.fitter.samples)
-        if name != "cogging" or getattr(c.effect, "order", None) == COGGING_ORDER
+        if name != "cogging" or getattr(c.effect, "order", None) == Truth.cogging_order
     )
     names = [knob.field for knob in candidate.knobs]
     trials = tuple(

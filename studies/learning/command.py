@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import importlib.util
-import json
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -20,7 +19,7 @@ from studies.learnt.films import write_films
 from studies.learnt.report import read_episodes, write_report
 from studies.learnt.tables import write_tables
 from studies.running.curves import Curves
-from studies.running.ending import check_output, fail, guarded, users_code
+from studies.running.ending import check_output, fail, guarded
 from studies.running.grids import expand_grid
 from studies.running.progress import Bars, Several
 from studies.running.trials import (
@@ -31,7 +30,6 @@ from studies.running.trials import (
     tell_failures,
     trial_folder,
 )
-from studies.running.workers import WorkersError
 
 BEST = "best.json"
 
@@ -50,7 +48,7 @@ def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
     """The command of a study: one trial, or the grid of a config file."""
     parser = build_parser(study)
     given = parser.parse_args(arguments)
-    settings = json.loads(parser.dump(given, format="json", skip_unset=False))
+    settings = parser.plain(given)
     output, grid = settings.pop("output"), settings.pop("grid")
     execution = Execution(
         **{name: settings.pop(name) for name in ("backend", "jobs", "scheduler")},
@@ -61,11 +59,7 @@ def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
     # Runs in the default place share their finished steps; a folder given holds all of its own.
     kept = (Path(output) if output else home) / "stages"
     # A wrong value is reported before anything is written.
-    try:
-        study.system_of(instantiate(study, settings)).check()
-    except ValueError as error:
-        place = users_code(error)
-        fail(f"{error} ({place})" if place else str(error))
+    study.system_of(instantiate(study, settings)).check()
     check_output(output or home)
     if execution.backend != "local" and not grid:
         fail(
@@ -118,19 +112,13 @@ def run_grid(
     execution: Execution,
 ) -> None:
     """Many trials, a table over all of them and a report."""
-    try:
-        blocks = [{ALIASES.get(name, name): block[name] for name in block} for block in grid]
-        configs = [resolve(study, config) for config in expand_grid(settings, blocks)]
-        trials = {trial_folder(output, trial_label(config), config): config for config in configs}
-        made_by = {folder: code_of_trial(study, config) for folder, config in trials.items()}
-    except ValueError as error:
-        fail(str(error))
+    blocks = [{ALIASES.get(name, name): block[name] for name in block} for block in grid]
+    configs = [resolve(study, config) for config in expand_grid(settings, blocks)]
+    trials = {trial_folder(output, trial_label(config), config): config for config in configs}
+    made_by = {folder: code_of_trial(study, config) for folder, config in trials.items()}
     remove_partial_files(output)
     work = functools.partial(run_trial, study, kept.resolve())
-    try:
-        run_trials(study.name, trials, work, execution, made_by)
-    except WorkersError as error:
-        fail(str(error))
+    run_trials(study.name, trials, work, execution, made_by)
     # For later reports, which load nothing that a file names.
     if best := study.system(instantiate(study, configs[0])).best:
         write_sealed(output / BEST, {"return": best()})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +78,7 @@ def resolve(study: Study, config: Config) -> dict[str, Any]:
     """``config`` with every default filled in, checked by the parser."""
     parser = build_parser(study)
     chosen = parser.parse_object(copy.deepcopy(dict(config)))
-    settings = json.loads(parser.dump(chosen, format="json", skip_unset=False))
+    settings = parser.plain(chosen)
     return {name: settings[name] for name in study.settings}
 
 

@@ -28,26 +28,19 @@ _IN_COLUMNS = {
 }  # fmt: skip
 
 
-def write_tables(
-    results: Sequence[Mapping[str, Any]], folder: Path
-) -> tuple[pd.DataFrame, pd.DataFrame]:
+def write_tables(results: Sequence[Mapping[str, Any]], folder: Path) -> None:
     """``results`` and ``accuracy`` as CSV and Parquet, and ``results.json`` with all trials.
 
     Args:
         results: Of every finished trial.
         folder: Where to write.
-
-    Returns:
-        The two tables.
     """
-    rows, errors = tables_of(results)
-    for name, table in (("results", rows), ("accuracy", errors)):
+    for name, table in zip(("results", "accuracy"), tables_of(results), strict=True):
         table = table.drop(columns=BY_START, errors="ignore")
         atomic_write_text(folder / f"{name}.csv", table.to_csv(index=False))
         with atomic_path(folder / f"{name}.parquet") as path:
             table.to_parquet(path, index=False)
     write_sealed(folder / "results.json", {"trials": list(results)})
-    return rows, errors
 
 
 def tables_of(results: Sequence[Mapping[str, Any]]) -> tuple[pd.DataFrame, pd.DataFrame]:

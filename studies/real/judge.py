@@ -8,10 +8,8 @@ import io
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 
 import studies
 from residual.gap.result import Verdict
@@ -61,17 +59,6 @@ class Judged:
         return max(self.corrected[g] / self.repaired[g] for g in self.corrected)
 
 
-def settings_of(rig: Rig, logs: Sequence[Path]) -> dict[str, Any]:
-    """Settings of find_gap as the rig's config and the logs give them."""
-    parser = find_gap.build_parser()
-    given = parser.parse_args(
-        ["--config", str(CONFIGS / f"{rig.name}.yaml"), "--logs", *map(str, logs),
-         "--output", "unused"]
-    )  # fmt: skip
-    settings = yaml.safe_load(parser.dump(given, format="yaml", skip_unset=False))
-    return {k: v for k, v in settings.items() if k not in ("output", "jobs", "config")}
-
-
 def files_of(rig: Rig, part: Part, data: Path, scratch: Path) -> list[Path]:
     """The logs of a part, made readable where the rig needs it."""
     found = []
@@ -98,11 +85,14 @@ class Judge:
     def __init__(self, rig: Rig, data: Path, scratch: Path) -> None:
         self.rig = rig
         logs = files_of(rig, rig.fit, data, scratch)
-        self.settings = settings_of(rig, logs)
         parser = find_gap.build_parser()
-        made = parser.instantiate(
-            parser.parse_object({**self.settings, "output": "unused", "jobs": 1})
+        config = str(CONFIGS / f"{rig.name}.yaml")
+        given = parser.parse_args(
+            ["--config", config, "--logs", *map(str, logs), "--output", "unused"]
         )
+        ours = ("output", "jobs", "config")
+        self.settings = {k: v for k, v in parser.plain(given).items() if k not in ours}
+        made = parser.instantiate(given)
         asked: HostSimulator = made["simulator"]
         hold = made["hold"]
         self.simulator = asked

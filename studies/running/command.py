@@ -94,6 +94,11 @@ class Parser(jsonargparse.ArgumentParser):
                         content = yaml.safe_dump(given)
         return super().parse_string(content, path, *rest, **options)
 
+    def plain(self, given: Any) -> dict[str, Any]:
+        """What was parsed as plain values, every default filled in: as a config file would say."""
+        found: dict[str, Any] = json.loads(self.dump(given, format="json", skip_unset=False))
+        return found
+
     def instantiate(self, namespace: Any, *rest: Any, **options: Any) -> Any:
         """As usual; whatever a class of the user's does not like of its settings is one line."""
         try:

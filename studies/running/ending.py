@@ -52,8 +52,9 @@ def guarded(
 ) -> Callable[[Callable[[Sequence[str] | None], None]], Callable[..., None]]:
     """Let a command end in one way, whatever happens.
 
-    Bad input and disks that fail end it with one line and exit code 2, Ctrl-C with 130, a fault
-    of ours with one line, a file that keeps the traceback, and exit code 1. ``--debug`` or
+    Bad input, which any code may refuse with a ``ValueError``, and disks that fail end it with one
+    line and exit code 2, Ctrl-C with 130, a fault of ours with one line, a file that keeps the
+    traceback, and exit code 1. ``--debug`` or
     ``SIMGAP_DEBUG=1`` shows tracebacks. Files of simulators may name classes of ours, of packages
     after ``--trust``, and of those whose classes stand beside it on the command line.
 
@@ -82,16 +83,15 @@ def guarded(
                 if debug and isinstance(ended.__context__, Exception):
                     traceback.print_exception(ended.__context__)
                 raise
-            except (OSError, Unsound) as error:
-                if debug:
-                    traceback.print_exc()
-                # One that names a file tells enough.
-                place = "" if getattr(error, "filename", None) else users_code(error)
-                fail(f"{error} ({place})" if place else str(error))
             except Exception as error:
                 if debug:
                     traceback.print_exc()
-                if place := users_code(error):
+                # One that names a file tells enough.
+                named = isinstance(error, OSError) and error.filename
+                place = "" if named else users_code(error)
+                if isinstance(error, OSError | ValueError) and on_purpose(error):
+                    fail(f"{error} ({place})" if place else str(error))
+                if place:
                     fail(f"{place} raised {typed(error)} (mend it, or see {DEBUG})")
                 sys.stderr.write(_internal(error))
                 raise SystemExit(1) from error
@@ -107,11 +107,12 @@ def on_purpose(error: Exception) -> bool:
     What happens inside a line of ours, as where a sequence has another length than that line
     takes for granted, is a fault of ours, and so is linear algebra that fails.
     """
-    frames = traceback.extract_tb(error.__traceback__)
     if isinstance(error, np.linalg.LinAlgError):
         return False
+    frames = traceback.extract_tb(error.__traceback__)
     # An operating system names the file, and tells enough.
-    if isinstance(error, OSError) or not frames or not Path(frames[-1].filename).is_file():
+    told = isinstance(error, OSError | Unsound)
+    if told or not frames or not Path(frames[-1].filename).is_file():
         return True
     last = frames[-1]
     return not _ours(Path(last.filename)) or (last.line or "").lstrip().startswith("raise")

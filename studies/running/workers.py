@@ -38,7 +38,7 @@ _RAY_ON_LOOPBACK = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
 _LOST = "the {} at {} was lost: start it and give the same command again; nothing finished is lost"
 
 
-class WorkersError(RuntimeError):
+class WorkersError(OSError):
     """The cluster cannot be used; the user can mend it."""
 
 

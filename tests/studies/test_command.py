@@ -130,6 +130,20 @@ def test_what_was_raised_on_purpose_is_told_from_a_fault_of_ours(act, told):
     assert on_purpose(caught.value) is told
 
 
+@pytest.mark.parametrize(
+    ("act", "code"),
+    [(lambda: find_unit("parsec", "m"), 2), (lambda: Windows.cut([(0, 4)]), 1), (users_own, 2)],
+)
+def test_a_value_error_ends_every_command_as_what_it_is(act, code, capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr("studies.log_info.describe", lambda path: act())
+    with pytest.raises(SystemExit, match=str(code)):
+        importlib.import_module("studies.log_info").main(["run.csv"])
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and ("internal fault" in said) == (code == 1)
+    assert (f"{__file__}, line" in said) == (act is users_own)
+
+
 @pytest.mark.parametrize("how", ["option", "variable"])
 def test_debug_shows_where(how, capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))

@@ -8,10 +8,11 @@ from scipy.integrate import solve_ivp
 
 from sims.checks import check_simulator
 from sims.effects.library import library
+from sims.loading import chosen_effects
 from studies.hidden.dirty.measure import Sensors, records
 from studies.hidden.dirty.report import headlines, misses
 from studies.hidden.dirty.score import oracle, same_as
-from studies.hidden.dirty.sets import HIDDEN, LEAD, make_set, oracle_effect
+from studies.hidden.dirty.sets import HIDDEN, LEAD, make_set
 from studies.hidden.dirty.systems import SYSTEMS, nominal
 from studies.hidden.dirty.truth import COORDINATES, INPUTS, PARAMETERS, Truth, simulate
 from studies.hidden.grid import DirtyBlock, HiddenStudy, trials_of
@@ -43,7 +44,7 @@ def test_a_hidden_effect_is_what_the_library_calls_so(system, label):
     period = 0.25 if system == "oven" else 0.01
     runs = records(truth, SHARP, "single", period, 400 * period, (6,))
     simulator = nominal(system, period, False, False)
-    effect = oracle_effect(label, simulator)
+    (effect,) = chosen_effects(simulator, [label])
     (field,) = effect.strengths()
     explained = simulator.with_effects([effect.with_values(**{field: strength})])
     # The memory of a lag at the start of a forecast is not measured, so all begins at rest.

@@ -15,7 +15,8 @@ from sims.effects.aliases import exact_aliases, exact_twins
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.host import HostSimulator
-from studies.hidden.dirty.sets import LEAD, Dirty, make_set, oracle_effect
+from sims.loading import chosen_effects
+from studies.hidden.dirty.sets import LEAD, Dirty, make_set
 from studies.judging.forecasts import Forecasts, plan, relative_error, root_mean_squares
 from studies.judging.oracle import fit_effects
 
@@ -88,7 +89,7 @@ def errors(result: GapResult, made: Dirty) -> dict[str, Any]:
 def oracle(made: Dirty, fit: Sequence[Forecasts]) -> tuple[Effect, ...]:
     """The hidden effect, its strength fitted by the forecasts of the logs that find_gap saw."""
     channels = list(root_mean_squares(made.simulator, fit))
-    return fit_effects(made.simulator, [oracle_effect(made.label, made.simulator)], fit, channels)
+    return fit_effects(made.simulator, chosen_effects(made.simulator, [made.label]), fit, channels)
 
 
 def _each(runs: Sequence[Trajectory]) -> int:

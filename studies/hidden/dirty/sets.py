@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
 
 from residual.trajectories import Trajectory
-from sims import effects as known
-from sims.effects.base import Effect
 from sims.host import HostSimulator
 from studies.hidden.dirty.measure import Layout, Sensors, records
 from studies.hidden.dirty.systems import nominal
@@ -176,19 +174,3 @@ def _most(plain: Truth, name: str, usual: float) -> float:
     if name in PARAMETERS[plain.system]:
         return 0.8 * PARAMETERS[plain.system][name]
     return 6 * abs(usual)
-
-
-def oracle_effect(label: str, simulator: HostSimulator) -> Effect:
-    """The library's form of a hidden effect, without its strength."""
-    name, _, where = label.partition("@")
-    if name in simulator.parameters:
-        return known.ParameterChange(name)
-    kinds = {kind.name: kind for kind in _KINDS}
-    return kinds[name](where)  # type: ignore[call-arg]
-
-
-_KINDS: Sequence[type[Effect]] = (
-    known.ViscousFriction, known.CoulombFriction, known.QuadraticDrag, known.LinearSpring,
-    known.ConstantLoad, known.ActuatorGain, known.Delay, known.ActuatorLag, known.DeadZone,
-    known.SensorOffset,
-)  # fmt: skip
