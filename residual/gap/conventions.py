@@ -1,14 +1,15 @@
-"""Signs and zeros that a log counts otherwise than the simulator: no effect, but a column map.
+"""Signs, zeros and units that a log counts in, and the simulator does not: no effect of physics.
 
-A reversed input or an angle counted from elsewhere makes every forecast wrong, and no effect of
-the library undoes it. So it is asked beforehand whether the nominal simulator forecasts far better
-with one of them changed.
+A reversed input, an angle counted from elsewhere or a speed in km/h makes every forecast wrong, and
+no effect of the library undoes it, or one that is not there. So it is asked beforehand whether the
+nominal simulator forecasts far better with one of them changed.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,20 +17,23 @@ from numpy.typing import NDArray
 from residual.gap import paths
 from residual.gap.model import Model
 from residual.gap.smooth import SmoothFitter
+from residual.logs.units import UNITS, Unit, units_of
 from sims.host import HostSimulator
+from sims.simulator import Channel
 
 Array = NDArray[np.float64]
 
-#: Error, in units of the usual variation, below which forecasts are too good to ask.
-GOOD = 0.3
+#: Error, in units of the way that windows usually go, from which on forecasts are poor enough to
+#: ask, and up to which another convention's are good: to stay where one is errs by about 1.
+POOR, GOOD = 0.3, 0.5
 #: Times that forecasts have to be better with another convention, and other conventions that do
 #: as well.
-BETTER, ALIKE = 3.0, 1.2
+BETTER, ALIKE = 2.0, 1.2
 #: Zeros from which angles are counted.
 QUARTERS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
 #: Windows that are looked at: all rows at once, and row by row.
 AT_ONCE, BY_ROW = 120, 20
-#: Error of a window in units of the usual variation beyond which it is just wrong.
+#: Error of a window in those units beyond which it is just wrong.
 WRONG = 5.0
 
 
@@ -40,7 +44,7 @@ class Convention:
     Attributes:
         says: What to change in the column map.
         states: Factor and offset of every state, (2, n_s).
-        inputs: Factor of every input, (n_a,).
+        inputs: The same of every input, (2, n_a).
     """
 
     says: str
@@ -58,12 +62,12 @@ def otherwise(simulator: HostSimulator, fitter: SmoothFitter) -> list[str]:
     Returns:
         No sentence, or one.
     """
-    own = _error(simulator, fitter)
-    if own < GOOD:
+    own = _error(simulator, fitter, _as_said(simulator))
+    if own < POOR:
         return []
     errors = {one.says: _error(simulator, fitter, one) for one in _conventions(simulator, fitter)}
     least = min(errors.values(), default=own)
-    if BETTER * least > own:
+    if BETTER * least > own or least > GOOD:
         return []
     alike = [says for says, error in errors.items() if error < ALIKE * least]
     return [
@@ -73,53 +77,96 @@ def otherwise(simulator: HostSimulator, fitter: SmoothFitter) -> list[str]:
 
 
 def _conventions(simulator: HostSimulator, fitter: SmoothFitter) -> list[Convention]:
-    channels, inputs = simulator.physical_channels, simulator.action_channels
-    measured = set(fitter.samples.measured.tolist())
-    plain = np.vstack([np.ones(len(channels)), np.zeros(len(channels))])
+    """What a column map may have to say: signs, zeros of angles, units."""
     found = []
-    for place, action in enumerate(inputs):
+    for place, action in enumerate(simulator.action_channels):
         if action.low < 0 < action.high:
-            turned = np.ones(len(inputs))
-            turned[place] = -1.0
-            found.append(Convention(f"scale: -1 for {action.name}", plain, turned))
+            found.append(_of_input(simulator, f"scale: -1 for {action.name}", place, -1.0))
+        for name, unit in _other_units(action):
+            says = f"unit: {name} for {action.name}"
+            found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
+    channels = simulator.physical_channels
+    measured = set(fitter.samples.measured.tolist())
     for place, channel in enumerate(channels):
-        if channel.kind != "position":
+        if channel.rate_of in {other.name for other in channels}:
             continue
-        joint = [place, *(i for i, c in enumerate(channels) if c.rate_of == channel.name)]
-        joint = [i for i in joint if i in measured]
-        turns = channel.angle or channel.unit == "rad"
-        zeros = QUARTERS if turns and place in measured else QUARTERS[:1]
-        for sign, zero in itertools.product((1.0, -1.0), zeros):
-            if not joint or (sign, zero) == (1.0, 0.0):
-                continue
-            states = plain.copy()
-            states[0, joint] = sign
-            states[1, place] = zero
-            says = [f"offset: {zero:.6g}"] if zero else []
-            says += ["scale: -1"] if sign < 0 else []
-            names = [channel.name] if sign > 0 else [channels[i].name for i in joint]
-            found.append(
-                Convention(f"{' and '.join(says)} for {' and '.join(names)}", states,
-                           np.ones(len(inputs)))
-            )  # fmt: skip
+        joint = [place, *(i for i, other in enumerate(channels) if other.rate_of == channel.name)]
+        seen = [i for i in joint if i in measured]
+        if seen:
+            found += _turned(simulator, seen) + _in_other_units(simulator, seen)
     return found
 
 
-def _error(
-    simulator: HostSimulator, fitter: SmoothFitter, convention: Convention | None = None
-) -> float:
-    """Mean error of forecasts straight from what was measured, in units of the usual variation."""
+def _turned(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
+    """Counted the other way round, or from a quarter or half turn away."""
+    channels = [simulator.physical_channels[i] for i in joint]
+    first = channels[0]
+    if first.kind == "other":
+        return []
+    turns = (first.angle or first.unit == "rad") and first.kind == "position"
+    found = []
+    for sign, zero in itertools.product((1.0, -1.0), QUARTERS if turns else QUARTERS[:1]):
+        changes = [f"offset: {zero:.6g}"] if zero else []
+        changes += ["scale: -1"] if sign < 0 else []
+        names = [channel.name for channel in (channels if sign < 0 else channels[:1])]
+        if changes:
+            says = f"{' and '.join(changes)} for {' and '.join(names)}"
+            found.append(_of_states(simulator, says, joint, sign, zero))
+    return found
+
+
+def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
+    """A position and its rate in units that go together."""
+    channels = [simulator.physical_channels[i] for i in joint]
+    found = []
+    for name, unit in _other_units(channels[0]):
+        said = [f"unit: {name} for {channels[0].name}"]
+        for rate in channels[1:]:
+            alike = [n for n, u in _other_units(rate) if np.isclose(u.factor, unit.factor)]
+            said += [f"unit: {one} for {rate.name}" for one in alike]
+        found.append(_of_states(simulator, " and ".join(said), joint, unit.factor, unit.offset))
+    return found
+
+
+def _other_units(channel: Channel) -> list[tuple[str, Unit]]:
+    units = [(name, UNITS[name]) for name in units_of(channel.unit)]
+    return [(name, unit) for name, unit in units if (unit.factor, unit.offset) != (1.0, 0.0)]
+
+
+def _of_input(
+    simulator: HostSimulator, says: str, place: int, factor: float, offset: float = 0.0
+) -> Convention:
+    plain = _as_said(simulator)
+    plain.inputs[:, place] = factor, offset
+    return dataclasses.replace(plain, says=says)
+
+
+def _of_states(
+    simulator: HostSimulator, says: str, joint: Sequence[int], factor: float, offset: float
+) -> Convention:
+    """A position and its rate count alike, but for its zero."""
+    plain = _as_said(simulator)
+    plain.states[0, joint] = factor
+    plain.states[1, joint[0]] = offset
+    return dataclasses.replace(plain, says=says)
+
+
+def _as_said(simulator: HostSimulator) -> Convention:
+    sizes = len(simulator.physical_channels), len(simulator.action_channels)
+    states, inputs = (np.vstack([np.ones(n), np.zeros(n)]) for n in sizes)
+    return Convention("", states, inputs)
+
+
+def _error(simulator: HostSimulator, fitter: SmoothFitter, convention: Convention) -> float:
+    """Mean error of forecasts straight from what was measured, in units of the usual way."""
     samples, windows = fitter.samples, fitter.blocks.windows
-    if convention is not None:
-        factor, offset = convention.states
-        samples = dataclasses.replace(
-            samples, seen=factor * samples.seen + offset,
-            actions=convention.inputs * samples.actions,
-            recorded=tuple(
-                dataclasses.replace(run, actions=convention.inputs * run.actions)
-                for run in samples.recorded
-            ),
-        )  # fmt: skip
+    (factor, offset), (gain, bias) = convention.states, convention.inputs
+    samples = dataclasses.replace(
+        samples, seen=factor * samples.seen + offset, actions=gain * samples.actions + bias,
+        recorded=tuple(
+            dataclasses.replace(run, actions=gain * run.actions + bias) for run in samples.recorded
+        ),
+    )  # fmt: skip
     model, none = Model(simulator), np.zeros((1, 0))
     nodes = paths.measured(model, samples, none[0])
     most = AT_ONCE if simulator.advances_rows_at_once else BY_ROW
@@ -132,8 +179,11 @@ def _error(
     )  # fmt: skip
     seen = samples.seen[index][..., samples.measured]
     there = np.isfinite(seen) & inside[..., None]
-    miss = np.where(there, (shown - seen) / fitter.scale[samples.measured], 0.0)
+    count = np.maximum(there.sum(axis=1), 1)
+    way = np.where(there, seen - nodes[index[:, :1]][..., samples.measured], 0.0)
+    usual = np.sqrt((way**2).sum(axis=(0, 1)) / np.maximum(there.sum(axis=(0, 1)), 1))
+    miss = np.where(there, (shown - seen) / np.where(usual > 0, usual, 1.0), 0.0)
     # What runs away is wrong, too.
     squares = np.nan_to_num(miss, nan=np.inf) ** 2
-    each = np.sqrt(squares.sum(axis=(1, 2)) / np.maximum(there.sum(axis=(1, 2)), 1))
+    each = np.sqrt(squares.sum(axis=(1, 2)) / np.maximum(count.sum(axis=1), 1))
     return float(np.minimum(each, WRONG).mean())

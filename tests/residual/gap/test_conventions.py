@@ -1,8 +1,9 @@
-"""Logs that count signs and zeros otherwise than the simulator."""
+"""Logs that count signs, zeros and units otherwise than the simulator."""
 
 from __future__ import annotations
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from residual.gap.conventions import otherwise
 from residual.gap.prepare import prepare
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorGain, CoulombFriction, LinearSpring
+from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel, Parameter
 
 LARGE = [
     (), (CoulombFriction("pivot", 0.01),), (LinearSpring("pivot", 0.01, np.pi),),
@@ -61,3 +64,44 @@ def test_a_joint_that_counts_the_other_way_round_is_told():
     turned = dataclasses.replace(run, states=np.array([-1.0, -1.0]) * run.states)
     (says,) = told(turned)
     assert "scale: -1 for angle and rate" in says
+
+
+@pytest.mark.parametrize(("factors", "volts", "wanted"), [
+    ((180 / np.pi, 180 / np.pi), 1.0, "unit: deg for angle and unit: deg/s for rate"),
+    ((1.0, 1.0), 1000.0, "unit: mV for voltage"),
+])  # fmt: skip
+def test_another_unit_is_told(factors, volts, wanted):
+    run = log((CoulombFriction("pivot", 0.003),))
+    (says,) = told(
+        dataclasses.replace(run, states=np.array(factors) * run.states, actions=volts * run.actions)
+    )
+    assert wanted in says
+
+
+class Room(FirstOrderSystem):
+    """A room warmed by a heater, losing heat to the cold outside."""
+
+    dt = 10.0
+    state_channels = (Channel("room", "K", "other", scale=10.0),)
+    action_channels = (Channel("heater", "W", "input", scale=1000.0, low=0.0, high=3000.0),)
+    parameters: ClassVar = {
+        "capacity": Parameter(5e4, "J/K", "heat that warms the room by 1 K"),
+        "loss": Parameter(40.0, "W/K", "loss to the outside"),
+        "outside": Parameter(270.0, "K", "temperature outside"),
+    }
+
+    def derivative(self, x, u, p):
+        return (u - p.loss * (x - p.outside)) / p.capacity
+
+
+def test_degrees_celsius_are_no_kelvin():
+    rng = np.random.default_rng(0)
+    watts = np.repeat(rng.uniform(0.0, 3000.0, (1, 20, 1)), 30, axis=1)
+    simulator = Room()
+    warm = simulator.rollout(np.array([[293.0]]), watts)[0]
+    warm += 0.1 * rng.standard_normal(warm.shape)
+    for zero, wanted in ((0.0, 0), (273.15, 1)):
+        run = Trajectory("room", 10.0 * np.arange(len(warm)), warm - zero, watts[0])
+        found = otherwise(simulator, prepare(simulator, [run], 300.0).fitter)
+        assert len(found) == wanted
+        assert all("unit: degC for room" in says for says in found)
