@@ -65,11 +65,14 @@ def otherwise(simulator: HostSimulator, fitter: SmoothFitter) -> list[str]:
     own = _error(simulator, fitter, _as_said(simulator))
     if own < POOR:
         return []
-    errors = {one.says: _error(simulator, fitter, one) for one in _conventions(simulator, fitter)}
-    least = min(errors.values(), default=own)
+    errors = [(_error(simulator, fitter, one), one) for one in _conventions(simulator, fitter)]
+    least, best = min(errors, key=lambda pair: pair[0], default=(own, _as_said(simulator)))
     if BETTER * least > own or least > GOOD:
         return []
-    alike = [says for says, error in errors.items() if error < ALIKE * least]
+    beyond = _beyond(best)
+    if beyond is not None and BETTER * least > _error(simulator, fitter, beyond):
+        return []
+    alike = [one.says for error, one in errors if error < ALIKE * least]
     return [
         f"does the log count as the simulator does? Its forecasts err {own / least:.2g} times less "
         f"with {' or '.join(alike)} in the column map: if that is so, set it and ask again"
@@ -124,7 +127,8 @@ def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Conv
         for rate in channels[1:]:
             alike = [n for n, u in _other_units(rate) if np.isclose(u.factor, unit.factor)]
             said += [f"unit: {one} for {rate.name}" for one in alike]
-        found.append(_of_states(simulator, " and ".join(said), joint, unit.factor, unit.offset))
+        if len(said) == len(channels):
+            found.append(_of_states(simulator, " and ".join(said), joint, unit.factor, unit.offset))
     return found
 
 
@@ -149,6 +153,15 @@ def _of_states(
     plain.states[0, joint] = factor
     plain.states[1, joint[0]] = offset
     return dataclasses.replace(plain, says=says)
+
+
+def _beyond(convention: Convention) -> Convention | None:
+    """With thrice its factors: as good only where they make a force too small to matter."""
+    states, inputs = convention.states.copy(), convention.inputs.copy()
+    for factors in (states[0], inputs[0]):
+        factors[np.abs(factors) != 1.0] *= 3.0
+    same = np.array_equal(states, convention.states) and np.array_equal(inputs, convention.inputs)
+    return None if same else Convention(convention.says, states, inputs)
 
 
 def _as_said(simulator: HostSimulator) -> Convention:

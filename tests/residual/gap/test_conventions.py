@@ -12,7 +12,7 @@ from residual.gap.conventions import otherwise
 from residual.gap.prepare import prepare
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorGain, CoulombFriction, LinearSpring
-from sims.equations import FirstOrderSystem
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel, Parameter
 
@@ -105,3 +105,28 @@ def test_degrees_celsius_are_no_kelvin():
         found = otherwise(simulator, prepare(simulator, [run], 300.0).fitter)
         assert len(found) == wanted
         assert all("unit: degC for room" in says for says in found)
+
+
+class Lift(EquationOfMotion):
+    """A height by an accelerometer."""
+
+    dt = 0.1
+    state_channels = (
+        Channel("height", "m", "position", scale=100.0),
+        Channel("climb", "m/s", "rate", rate_of="height", scale=10.0),
+    )
+    action_channels = (Channel("accelerometer", "m/s2", "input", scale=1.0),)
+
+    def acceleration(self, q, v, u, force, p):
+        return u + force
+
+
+def test_a_unit_that_only_makes_an_input_vanish_is_none():
+    """An accelerometer's bias throws forecasts far off, and to go straight on is better."""
+    rng = np.random.default_rng(0)
+    felt = np.repeat(0.05 * rng.standard_normal((1, 40, 1)), 20, axis=1)
+    simulator = Lift()
+    states = simulator.rollout(np.array([[1000.0, 10.0]]), felt)[0]
+    states += np.array([0.5, np.nan]) * rng.standard_normal(states.shape)
+    run = Trajectory("lift", 0.1 * np.arange(len(states)), states, felt[0] + 1.5)
+    assert not otherwise(simulator, prepare(simulator, [run], 10.0).fitter)
