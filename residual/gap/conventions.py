@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from residual.gap import paths
 from residual.gap.model import Model
+from residual.gap.result import Conventions
 from residual.gap.smooth import SmoothFitter
 from residual.logs.units import UNITS, Unit, units_of
 from sims.host import HostSimulator
@@ -52,31 +53,28 @@ class Convention:
     inputs: Array
 
 
-def otherwise(simulator: HostSimulator, fitter: SmoothFitter) -> list[str]:
-    """Conventions with which the nominal simulator forecasts far better, the best one in words.
+def otherwise(simulator: HostSimulator, fitter: SmoothFitter) -> Conventions | None:
+    """Conventions with which the nominal simulator forecasts far better.
 
     Args:
         simulator: The nominal simulator.
         fitter: With the windows to forecast.
 
     Returns:
-        No sentence, or one.
+        The best of them and what is as good; None where none is.
     """
     own = _error(simulator, fitter, _as_said(simulator))
     if own < POOR:
-        return []
+        return None
     errors = [(_error(simulator, fitter, one), one) for one in _conventions(simulator, fitter)]
     least, best = min(errors, key=lambda pair: pair[0], default=(own, _as_said(simulator)))
     if BETTER * least > own or least > GOOD:
-        return []
+        return None
     beyond = _beyond(best)
     if beyond is not None and BETTER * least > _error(simulator, fitter, beyond):
-        return []
-    alike = [one.says for error, one in errors if error < ALIKE * least]
-    return [
-        f"does the log count as the simulator does? Its forecasts err {own / least:.2g} times less "
-        f"with {' or '.join(alike)} in the column map: if that is so, set it and ask again"
-    ]
+        return None
+    alike = tuple(one.says for error, one in errors if error < ALIKE * least)
+    return Conventions(alike, own / least)
 
 
 def _conventions(simulator: HostSimulator, fitter: SmoothFitter) -> list[Convention]:

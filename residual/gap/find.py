@@ -154,11 +154,11 @@ def find_gap(
                 prepared = prepare(simulator, runs, horizon)
             prepared = beyond_noise(simulator, runs, prepared)
             horizon = prepared.horizon
+        conventions = None
         if isinstance(prepared.fitter, SmoothFitter):
-            counted = otherwise(simulator, prepared.fitter)
-            quality = [*counted, *quality]
-            for says in counted:
-                tell(says)
+            conventions = otherwise(simulator, prepared.fitter)
+        if conventions is not None:
+            tell(f"does the log count otherwise, by {' or '.join(conventions.changes)}?")
         quality += left_out
         found = explained(simulator, prepared)
         other = held_otherwise(simulator) if hold is None else None
@@ -203,7 +203,8 @@ def find_gap(
             others, _ = excerpt(examine(simulator, held).trajectories, stride_for(held, horizon))
             apart = judged_apart(answer, prepared, others, table)
         clock.lap("forecast")
-    return told(answer, table, apart, sets, tolerance, quality, clock.laps)
+    result = told(answer, table, apart, sets, tolerance, quality, clock.laps)
+    return dataclasses.replace(result, conventions=conventions)
 
 
 def clearly_better(one: Explanation, other: Explanation) -> bool:

@@ -221,6 +221,20 @@ class Blind:
 
 
 @dataclasses.dataclass(frozen=True)
+class Conventions:
+    """What the log may count otherwise than the simulator.
+
+    Attributes:
+        changes: Lines of the column map, any of which makes the nominal simulator forecast far
+            better: a sign, a zero or a unit.
+        times: How much smaller its error is then.
+    """
+
+    changes: tuple[str, ...]
+    times: float
+
+
+@dataclasses.dataclass(frozen=True)
 class GapResult:
     """Everything that was found.
 
@@ -241,6 +255,7 @@ class GapResult:
             otherwise shares of the error did.
         seconds: Time spent, by stage.
         substeps: Sub-steps per control period of ``corrected``, if it needs more than it had.
+        conventions: What to look at first, None where nothing is counted otherwise.
     """
 
     verdicts: tuple[Verdict, ...]
@@ -258,6 +273,7 @@ class GapResult:
     adequate: bool
     seconds: dict[str, float]
     substeps: int | None = None
+    conventions: Conventions | None = None
 
     def __repr__(self) -> str:
         kinds = "; ".join(f"{v.effect} {v.kind}".strip() for v in self.verdicts[:4])

@@ -73,6 +73,7 @@ def gap_record(
     total = sum(result.seconds.values()) if seconds is None else seconds
     return {
         "says": lead(result, config.get("tolerance")),
+        "conventions": dataclasses.asdict(result.conventions) if result.conventions else None,
         "verdicts": [dataclasses.asdict(verdict) for verdict in result.verdicts],
         "gap": dataclasses.asdict(result.gap),
         "held_out": dataclasses.asdict(result.held_out) if result.held_out else None,

@@ -33,10 +33,27 @@ UNLIKE, FEW_CHANNELS = 0.2, 3
 def lead(result: GapResult, tolerance: float | None = None) -> str:
     """The first sentence: the share of the gap that has a name.
 
+    Before it, what the log may count otherwise than the simulator: no effect undoes that.
+
     Args:
         result: What was found.
         tolerance: Forecast error that does not matter.
     """
+    return _conventions(result) + _named_share(result, tolerance)
+
+
+def _conventions(result: GapResult) -> str:
+    other = result.conventions
+    if other is None:
+        return ""
+    return (
+        f"First see whether the log counts as the simulator does: with "
+        f"{' or '.join(other.changes)} in the column map the nominal simulator errs "
+        f"{other.times:.2g} times less. If that is not it: "
+    )
+
+
+def _named_share(result: GapResult, tolerance: float | None) -> str:
     gap = result.gap
     before = quantity_text(gap.before.value, gap.unit)
     if tolerance is not None and gap.before.value <= tolerance:

@@ -40,7 +40,9 @@ def banners(result: GapResult, tolerance: float | None) -> list[Section]:
     """The first sentence, one banner per verdict, and what is too small for one."""
     worst = {verdict.kind for verdict in result.verdicts if not is_footnote(verdict)}
     tone: Tone = "good"
-    if result.effects and worst & {"ambiguous", "unexplained"}:
+    if result.conventions is not None:
+        tone = "bad"
+    elif result.effects and worst & {"ambiguous", "unexplained"}:
         tone = "warning"
     elif not result.effects and "unexplained" in worst:
         tone = "bad"

@@ -8,6 +8,7 @@ import pytest
 
 from residual.gap.result import (
     ChannelGap,
+    Conventions,
     Gap,
     GapResult,
     Meant,
@@ -77,6 +78,17 @@ def test_a_gain_is_told_as_a_share_more_and_as_times():
     assert headline(gain, result(gain)).endswith(
         "gain 0.62 (0.50 to 0.70), so 1.62 times the command."
     )
+
+
+def test_what_the_log_may_count_otherwise_comes_first():
+    found = dataclasses.replace(
+        result(MASS),
+        conventions=Conventions(("scale: -1 for voltage", "unit: mV for voltage"), 19.0),
+    )
+    first, rest = lead(found).split(" If that is not it: ")
+    assert "with scale: -1 for voltage or unit: mV for voltage in the column map" in first
+    assert first.endswith("errs 19 times less.")
+    assert rest == lead(result(MASS))
 
 
 @pytest.mark.parametrize(
