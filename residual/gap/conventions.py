@@ -82,9 +82,9 @@ def _conventions(simulator: HostSimulator, fitter: SmoothFitter) -> list[Convent
     found = []
     for place, action in enumerate(simulator.action_channels):
         if action.low < 0 < action.high:
-            found.append(_of_input(simulator, f"scale: -1 for {action.name}", place, -1.0))
+            found.append(_of_input(simulator, f"`scale: -1` for {action.name}", place, -1.0))
         for name, unit in _other_units(action):
-            says = f"unit: {name} for {action.name}"
+            says = f"`unit: {name}` for {action.name}"
             found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
     channels = simulator.physical_channels
     measured = set(fitter.samples.measured.tolist())
@@ -107,8 +107,8 @@ def _turned(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
     turns = (first.angle or first.unit == "rad") and first.kind == "position"
     found = []
     for sign, zero in itertools.product((1.0, -1.0), QUARTERS if turns else QUARTERS[:1]):
-        changes = [f"offset: {zero:.6g}"] if zero else []
-        changes += ["scale: -1"] if sign < 0 else []
+        changes = [f"`offset: {zero:.6g}`"] if zero else []
+        changes += ["`scale: -1`"] if sign < 0 else []
         names = [channel.name for channel in (channels if sign < 0 else channels[:1])]
         if changes:
             says = f"{' and '.join(changes)} for {' and '.join(names)}"
@@ -121,10 +121,10 @@ def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Conv
     channels = [simulator.physical_channels[i] for i in joint]
     found = []
     for name, unit in _other_units(channels[0]):
-        said = [f"unit: {name} for {channels[0].name}"]
+        said = [f"`unit: {name}` for {channels[0].name}"]
         for rate in channels[1:]:
             alike = [n for n, u in _other_units(rate) if np.isclose(u.factor, unit.factor)]
-            said += [f"unit: {one} for {rate.name}" for one in alike]
+            said += [f"`unit: {one}` for {rate.name}" for one in alike]
         if len(said) == len(channels):
             found.append(_of_states(simulator, " and ".join(said), joint, unit.factor, unit.offset))
     return found

@@ -83,10 +83,10 @@ def test_a_gain_is_told_as_a_share_more_and_as_times():
 def test_what_the_log_may_count_otherwise_comes_first():
     found = dataclasses.replace(
         result(MASS),
-        conventions=Conventions(("scale: -1 for voltage", "unit: mV for voltage"), 19.0),
+        conventions=Conventions(("`scale: -1` for voltage", "`unit: mV` for voltage"), 19.0),
     )
     first, rest = lead(found).split(" If that is not it: ")
-    assert "with scale: -1 for voltage or unit: mV for voltage in the column map" in first
+    assert "with `scale: -1` for voltage or `unit: mV` for voltage in the column map" in first
     assert first.endswith("errs 19 times less.")
     assert rest == lead(result(MASS))
 

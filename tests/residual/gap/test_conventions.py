@@ -47,7 +47,7 @@ def test_a_large_gap_is_no_matter_of_convention(effects):
 def test_a_reversed_input_is_told(effects):
     run = log(effects)
     told = changes(dataclasses.replace(run, actions=-run.actions))
-    assert "scale: -1 for voltage" in told
+    assert "`scale: -1` for voltage" in told
 
 
 @pytest.mark.parametrize(("offset", "wanted"), [
@@ -56,19 +56,19 @@ def test_a_reversed_input_is_told(effects):
 def test_an_angle_counted_from_elsewhere_is_told(offset, wanted):
     run = log()
     (says,) = changes(dataclasses.replace(run, states=run.states + np.array([offset, 0.0])))
-    assert f"offset: {wanted} for angle" in says
+    assert f"`offset: {wanted}` for angle" in says
 
 
 def test_a_joint_that_counts_the_other_way_round_is_told():
     """Only the gravity of a sideways zero tells it from a reversed input."""
     run = log()
     turned = dataclasses.replace(run, states=np.array([-1.0, -1.0]) * run.states)
-    assert "scale: -1 for angle and rate" in changes(turned)
+    assert "`scale: -1` for angle and rate" in changes(turned)
 
 
 @pytest.mark.parametrize(("factors", "volts", "wanted"), [
-    ((180 / np.pi, 180 / np.pi), 1.0, "unit: deg for angle and unit: deg/s for rate"),
-    ((1.0, 1.0), 1000.0, "unit: mV for voltage"),
+    ((180 / np.pi, 180 / np.pi), 1.0, "`unit: deg` for angle and `unit: deg/s` for rate"),
+    ((1.0, 1.0), 1000.0, "`unit: mV` for voltage"),
 ])  # fmt: skip
 def test_another_unit_is_told(factors, volts, wanted):
     run = log((CoulombFriction("pivot", 0.003),))
@@ -100,7 +100,7 @@ def test_degrees_celsius_are_no_kelvin():
     simulator = Room()
     warm = simulator.rollout(np.array([[293.0]]), watts)[0]
     warm += 0.1 * rng.standard_normal(warm.shape)
-    for zero, wanted in ((0.0, None), (273.15, ("unit: degC for room",))):
+    for zero, wanted in ((0.0, None), (273.15, ("`unit: degC` for room",))):
         run = Trajectory("room", 10.0 * np.arange(len(warm)), warm - zero, watts[0])
         found = otherwise(simulator, prepare(simulator, [run], 300.0).fitter)
         assert (found and found.changes) == wanted
