@@ -120,9 +120,13 @@ def draw_over_time(
         draw_lines(axis, series)
         axis.set_ylabel(label)
     axes[-1].set_xlabel("time (s)")
-    figure.legend(
-        *axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.4
-    )
+    legend_above(figure, axes[0])
+
+
+def legend_above(figure: Figure, axis: Axes, columns: int = 2) -> None:
+    """One legend above all axes, of the curves in one of them."""
+    curves = axis.get_legend_handles_labels()
+    figure.legend(*curves, loc="outside upper left", ncols=columns, handlelength=1.4)
 
 
 def save_figure(

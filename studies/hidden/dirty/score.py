@@ -6,8 +6,6 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from residual.gap import GapResult, find_gap
 from residual.gap.result import Verdict
 from residual.trajectories import Trajectory
@@ -154,8 +152,3 @@ def _family(label: str, simulator: HostSimulator, offered: Mapping[str, Effect])
         for name, effect in offered.items()
         if family and effect.family_in(simulator) == family and effect.where == hidden.where
     )
-
-
-def finite(value: Any) -> float:
-    """A number from a result file, where infinity has become None."""
-    return np.inf if value is None else float(value)
