@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import importlib.util
 import time
@@ -31,8 +32,6 @@ from studies.running.trials import (
     trial_folder,
 )
 
-BEST = "best.json"
-
 
 def command(study: Study) -> Callable[..., None]:
     """The function ``main(arguments=None)`` of a study's file."""
@@ -50,10 +49,8 @@ def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     settings = parser.plain(given)
     output, grid = settings.pop("output"), settings.pop("grid")
-    execution = Execution(
-        **{name: settings.pop(name) for name in ("backend", "jobs", "scheduler")},
-        tensorboard=_curves_folder(settings.pop("tensorboard")),
-    )
+    settings["tensorboard"] = _curves_folder(settings["tensorboard"])
+    execution = Execution(**{f.name: settings.pop(f.name) for f in dataclasses.fields(Execution)})
     settings.pop("config", None)
     home = Path("results", study.name)
     # Runs in the default place share their finished steps; a folder given holds all of its own.
@@ -119,9 +116,6 @@ def run_grid(
     remove_partial_files(output)
     work = functools.partial(run_trial, study, kept.resolve())
     run_trials(study.name, trials, work, execution, made_by)
-    # For later reports, which load nothing that a file names.
-    if best := study.system(instantiate(study, configs[0])).best:
-        write_sealed(output / BEST, {"return": best()})
     failures = report_grid(output)
     if failures:
         raise SystemExit(1)
@@ -131,9 +125,8 @@ def report_grid(folder: Path) -> Failures:
     """Tables and report of a grid from the trials in its folder; returns the failed ones."""
     results, failures = read_trials(folder)
     if results:
-        best = read_sealed(folder / BEST)["return"] if (folder / BEST).exists() else None
         write_tables(results, folder)
-        table = write_report(results, folder, failures=failures, best=best)
+        table = write_report(results, folder, failures=failures)
         print(f"\n{table}\n\nreport: {folder / 'report.html'}")
     tell_failures(failures)
     return failures

@@ -6,11 +6,11 @@ import copy
 from pathlib import Path
 from typing import Any
 
-from jsonargparse.typing import NonNegativeFloat, PositiveInt
+from jsonargparse.typing import NonNegativeFloat
 
 from studies.learning.study import Config, Study, Trial
 from studies.running.command import Parser
-from studies.running.workers import Backend
+from studies.running.trials import Execution
 
 #: Settings under their earlier names.
 ALIASES = {"caution": "uncertainty_penalty"}
@@ -26,25 +26,7 @@ def build_parser(study: Study) -> Parser:
         default=None,
         help=f"Folder for the results; default: results/{study.name}/ and a name.",
     )
-    parser.add_argument("--jobs", type=PositiveInt, default=1, help="Processes for many trials.")
-    parser.add_argument(
-        "--backend",
-        type=Backend,
-        default="local",
-        help="Where many trials run: in local processes or on a cluster (docs/scaling.md).",
-    )
-    parser.add_argument(
-        "--scheduler",
-        type=str | None,
-        default=None,
-        help="Address of the cluster's scheduler, such as tcp://host:8786.",
-    )
-    parser.add_argument(
-        "--tensorboard",
-        type=Path | None,
-        default=None,
-        help="Folder for training curves; tensorboard --logdir shows them.",
-    )
+    parser.add_class_arguments(Execution)
     parser.add_argument(
         "--grid",
         type=list[dict[str, list[Any]]] | None,

@@ -180,9 +180,7 @@ def updates_figure(rows: pd.DataFrame) -> Drawn:
 
 
 @styled()
-def budgets_figure(
-    rows: pd.DataFrame, errors: pd.DataFrame, about: Mapping[str, Any], best: float | None
-) -> Drawn:
+def budgets_figure(rows: pd.DataFrame, errors: pd.DataFrame, about: Mapping[str, Any]) -> Drawn:
     """Return and one-step error after one update, against the true samples by estimator."""
     figure, axes = new_figure(2, 1, height=6.4, share_x=True)
     first = rows[(rows["name"] == "difference") & (rows["iteration"] == 1)]
@@ -211,7 +209,7 @@ def budgets_figure(
              "half_width": m.half_width, "worst": m.worst, "one_step": error.get(n)}
             for n, m in means.items()
         ]  # fmt: skip
-    if best is not None:
+    if (best := about.get("best")) is not None:
         reference_line(axes[0, 0], factor * best, "the best possible")
     axes[0, 0].set_xscale("log")
     axes[1, 0].set(

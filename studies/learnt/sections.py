@@ -103,8 +103,9 @@ def legend(summary: pd.DataFrame, once: pd.DataFrame) -> list[str]:
     return says
 
 
-def policies_section(summary: pd.DataFrame, once: pd.DataFrame, best: float | None) -> Table:
+def policies_section(summary: pd.DataFrame, once: pd.DataFrame, about: About) -> Table:
     """What ``summarise`` found."""
+    best = about.get("best")
     known = [f"The best return that is possible is {best:.0f}."] if best is not None else []
     caption = " ".join([*legend(summary, once), *known])
     return Table.of(summary, heading="Policies", caption=caption, digits=2)

@@ -39,11 +39,9 @@ class Mean:
         if self.count == 1:
             return return_text(self.value)
         larger = max(abs(self.value), float(np.nan_to_num(self.half_width)))
-        if abs(self.value) >= 100:
-            return self._decimals(0)
         # Of what is small, two digits.
         size = np.floor(np.log10(larger)) if larger else 0
-        return self._decimals(int(np.clip(1 - size, 1, 9)))
+        return self._decimals(0 if abs(self.value) >= 100 else int(np.clip(1 - size, 1, 9)))
 
     def text(self, digits: int) -> str:
         """The mean to so many digits, and its interval."""
@@ -53,10 +51,9 @@ class Mean:
         return self._decimals(int(max(0, digits - 1 - size)))
 
     def _decimals(self, digits: int) -> str:
-        if self.count == 1:
-            return f"{self.value:.{digits}f}"
         # With spaces that do not break a line.
-        return f"{self.value:.{digits}f}\u00a0±\u00a0{self.half_width:.{digits}f}"
+        interval = "" if self.count == 1 else f"\u00a0±\u00a0{self.half_width:.{digits}f}"
+        return f"{self.value:.{digits}f}{interval}"
 
 
 def mean(values: Sequence[float]) -> Mean:
@@ -70,8 +67,7 @@ def mean(values: Sequence[float]) -> Mean:
         raise ValueError("a mean needs at least one value")
     half = np.nan
     if len(sample) > 1:
-        standard_error = sample.std(ddof=1) / np.sqrt(len(sample))
-        half = float(stats.t.ppf(0.975, len(sample) - 1) * standard_error)
+        half = float(stats.t.ppf(0.975, len(sample) - 1) * stats.sem(sample))
     return Mean(float(sample.mean()), half, float(sample.min()), len(sample))
 
 

@@ -88,16 +88,13 @@ class Evidence:
         return "gap closed", "good"
 
 
-def headline(
-    once: pd.DataFrame, errors: pd.DataFrame, about: About, best: float | None
-) -> list[Section]:
+def headline(once: pd.DataFrame, errors: pd.DataFrame, about: About) -> list[Section]:
     """Did it work, was it the difference model's doing, and in which numbers?
 
     Args:
         once: Every policy once, as ``policies_once`` gives them.
         errors: One row for each measurement of accuracy.
         about: The system.
-        best: The best return that is possible, if it is known.
     """
     kinds = {str(name): part for name, part in once.groupby("name")}
     before, target = kinds["idealised"], about["target"]
@@ -134,7 +131,7 @@ def headline(
     alone = _value(control) if control is not None else None
     text = [went] if found.same else []
     text += [_of_gain(found, starts(chosen)), *_of_target(found, target)]
-    text += [*_of_cause(found, alone), *_of_rest(found, true, best)]
+    text += [*_of_cause(found, alone), *_of_rest(found, true, about.get("best"))]
     tiles = {
         "idealised policy": return_text(start), f"after update {update}": return_text(value),
         "gain": str(found.gain), "true interaction": duration(samples * about["dt"]),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import mujoco
 import mujoco.rollout
@@ -11,42 +12,37 @@ import numpy as np
 
 from sims.mujoco import MujocoSimulator
 from sims.mujoco.rows import threads
+from studies.reporting.markdown import filled
 from studies.robots.cases import nominal
 from studies.robots.drives import ROBOTS
 
+#: Rows, control steps of each, and rounds that take turns.
+ROWS, STEPS, ROUNDS = 1024, 25, 5
 
-@dataclasses.dataclass(frozen=True)
-class Speed:
-    """Control steps per second of processor time, medians of rounds that take turns.
 
-    Attributes:
-        robot: The shipped model.
-        ours: Rows that differ in the masses of all bodies and the damping of all joints.
-        alike: Rows of the nominal.
-        bare: ``mujoco.rollout`` of the nominal model, all steps in one call.
+def speeds() -> list[dict[str, Any]]:
+    """Control steps per second of processor time of every shipped model, medians of the rounds.
+
+    On as many threads as ``OMP_NUM_THREADS`` allows.
+
+    Returns:
+        ``robot``; ``ours``, of rows that differ in the masses of all bodies and the damping of all
+        joints; ``alike``, of rows of the nominal; ``bare``, of ``mujoco.rollout`` of the nominal
+        model, all steps in one call; ``share``, of ours in bare.
     """
-
-    robot: str
-    ours: float
-    alike: float
-    bare: float
+    return [_speed(robot) for robot in ROBOTS]
 
 
-def speeds(rows: int = 1024, steps: int = 25, rounds: int = 5) -> list[Speed]:
-    """Every shipped model, on as many threads as ``OMP_NUM_THREADS`` allows."""
-    return [_speed(robot, rows, steps, rounds) for robot in ROBOTS]
-
-
-def _speed(robot: str, rows: int, steps: int, rounds: int) -> Speed:
+def _speed(robot: str) -> dict[str, Any]:
     simulator = nominal(robot)
     rng = np.random.default_rng(0)
-    start = simulator.smooth_states(rows, rng)
+    start = simulator.smooth_states(ROWS, rng)
     actions = np.stack(
-        [0.2 * c.scale * rng.uniform(-1, 1, (rows, steps)) for c in simulator.action_channels],
+        [0.2 * c.scale * rng.uniform(-1, 1, (ROWS, STEPS)) for c in simulator.action_channels],
         axis=2,
     )
     values = {
-        name: parameter.value * rng.uniform(0.9, 1.1, rows)
+        name: parameter.value * rng.uniform(0.9, 1.1, ROWS)
         for name, parameter in simulator.parameters.items()
         if name.startswith(("mass of body", "damping of joint"))
     }
@@ -54,13 +50,13 @@ def _speed(robot: str, rows: int, steps: int, rounds: int) -> Speed:
 
     def ours(of: MujocoSimulator) -> None:
         states = start
-        for k in range(steps):
+        for k in range(STEPS):
             states = of.step(states, actions[:, k])
 
     model = simulator.model
     data = [mujoco.MjData(model) for _ in range(threads())]
     size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-    initial = np.zeros((rows, size))
+    initial = np.zeros((ROWS, size))
     initial[:, 1 : 1 + model.nq + model.nv] = start
     control = np.repeat(actions, simulator.substeps, axis=1)
     with mujoco.rollout.Rollout(nthread=threads()) as roll:
@@ -71,27 +67,26 @@ def _speed(robot: str, rows: int, steps: int, rounds: int) -> Speed:
                     _seconds(lambda: ours(simulator)),
                     _seconds(lambda: roll.rollout(model, data, initial, control)),
                 ]
-                for _ in range(rounds + 1)
+                for _ in range(ROUNDS + 1)
             ]
         )
-    rates = rows * steps / np.median(found[1:], axis=0)
-    return Speed(robot, *map(float, rates))
+    own, alike, bare = ROWS * STEPS / np.median(found[1:], axis=0)
+    return {"robot": robot, "ours": own, "alike": alike, "bare": bare, "share": own / bare}
 
 
-def _seconds(work: object) -> float:
+def _seconds(work: Callable[[], object]) -> float:
     begin = time.process_time()
-    work()  # type: ignore[operator]
+    work()
     return time.process_time() - begin
 
 
-def table(found: list[Speed]) -> str:
+def table(found: Sequence[Mapping[str, Any]]) -> str:
     """Markdown."""
-    lines = [
-        "| model | rows that differ | rows alike | `mujoco.rollout` | share |",
-        "|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {s.robot} | {s.ours:,.0f} | {s.alike:,.0f} | {s.bare:,.0f} | {s.ours / s.bare:.2f} |"
-        for s in found
-    ]
-    return "\n".join(lines)
+    columns = {
+        "model": "{robot}",
+        "rows that differ": "{ours:,.0f}",
+        "rows alike": "{alike:,.0f}",
+        "`mujoco.rollout`": "{bare:,.0f}",
+        "share": "{share:.2f}",
+    }
+    return filled(found, columns)

@@ -55,19 +55,6 @@ class Bars:
             yield advance
 
 
-class Silent:
-    """No output, for ``learn_by_difference(..., progress=Silent())`` in a script."""
-
-    @contextmanager
-    def task(self, title: str, total: int) -> Iterator[Advance]:
-        """Nothing is shown."""
-
-        def ignore(done: int, note: str = "", values: Mapping[str, float] | None = None) -> None:
-            pass
-
-        yield ignore
-
-
 class Several:
     """Passes on to several others."""
 
@@ -87,3 +74,7 @@ class Several:
                     each(done, note, values)
 
             yield advance
+
+
+class Silent(Several):
+    """No output, for ``learn_by_difference(..., progress=Silent())`` in a script."""

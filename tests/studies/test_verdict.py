@@ -58,7 +58,7 @@ def trial(learnt, control=None, seed=0, error=0.01, gap=0.2, target=None):
 
 def verdict(*trials):
     rows, errors = tables_of(trials)
-    found, tiles = headline(policies_once(rows), errors, trials[0]["about"], None)
+    found, tiles = headline(policies_once(rows), errors, trials[0]["about"])
     return found, tiles
 
 

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from residual.trajectories import Trajectory
 from studies.hidden.dirty.truth import COORDINATES, INPUTS, Truth, simulate
@@ -156,20 +157,13 @@ def _read(
     """States in the order of the simulator's channels: each position before its rate."""
     sizes = np.array(SIZES[system])
     white = rng.standard_normal(motion.shape)
-    slow = np.empty_like(white)
-    slow[0] = white[0]
-    for k in range(1, len(slow)):
-        # A memory of five samples.
-        slow[k] = 0.82 * slow[k - 1] + math.sqrt(1 - 0.82**2) * white[k]
+    # A memory of five samples.
+    white[1:] *= math.sqrt(1 - 0.82**2)
+    slow = lfilter([1.0], [1.0, -0.82], white, axis=0)
     fresh = rng.standard_normal(motion.shape)
     mixed = math.sqrt(sensors.coloured) * slow + math.sqrt(1 - sensors.coloured) * fresh
     seen = motion + sensors.noise * sizes * mixed
-    if system == "oven":
-        if sensors.rounded:
-            step = sensors.rounded * sizes[0]
-            seen = step * np.round(seen / step)
-        return seen
-    c = motion.shape[1] // 2
+    c = 1 if system == "oven" else motion.shape[1] // 2
     q, v = seen[:, :c], seen[:, c:]
     if sensors.summed:
         # A sensor of the rate alone, which drifts as it is summed up.
@@ -178,6 +172,8 @@ def _read(
     if sensors.rounded:
         step = sensors.rounded * sizes[:c]
         q = step * np.round(q / step)
+    if system == "oven":
+        return q
     if not sensors.rates:
         v = np.full_like(v, np.nan)
     return np.stack([q, v], axis=2).reshape(len(times), 2 * c)
