@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from simgap_files import atomic_write_json, atomic_write_text, read_json
+from studies.reporting.render import render
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
 from studies.running.workers import ONE_THREAD
@@ -29,61 +30,6 @@ FIGURE = Path("images", "fit_scaling.png")
 MUJOCO = "## MuJoCo models\n"
 # What takes most of the time: large fits, and the second problem size of DDPG.
 QUICK = "not leo and not 15000 and not 100000 and not (3750 and GaussianProcessRegressor)"
-
-NOTES = """\
-- One thread for BLAS and PyTorch, one process. `times` is ours over the peer's in speed: above 1
-  ours is faster. Trust the ratios more than the absolute figures, which follow the machine.
-- DDPG and simulators: processor time, median of 10 rounds, and the peer runs in turns with ours,
-  so that other programs on the machine hit both alike. Fits: processor time, median of 3 rounds
-  (of 1 for GaussianProcessRegressor). Predictions: wall time, median over about one second.
-- DDPG: every step of the environment comes with one update of batch 64; networks 400 and 300
-  wide, float32. Sizes: `pendulum` has 3 observations and 1 action, `leo` 17 and 6. The environment
-  costs next to nothing. "Share of its own matrix products": time of the bare products of an
-  update over the time of the update. "Peak" is this machine's own sgemm of 1024 x 1024, measured
-  in the same rounds.
-- Fits learn the difference of two pendulums, without noise; held-out error is RMS error over RMS
-  difference at 2000 other states, up to a quarter faster than those learnt from.
-  GaussianProcessRegressor has the same kernel and its default optimizer, MLPRegressor the layers
-  of DropoutNet and its defaults otherwise. Linear has no peer: it is a closed form.
-- GaussianProcessRegressor is left out at 15000 points: every step of its optimizer factors and
-  differentiates a matrix of 15000 x 15000 (hours, and more than 10 GB).
-- Cost against size: 24 standard normal inputs, 18 outputs tanh(X A) B with random A (24, 40) and
-  B (40, 18), 1 % noise (`tests/benchmarks/fit_at_scale.py`); held-out error is RMS error over RMS
-  target at 4000 other rows without noise. Each fit has a process of its own and is run once;
-  seconds are wall time on one thread. Peak memory is the whole process's, libraries and data
-  included.
-- Predictions are means, fitted on 3750 points, reached through `DifferenceModel` as the corrected
-  simulator reaches them; features and checks of the input are part of the time, for peers too.
-  The length scales of GaussianProcessRegressor are given here, they do not change the time.
-- find_gap: processor time of one answer with default options but the hold; logs by SciPy, 8 records
-  of 250 rows of the pendulum with rates, 20 s at 500 Hz of an arm with two joints without.
-- Gymnasium's Pendulum-v1 is no like-for-like peer of the simulators: it has no motor and takes
-  one Euler step per control period; it stands for what a step of a plain environment costs.
-  Wrappers are left off. The one-step error is that against an adaptive method of order 8; for
-  `Pendulum + Linear` against the true pendulum that it was fitted to."""
-
-
-ROBOTS = """\
-Measured by `python -m studies.benchmarks --mujoco`.
-
-Control steps per second of processor time, 1024 rows, own masses and dampings in each row or rows
-alike; medians of five rounds that take turns with `mujoco.rollout` of the bare model, of whose
-speed at least half is wanted:
-
-{speeds}
-
-[What they are](mujoco.md). On the same logs (arm2, three records of 7.5 s at 100 Hz, encoders
-0.5 mrad, rates unmeasured; errors over 0.3 s on a fourth from smoothed starts, which alone cost
-1.85 mrad) find_gap with its whole library, and `mujoco.sysid`, to which damping, frictionloss,
-quadratic damping and armature of every joint, mass and center of mass of every body are listed. A
-name of sysid is one whose 95 % interval excludes the nominal value. Processor seconds:
-
-{rivals}
-
-sysid fits the dynamics too and is quick. It does not say which of the significant values to
-believe: its start states are not fitted, and where one value cannot be seen most intervals are
-infinite.
-"""
 
 
 def build_parser() -> Parser:
@@ -144,15 +90,12 @@ def document(data: Mapping[str, Any], figure: bool = False) -> str:
         data: The content of a file that ``pytest --benchmark-json`` wrote.
         figure: Show ``FIGURE``, which stands beside the page.
     """
-    found = tables(data)  # an error if the data are none
+    found = tables(data).rstrip()  # an error if the data are none
     if figure:
         picture = f"![Seconds, memory and error of a fit against the number of points]({FIGURE})"
         found = found.replace(f"{SCALING}\n", f"{SCALING}\n\n{picture}\n", 1)
     command = data.get("command", f"pytest {SUITE} -o addopts= --benchmark-only")
-    return (
-        f"# Benchmarks\n\nMeasured by `{command}`; nothing here is written by hand.\n\n"
-        f"{found}\n## How it was measured\n\n{NOTES}\n"
-    )
+    return f"{render('benchmarks.md', command=command, tables=found)}\n"
 
 
 @guarded(resumes=False)
@@ -192,7 +135,7 @@ def robots(output: str | None) -> None:
         rivals = beside.table(lambda text: print(text, file=sys.stderr, flush=True))
     except ImportError as problem:
         fail(f"{problem}; the comparison needs pip install 'simgap[mujoco]' 'mujoco[sysid]'")
-    page = f"{MUJOCO}\n{ROBOTS.format(speeds=found, rivals=rivals)}"
+    page = f"{render('benchmarks_mujoco.md', speeds=found, rivals=rivals)}\n"
     print(page)
     if output:
         there = Path(output)

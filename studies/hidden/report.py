@@ -15,8 +15,7 @@ from simgap_files import atomic_write_text
 from studies.hidden.counts import asked, count, told
 from studies.hidden.strengths import HIDDEN
 from studies.reporting.figures import new_figure, save_figure, styled
-from studies.reporting.page import Report
-from studies.reporting.sections import Code, Figure, Prose, Section, Table
+from studies.reporting.sections import Code, Figure, Prose, Report, Section, Table
 from studies.running.versions import versions
 
 #: Residual over noise on held-out windows at which a gap counts as closed.

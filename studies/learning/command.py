@@ -13,16 +13,22 @@ from typing import Any
 import yaml
 
 from simgap_files import atomic_write_text, read_sealed, remove_partial_files, write_sealed
-from studies.learning.settings import ALIASES, build_parser, instantiate, resolve, trial_label
 from studies.learning.study import Study
-from studies.learning.trial import code_of_trial, run_trial
+from studies.learning.trial import (
+    ALIASES,
+    build_parser,
+    code_of_trial,
+    instantiate,
+    resolve,
+    run_trial,
+    trial_label,
+)
 from studies.learnt.films import write_films
 from studies.learnt.report import read_episodes, write_report
 from studies.learnt.tables import write_tables
-from studies.running.curves import Curves
 from studies.running.ending import check_output, fail, guarded
 from studies.running.grids import expand_grid
-from studies.running.progress import Bars, Several
+from studies.running.progress import Bars, Curves, Several
 from studies.running.trials import (
     Execution,
     Failures,

@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from studies.learnt.errors import by_group, model_errors
-from studies.learnt.pairs import above, starts
-from studies.learnt.statistics import Mean, mean
+from studies.learnt.statistics import Mean, above, mean, starts
 from studies.learnt.words import POLICY_WORDS, duration
 from studies.reporting import Section, Table
 

@@ -13,8 +13,7 @@ from typing import Any, Literal
 import pandas as pd
 
 from studies.learnt.errors import by_group, model_errors, no_gap
-from studies.learnt.pairs import above, starts
-from studies.learnt.statistics import Mean, mean, return_text
+from studies.learnt.statistics import Mean, above, mean, return_text, starts
 from studies.learnt.words import NEAR, POLICY_WORDS, duration
 from studies.reporting import KeyValues, Section, Verdict
 

@@ -3,7 +3,6 @@
 ``Report("Pendulum", "One update.", [Verdict("It works.", tone="good")]).write(path)``
 """
 
-from studies.reporting.page import Report
 from studies.reporting.sections import (
     Animation,
     Code,
@@ -11,6 +10,7 @@ from studies.reporting.sections import (
     Gallery,
     KeyValues,
     Prose,
+    Report,
     Section,
     Table,
     Verdict,

@@ -19,8 +19,7 @@ from typing import Any
 from tqdm import tqdm
 
 from simgap_files import atomic_write_json, read_json
-from studies.running.progress import Advance
-from studies.running.stream import stderr
+from studies.running.progress import Advance, stderr
 
 STATUS = "status.json"
 WRITE_EVERY = 10.0  # seconds; hundreds of trials share a file system

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from residual.gap.data.windows import Windows
 from residual.logs.units import find_unit
 from studies import learn
-from studies.learning.settings import build_parser
+from studies.learning.trial import build_parser
 from studies.pendulum_gap import STUDY
 from studies.running import ending
 from studies.running.ending import check_output, fail, guarded, on_purpose

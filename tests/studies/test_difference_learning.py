@@ -21,8 +21,8 @@ from studies.learning.budget import Budget
 from studies.learning.kept import OnDisk
 from studies.learning.loop import learn_by_difference, run_loop
 from studies.learning.outcome import Learnt
-from studies.learning.settings import trial_label
 from studies.learning.steps import Steps
+from studies.learning.trial import trial_label
 from studies.running.progress import Silent
 
 BUDGET = Budget(
