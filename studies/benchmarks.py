@@ -8,6 +8,7 @@ what the other measured.
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -22,7 +23,7 @@ from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
 from studies.running.workers import ONE_THREAD
 from studies.timing.fit_scaling import write_figure
-from studies.timing.tables import SCALING, records, tables
+from studies.timing.tables import SCALING, mujoco_tables, records, tables
 
 ROOT = Path(__file__).resolve().parents[1]
 SUITE = Path("tests", "benchmarks")
@@ -67,10 +68,7 @@ def run_suite(target: Path, quick: bool) -> bool:
         FileNotFoundError: This is no checkout of the project: the suite is not there.
         ChildProcessError: Nothing was measured.
     """
-    if not (ROOT / SUITE).is_dir():
-        raise FileNotFoundError(
-            f"{ROOT / SUITE} does not exist: run the benchmarks in a checkout of the project"
-        )
+    check_suite()
     command = [sys.executable, "-m", "pytest", str(SUITE), "-o", "addopts=", "--benchmark-only"]
     command += ["--benchmark-json", str(target), "-q", "-rs", "-p", "no:cacheprovider"]
     command += ["-k", QUICK] if quick else []
@@ -81,6 +79,14 @@ def run_suite(target: Path, quick: bool) -> bool:
             "pip install 'simgap[test,bench]'"
         )
     return done.returncode == 0
+
+
+def check_suite() -> None:
+    """Raise ``FileNotFoundError`` if this is no checkout of the project."""
+    if not (ROOT / SUITE).is_dir():
+        raise FileNotFoundError(
+            f"{ROOT / SUITE} does not exist: run the benchmarks in a checkout of the project"
+        )
 
 
 def document(data: Mapping[str, Any], figure: bool = False) -> str:
@@ -127,20 +133,32 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def robots(output: str | None) -> None:
-    """Measure MuJoCo models and print the page; see ``studies.robots``."""
-    try:
-        from studies.robots import beside, speed
-
-        found = speed.table(speed.speeds())
-        rivals = beside.table(lambda text: print(text, file=sys.stderr, flush=True))
-    except ImportError as problem:
-        fail(f"{problem}; the comparison needs pip install 'simgap[mujoco]' 'mujoco[sysid]'")
-    page = f"{render('benchmarks_mujoco.md', speeds=found, rivals=rivals)}\n"
+    """Measure MuJoCo models and print the page."""
+    page = f"{render('benchmarks_mujoco.md', **mujoco_tables(measure_mujoco()))}\n"
     print(page)
     if output:
         there = Path(output)
         whole = there.read_text(encoding="utf-8") if there.is_file() else "# Benchmarks\n"
         atomic_write_text(output, with_robots(whole, page))
+
+
+def measure_mujoco() -> dict[str, Any]:
+    """What ``tests/benchmarks/mujoco_models.py`` measured: ``speeds`` and ``rivals``.
+
+    Raises:
+        FileNotFoundError: This is no checkout of the project.
+        ChildProcessError: Nothing was measured.
+    """
+    check_suite()
+    command = [sys.executable, "-m", f"{'.'.join(SUITE.parts)}.mujoco_models"]
+    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    if done.returncode:
+        raise ChildProcessError(
+            "nothing was measured, see above; the comparison needs pip install 'simgap[mujoco]' "
+            "'mujoco[sysid]'"
+        )
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
 def robots_in(page: str) -> str:

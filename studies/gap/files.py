@@ -41,6 +41,7 @@ def write_report(
         name: Of the page.
     """
     figures = folder / "figures"
+    settings = yaml.safe_dump(record["config"], sort_keys=False)
     sections: list[Section] = [
         *banners(result, record["config"].get("tolerance")),
         tiles(result),
@@ -52,7 +53,7 @@ def write_report(
         *apart(result),
         *blind(result),
         *quality(result, record),
-        *provenance(record),
+        Code(settings, summary="The settings of this run", heading="Settings"),
     ]
     logs = record["config"]["logs"]
     names = ", ".join(Path(log).name for log in logs[:3])
@@ -83,12 +84,6 @@ def quality(result: GapResult, record: Mapping[str, Any]) -> list[Section]:
     if rows:
         sections.append(Table(["finding", "where", "what"], rows[:FINDINGS]))
     return sections
-
-
-def provenance(record: Mapping[str, Any]) -> list[Section]:
-    """What made the numbers."""
-    settings = yaml.safe_dump(record["config"], sort_keys=False)
-    return [Code(settings, summary="The settings of this run", heading="Settings")]
 
 
 def footer(record: Mapping[str, Any]) -> str:

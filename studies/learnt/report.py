@@ -108,10 +108,10 @@ def write_report(
 
 def _before_and_after(results: Results, films: Mapping[str, Path]) -> list[Section]:
     """The films of the policies that pictures show, if there are any."""
-    moving = {title: films[key] for key, title in shown(results).items() if key in films}
     pictures = [
-        Animation(path, f"The true system under the policy: {title}.", title)
-        for title, path in moving.items()
+        Animation(films[key], f"The true system under the policy: {title}.", title)
+        for key, title in shown(results).items()
+        if key in films
     ]
     caption = "The first seconds on the **true** system."
     return [Gallery(pictures, caption, heading="Before and after")] if pictures else []
@@ -173,6 +173,5 @@ def _provenance(results: Sequence[Results]) -> list[Section]:
         sections.append(KeyValues(dict(results[0]["versions"]), heading="Versions"))
     if len(results) == 1 and "config" in results[0]:
         settings = yaml.safe_dump(results[0]["config"], sort_keys=False)
-        summary = "The resolved configuration"
-        sections.append(Code(settings, summary=summary, heading="Configuration"))
+        sections.append(Code(settings, "The resolved configuration", heading="Configuration"))
     return sections

@@ -108,8 +108,9 @@ def headline(once: pd.DataFrame, errors: pd.DataFrame, about: About) -> list[Sec
     chosen, reached = _chosen(learnt, target)
     samples, estimator, update = chosen.iloc[0][_PLACE]
     seen = model_errors(errors, estimator, samples, update)
-    control, value = _control(kinds, update), _value(chosen)
-    pairs = above(chosen, control) if control is not None else []
+    value = _value(chosen)
+    control = once[(once["name"] == "control") & (once["iteration"] == update)]
+    pairs = above(chosen, control) if len(control) else []
     true = _value(kinds["true"]) if "true" in kinds else None
     worst, error = _worst(seen, about)
     found = Evidence(
@@ -127,7 +128,7 @@ def headline(once: pd.DataFrame, errors: pd.DataFrame, about: About) -> list[Sec
     needed = f"{samples} true samples, {duration(samples * about['dt'])}"
     gone = f"from {return_text(start)} to {return_text(value)} ({by}, {needed})"
     went = f"On the true system the return went {gone}."
-    alone = _value(control) if control is not None else None
+    alone = _value(control) if len(control) else None
     text = [went] if found.same else []
     text += [_of_gain(found, starts(chosen)), *_of_target(found, target)]
     text += [*_of_cause(found, alone), *_of_rest(found, true, about.get("best"))]
@@ -207,14 +208,6 @@ def _of_rest(found: Evidence, true: float | None, best: float | None) -> list[st
 def _value(rows: pd.DataFrame) -> float:
     """The mean return on the true system over seeds."""
     return float(rows.groupby("seed")["return_true"].mean().mean())
-
-
-def _control(kinds: Mapping[str, pd.DataFrame], update: int) -> pd.DataFrame | None:
-    """As much training without a difference model, if there is any."""
-    if "control" not in kinds:
-        return None
-    rows = kinds["control"][kinds["control"]["iteration"] == update]
-    return rows if len(rows) else None
 
 
 def _worst(seen: pd.DataFrame, about: About) -> tuple[str, float | None]:

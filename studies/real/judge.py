@@ -141,11 +141,9 @@ class Judge:
         ours = ("output", "jobs", "config")
         self.settings = {k: v for k, v in parser.plain(given).items() if k not in ours}
         made = parser.instantiate(given)
-        asked: HostSimulator = made["simulator"]
-        hold = made["hold"]
-        self.simulator = asked
-        if hold != "auto":
-            self.simulator = asked.with_hold({c.name: hold for c in asked.action_channels})
+        self.simulator: HostSimulator = made["simulator"]
+        if hold := find_gap.holds(self.simulator, made["hold"]):
+            self.simulator = self.simulator.with_hold(hold)
         self._format: LogFormat = made["columns"]
         self._fit = self._read(rig.fit, logs)
         self._runs = self._read(rig.judge, files_of(rig, rig.judge, data, scratch))
@@ -172,11 +170,8 @@ class Judge:
         return plan(self.simulator, runs, self.rig.horizon)
 
     def _read(self, part: Part, logs: Sequence[Path]) -> list[Trajectory]:
-        changed = {
-            name: value
-            for name in ("start", "stop", "only")
-            if (value := getattr(part, name)) is not None
-        }
+        given = {name: getattr(part, name) for name in ("start", "stop", "only")}
+        changed = {name: value for name, value in given.items() if value is not None}
         states = {**self._format.states, **self.rig.derived}
         layout = dataclasses.replace(self._format, states=states, **changed)
         data = find_gap.read(self.simulator, [str(log) for log in logs], layout)

@@ -68,7 +68,7 @@ class Picture(Section):
     """What a still and a moving picture share.
 
     Args:
-        source: A matplotlib figure, or the bytes or path of a PNG, SVG, JPEG or GIF.
+        source: A matplotlib figure, or the bytes or path of a PNG or GIF.
         alt: What it shows, for those who cannot see it: the finding, not "a plot".
         caption: Text under it; markup as in ``Prose``.
     """

@@ -80,6 +80,27 @@ def tables(data: Mapping[str, Any]) -> str:
     return "\n\n".join(f"## {title}\n\n{text}" for title, text in parts if text) + "\n"
 
 
+def mujoco_tables(measured: Mapping[str, Sequence[Record]]) -> dict[str, str]:
+    """What ``tests/benchmarks/mujoco_models.py`` measured, as tables by the same names."""
+    speeds = {
+        "model": "{robot}",
+        "rows that differ": "{ours:,.0f}",
+        "rows alike": "{alike:,.0f}",
+        "`mujoco.rollout`": "{bare:,.0f}",
+        "share": "{share:.2f}",
+    }
+    rivals = {
+        "hidden": "{hidden}",
+        "": "{who}",
+        "named: change (95 % interval)": "{named}",
+        "false names": "{false}",
+        "held-out error": "{error:.2f} mrad (nominal {nominal:.2f})",
+        "s": "{seconds:.0f}",
+    }
+    columns = {"speeds": speeds, "rivals": rivals}
+    return {name: filled(measured[name], columns[name]) for name in columns}
+
+
 def _machine(data: Mapping[str, Any]) -> str:
     info = data.get("machine_info", {})
     cpu = info.get("cpu", {})

@@ -8,8 +8,9 @@ import importlib
 import io
 import logging
 import os
+import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -22,7 +23,6 @@ from sims.host import HostSimulator
 from sims.mujoco import MujocoSimulator
 from sims.mujoco.attributes import Attribute
 from sims.simulator import Array
-from studies.reporting.markdown import filled
 from studies.robots.cases import NAMES, nominal
 from studies.robots.drives import measure
 
@@ -255,22 +255,14 @@ def compare(robot: str, hidden: Mapping[str, float], minutes: float) -> Iterator
     yield side("mujoco.sysid", changes, error, fitted.seconds)
 
 
-def table(tell: Callable[[str], None], minutes: float = 1.0) -> str:
-    """Markdown for the arm with two joints."""
+def rivals(minutes: float = 1.0) -> list[dict[str, Any]]:
+    """Both on the arm with two joints: what is ``hidden``, and what ``compare`` yields."""
     rows = []
     for hidden in HIDDEN:
         words = " + ".join(f"{name} {size:+g}" for name, size in hidden.items()) or "nothing"
-        tell(f"arm2: {words}")
+        print(f"arm2: {words}", file=sys.stderr, flush=True)
         rows += [{"hidden": words} | side for side in compare("arm2", hidden, minutes)]
-    columns = {
-        "hidden": "{hidden}",
-        "": "{who}",
-        "named: change (95 % interval)": "{named}",
-        "false names": "{false}",
-        "held-out error": "{error:.2f} mrad (nominal {nominal:.2f})",
-        "s": "{seconds:.0f}",
-    }
-    return filled(rows, columns)
+    return rows
 
 
 def _number(value: Interval) -> str:

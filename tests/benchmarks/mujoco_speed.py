@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -12,7 +12,6 @@ import numpy as np
 
 from sims.mujoco import MujocoSimulator
 from sims.mujoco.rows import threads
-from studies.reporting.markdown import filled
 from studies.robots.cases import nominal
 from studies.robots.drives import ROBOTS
 
@@ -78,15 +77,3 @@ def _seconds(work: Callable[[], object]) -> float:
     begin = time.process_time()
     work()
     return time.process_time() - begin
-
-
-def table(found: Sequence[Mapping[str, Any]]) -> str:
-    """Markdown."""
-    columns = {
-        "model": "{robot}",
-        "rows that differ": "{ours:,.0f}",
-        "rows alike": "{alike:,.0f}",
-        "`mujoco.rollout`": "{bare:,.0f}",
-        "share": "{share:.2f}",
-    }
-    return filled(found, columns)
