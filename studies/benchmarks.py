@@ -120,8 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         fail(f"{given.read}: {problem}" if given.read else str(problem))
     picture = Path(given.output).parent / FIGURE if given.output else None
     page = document(data, picture is not None and write_figure(found, picture) is not None)
-    if given.output and Path(given.output).is_file():
-        page = with_robots(page, robots_in(Path(given.output).read_text(encoding="utf-8")))
+    page = joined(page, parts_of(given.output)[1])
     print(page)
     if given.json:
         atomic_write_json(given.json, data)
@@ -137,9 +136,7 @@ def robots(output: str | None) -> None:
     page = f"{render('benchmarks_mujoco.md', **mujoco_tables(measure_mujoco()))}\n"
     print(page)
     if output:
-        there = Path(output)
-        whole = there.read_text(encoding="utf-8") if there.is_file() else "# Benchmarks\n"
-        atomic_write_text(output, with_robots(whole, page))
+        atomic_write_text(output, joined(parts_of(output)[0] or "# Benchmarks", page))
 
 
 def measure_mujoco() -> dict[str, Any]:
@@ -161,17 +158,17 @@ def measure_mujoco() -> dict[str, Any]:
     return found
 
 
-def robots_in(page: str) -> str:
-    """The section on MuJoCo models of a page; empty if it has none."""
-    _, heading, rest = f"\n{page}".partition(f"\n{MUJOCO}")
-    own, _, _ = rest.partition("\n## ")
-    return f"{MUJOCO}{own.rstrip()}\n" if heading else ""
+def parts_of(output: str | None) -> tuple[str, str]:
+    """The page that is there, and its last section, on MuJoCo models; empty if there is none."""
+    there = Path(output) if output else None
+    page = there.read_text(encoding="utf-8") if there and there.is_file() else ""
+    rest, heading, section = f"\n{page}".partition(f"\n{MUJOCO}")
+    return rest, heading + section
 
 
-def with_robots(page: str, section: str) -> str:
-    """A page whose section on MuJoCo models, the last one, is this."""
-    rest = page.replace(robots_in(page), "") if robots_in(page) else page
-    return f"{rest.rstrip()}\n\n{section}" if section else page
+def joined(page: str, section: str) -> str:
+    """A page with the section on MuJoCo models, if there is one, as its last."""
+    return f"{page.strip()}\n\n{section.strip()}".rstrip() + "\n"
 
 
 def measure(quick: bool) -> tuple[dict[str, Any], bool]:

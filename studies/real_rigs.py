@@ -14,7 +14,7 @@ from __future__ import annotations
 import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -66,35 +66,27 @@ def table(results: Sequence[Judged]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-#: What is asked of every answer, whether one does it, and what one does that does not.
-ASKED: Sequence[tuple[str, Callable[[Judged], bool], Callable[[Judged], str]]] = (
-    (
-        "key's effect or its family named",
-        lambda r: r.named.enough,
-        lambda r: f"names {', '.join(r.named.right)}",
-    ),
-    (
-        f"error at most {RATIO} times the key's repair",
-        lambda r: r.ratio <= RATIO,
-        lambda r: f"{r.ratio:.2f} times the error of the key's repair",
-    ),
-    (
-        "no confirmed name that the key does not support",
-        lambda r: not r.named.wrong,
-        lambda r: f"confirmed {', '.join(r.named.wrong)}",
-    ),
-    (
-        f"at most {SECONDS:.0f} s of processor time",
-        lambda r: r.seconds <= SECONDS,
-        lambda r: f"{r.seconds:.0f} s of processor time",
-    ),
-)
-
-
 def summary(results: Sequence[Judged]) -> str:
     """What was reached, in counts, and every miss in words."""
-    lines = [f"{what}: {sum(map(met, results))}/{len(results)}" for what, met, _ in ASKED]
-    lines += [f"missed: {r.rig}: {why(r)}" for r in results for _, met, why in ASKED if not met(r)]
+    count = len(results)
+    lines = [
+        f"key's effect or its family named: {sum(r.named.enough for r in results)}/{count}",
+        f"error at most {RATIO} times the key's repair: "
+        f"{sum(r.ratio <= RATIO for r in results)}/{count}",
+        f"a confirmed name that the key does not support: "
+        f"{sum(bool(r.named.wrong) for r in results)}/{count}",
+        f"at most {SECONDS:.0f} s of processor time: "
+        f"{sum(r.seconds <= SECONDS for r in results)}/{count}",
+    ]
+    for r in results:
+        if not r.named.enough:
+            lines.append(f"missed: {r.rig}: names {', '.join(r.named.right)}")
+        if r.ratio > RATIO:
+            lines.append(f"missed: {r.rig}: {r.ratio:.2f} times the error of the key's repair")
+        if r.named.wrong:
+            lines.append(f"missed: {r.rig}: confirmed {', '.join(r.named.wrong)}")
+        if r.seconds > SECONDS:
+            lines.append(f"missed: {r.rig}: {r.seconds:.0f} s of processor time")
     return "\n".join(lines)
 
 

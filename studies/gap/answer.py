@@ -137,7 +137,9 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.form:
         found.append(f"of the same family, {names_of(verdict.form)} would do as well")
     if verdict.same_motion:
-        found.append(f"no motion can tell it from {_twins(verdict)}")
+        known = {o.effect: f" ({_values(o)})" for o in verdict.meant}
+        names = [f"{effect_name(name)}{known.get(name, '')}" for name in verdict.same_motion]
+        found.append(f"no motion can tell it from {listed(names, 'or')}")
     for other in verdict.beside:
         twin = next(v for v in result.verdicts if other.effect in v.same_motion)
         meant, named = effect_name(other.effect), effect_name(twin.label)
@@ -145,16 +147,6 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.provisional:
         found.append(provisional(result))
     return found
-
-
-def _twins(verdict: Verdict) -> str:
-    """Its exact twins, with the numbers that are known of them."""
-    known = {other.effect: other for other in verdict.meant}
-    names = [
-        effect_name(label) + (f" ({_values(known[label])})" if label in known else "")
-        for label in verdict.same_motion
-    ]
-    return listed(names, "or")
 
 
 def _values(meant: Meant) -> str:

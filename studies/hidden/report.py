@@ -205,32 +205,21 @@ def write_report(
         if counts.size:
             drawn = confusion(counts)
             save_figure(drawn, output / "confusion.png", counts.reset_index())
-            sections.append(
-                Figure(
-                    drawn,
-                    "Hidden effects against the name given first; the diagonal is right.",
-                    "Counts of sets; rows of effects hidden alone.",
-                    heading="What is taken for what",
-                )
-            )
-        sections.append(
-            Table.of(
-                table,
-                "Every cell",
-                f"Counts. Closed: the gap after is at most {CLOSED}; wrong: a confident name that "
-                "means nothing hidden. Logs: excitation, noise, number of trajectories.",
-            )
+            alt = "Hidden effects against the name given first; the diagonal is right."
+            caption = "Counts of sets; rows of effects hidden alone."
+            sections.append(Figure(drawn, alt, caption, heading="What is taken for what"))
+        caption = (
+            f"Counts. Closed: the gap after is at most {CLOSED}; wrong: a confident name that "
+            "means nothing hidden. Logs: excitation, noise, number of trajectories."
         )
+        sections.append(Table.of(table, "Every cell", caption))
     compared = rivals(data)
     atomic_write_text(output / "rivals.csv", compared.to_csv(index=False))
-    sections.append(
-        Table.of(
-            compared,
-            "Beside other methods",
-            "Near-twins count as right. pysindy differentiates over 50 ms, across the jumps of a "
-            "held input, which it was not made for.",
-        )
+    caption = (
+        "Near-twins count as right. pysindy differentiates over 50 ms, across the jumps of a held "
+        "input, which it was not made for."
     )
+    sections.append(Table.of(compared, "Beside other methods", caption))
     sections.append(Code(yaml.safe_dump(dict(config), sort_keys=False), summary="settings"))
     found = ", ".join(f"{name} {version}" for name, version in versions().items())
     Report("Hidden effects", "What find_gap names, known what was hidden.", sections, found).write(

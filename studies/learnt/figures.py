@@ -93,10 +93,12 @@ def episodes_figure(
         about: The system.
         episodes: ``states`` and ``actions`` by name of the policy.
     """
-    names = [channel["name"] for channel in about["states"]]
     steps = drawn_steps(about["dt"])
     wanted: list[tuple[str, int, dict[str, Any]]] = [
-        ("states", names.index(name), about["states"][names.index(name)]) for name in about["shown"]
+        ("states", column, channel)
+        for name in about["shown"]
+        for column, channel in enumerate(about["states"])
+        if channel["name"] == name
     ]
     if len(about["actions"]) == 1:
         wanted.append(("actions", 0, about["actions"][0]))

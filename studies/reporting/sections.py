@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import pandas as pd
 from matplotlib.figure import Figure as MatplotlibFigure
@@ -82,6 +82,10 @@ class Picture(Section):
         """``source``, ready to be put into the page."""
         return load_media(self.source)
 
+    def small(self) -> Self:
+        """The same for a place beside others; by default there is one size."""
+        return self
+
 
 @dataclasses.dataclass(frozen=True)
 class Figure(Picture):
@@ -94,7 +98,7 @@ class Figure(Picture):
         """A matplotlib figure of one column laid out anew for screens up to 640 px wide."""
         return narrowed(self.source)
 
-    def small(self) -> Figure:
+    def small(self) -> Self:
         """The same with its narrow picture at any width."""
         return dataclasses.replace(self, source=self.narrow_picture or self.picture)
 
@@ -121,10 +125,6 @@ class Animation(Picture):
     def still(self) -> Media | None:
         """The middle frame."""
         return still(self.picture)
-
-    def small(self) -> Animation:
-        """Itself: an animation has one size."""
-        return self
 
 
 @dataclasses.dataclass(frozen=True)
@@ -181,13 +181,11 @@ class KeyValues(Section):
     Args:
         items: Value by name, in order; a unit belongs into the value's text.
         style: ``"tiles"`` for up to about six headline numbers, ``"list"`` for settings.
-        digits: Significant digits of floats.
     """
 
     template: ClassVar[str] = "key_values.html"
     items: Mapping[str, Cell]
     style: Literal["list", "tiles"] = "list"
-    digits: int = 3
 
 
 @dataclasses.dataclass(frozen=True)

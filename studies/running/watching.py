@@ -120,16 +120,14 @@ class TrialsView:
                 self._show_lines(now)
 
     def _show_lines(self, now: Mapping[Path, Mapping[str, Any]]) -> None:
-        shown = list(now.items())[:SHOWN]
-        while len(self._lines) < len(shown):
+        texts = []
+        for folder, status in list(now.items())[:SHOWN]:
+            share = f" {100 * status['done'] // status['total']} %" if status["total"] else ""
+            texts.append(f"{folder.name}: {status['step']}{share} {status['note']}")
+        for place in range(len(self._lines) + 1, len(texts) + 1):
             self._lines.append(
-                tqdm(file=sys.stderr, position=len(self._lines) + 1, leave=False,
-                     bar_format="  {desc}")
-            )  # fmt: skip
-        for k, line in enumerate(self._lines):
-            text = ""
-            if k < len(shown):
-                folder, status = shown[k]
-                share = f" {100 * status['done'] // status['total']} %" if status["total"] else ""
-                text = f"{folder.name}: {status['step']}{share} {status['note']}"
+                tqdm(file=sys.stderr, position=place, leave=False, bar_format="  {desc}")
+            )
+        texts += [""] * (len(self._lines) - len(texts))
+        for line, text in zip(self._lines, texts, strict=True):
             line.set_description_str(text)

@@ -18,7 +18,7 @@ SCALING = "## Cost of a fit against size"
 LEAST_TIMES_DDPG = 2.5
 LEAST_SHARE_OF_PRODUCTS = 0.85
 LEAST_TIMES_GP = 10.0
-MOST_ONE_ROW = 0.2e-3
+MOST_ONE_ROW = 0.2  # ms
 LEAST_CONTROL_STEPS = 8000.0
 MOST_ANSWER = {"Pendulum": 60.0, "PendulumEquation": 20.0, "two joints": 180.0}
 
@@ -128,25 +128,28 @@ def _targets(found: Sequence[Record]) -> str:
         verdict = "yes" if met else f"no: {value / limit:.2f} times that"
         rows.append([what, format(value, form), f"{sign} {limit:{form}}", verdict])
 
-    for record in _of(found, "test_learn_against_stable_baselines3"):
-        what = f"DDPG, {record['env']}: times stable-baselines3's updates per second"
-        add(what, record["times_stable_baselines3"], ".2f", LEAST_TIMES_DDPG)
-    for record in _of(found, "test_update_against_its_products"):
-        what = f"DDPG, {record['env']}: share of an update that is its matrix products"
-        add(what, record["share_of_products"], ".2f", LEAST_SHARE_OF_PRODUCTS)
+    asked = (
+        ("test_learn_against_stable_baselines3", "times stable-baselines3's updates per second",
+         "times_stable_baselines3", LEAST_TIMES_DDPG),
+        ("test_update_against_its_products", "share of an update that is its matrix products",
+         "share_of_products", LEAST_SHARE_OF_PRODUCTS),
+    )  # fmt: skip
+    for test, what, figure, least in asked:
+        for record in _of(found, test):
+            add(f"DDPG, {record['env']}: {what}", record[figure], ".2f", least)
     own = _one(found, "test_fit_time", estimator="GaussianProcess", points=3750)
     peer = _one(found, "test_fit_time", estimator=PEERS["GaussianProcess"], points=3750)
     if own and peer:
         what = "Gaussian process, fit at 3750 points: times faster than scikit-learn's"
         add(what, peer["seconds"] / own["seconds"], ".1f", LEAST_TIMES_GP)
-        what = "the same: held-out error"
-        add(what, own["held_out_error"], ".3g", peer["held_out_error"], at_least=False)
+        error, most = own["held_out_error"], peer["held_out_error"]
+        add("the same: held-out error", error, ".3g", most, at_least=False)
     for what, value, form, most in fit_scaling.targets(found):
         add(what, value, form, most, at_least=False)
     for name in OURS:
         if own := _one(found, "test_prediction_latency", estimator=name, rows=1):
-            what = f"{name}: prediction of one row, ms"
-            add(what, 1e3 * own["seconds"], ".3f", 1e3 * MOST_ONE_ROW, at_least=False)
+            took = 1e3 * own["seconds"]
+            add(f"{name}: prediction of one row, ms", took, ".3f", MOST_ONE_ROW, at_least=False)
     for system, most in MOST_ANSWER.items():
         seconds = [r["processor_seconds"] for r in found if r.get("system") == system]
         if seconds:

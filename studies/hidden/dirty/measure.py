@@ -59,22 +59,11 @@ class Sensors:
     input_noise: float | None = None
 
 
-def record(
+def _record(
     truth: Truth, sensors: Sensors, name: str, period: float, seconds: float, drive: float,
     rng: np.random.Generator, noise: np.random.Generator,
 ) -> Trajectory:  # fmt: skip
-    """One measured run.
-
-    Args:
-        truth: The system.
-        sensors: How it is measured.
-        name: Of the run.
-        period: Between samples in s.
-        seconds: Length of the run.
-        drive: Share of the actuators' reach that is used.
-        rng: Source of the drive.
-        noise: Source of all that the sensors add.
-    """
+    """One measured run: ``rng`` drives it, ``noise`` is the source of all that the sensors add."""
     count = int(seconds / period) + 1
     times = period * np.arange(count, dtype=float)
     if sensors.jitter:
@@ -82,10 +71,10 @@ def record(
             sensors.jitter * noise.standard_normal(count - 2), -0.4, 0.4
         )
     reach = [drive * most for most in REACH[truth.system]]
-    slow = 8.0 if truth.system == "oven" else 1.0
+    thermal = truth.system == "oven"
+    slow = 8.0 if thermal else 1.0
     commands: list[Callable[[float], float]] = []
     breaks: list[float] = []
-    thermal = truth.system == "oven"
     for most in reach:
         if sensors.input_noise is None:
             level, jumps = _levels(times, most, slow, thermal, rng)
@@ -183,16 +172,22 @@ def records(
     truth: Truth, sensors: Sensors, layout: Layout, period: float, seconds: float,
     seed: Sequence[int],
 ) -> list[Trajectory]:  # fmt: skip
-    """A log: several runs driven harder and harder, one long run, or many short ones alike."""
+    """A log: several runs driven harder and harder, one long run, or many short ones alike.
+
+    Args:
+        truth: The system.
+        sensors: How it is measured.
+        layout: ``"ramp"``, ``"single"`` or ``"many"``.
+        period: Between samples in s.
+        seconds: Length of all runs together.
+        seed: Of drive and noise.
+    """
     drives: list[float] = {
-        "ramp": list(np.linspace(0.25, 1.0, 6)),
-        "single": [0.8],
-        "many": [0.8] * 12,
-    }[layout]
-    each = seconds / len(drives)
+        "ramp": np.linspace(0.25, 1.0, 6).tolist(), "single": [0.8], "many": [0.8] * 12
+    }[layout]  # fmt: skip
     found = []
     for number, share in enumerate(drives):
         rng, noise = np.random.default_rng([*seed, number]).spawn(2)
-        name = f"run {number + 1:02d}"
-        found.append(record(truth, sensors, name, period, each, share, rng, noise))
+        name, each = f"run {number + 1:02d}", seconds / len(drives)
+        found.append(_record(truth, sensors, name, period, each, share, rng, noise))
     return found

@@ -107,17 +107,8 @@ def accelerations(
     return [aa, (m11 * r2 - couple * r1) / det - aa]
 
 
-def command_path(truth: Truth, commands: Sequence[Input]) -> list[Input]:
-    """What reaches the actuators, but for a lag."""
-    names = INPUTS[truth.system]
-    found = []
-    for name, command in zip(names, commands, strict=True):
-        own = truth.where == name
-        found.append(_shaped(truth.effect, truth.strength, command) if own else command)
-    return found
-
-
 def _shaped(effect: str, s: float, command: Input) -> Input:
+    """What reaches an actuator, but for a lag."""
     if effect == "actuator_gain":
         return lambda t: (1 + s) * command(t)
     if effect == "actuator_bias":
@@ -148,7 +139,10 @@ def simulate(
     """
     system, p = truth.system, truth.parameters()
     c, thermal = len(start), truth.system == "oven"
-    paths = command_path(truth, commands)
+    paths = [
+        _shaped(truth.effect, truth.strength, command) if truth.where == name else command
+        for name, command in zip(INPUTS[system], commands, strict=True)
+    ]
     lagged = INPUTS[system].index(truth.where) if truth.effect == "actuator_lag" else -1
     at = COORDINATES[system].index(truth.where) if truth.where in COORDINATES[system] else -1
     mass = truth.flexible * INERTIA[system]
