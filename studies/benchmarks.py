@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from simgap_files import atomic_write_json, atomic_write_text, read_json
+from simgap_files import atomic_write_text, read_json
 from studies.reporting.render import render
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
@@ -29,24 +29,21 @@ ROOT = Path(__file__).resolve().parents[1]
 SUITE = Path("tests", "benchmarks")
 FIGURE = Path("images", "fit_scaling.png")
 MUJOCO = "## MuJoCo models\n"
-# What takes most of the time: large fits, and the second problem size of DDPG.
-QUICK = "not leo and not 15000 and not 100000 and not (3750 and GaussianProcessRegressor)"
 
 
 def build_parser() -> Parser:
     """The command line."""
     parser = Parser(prog="python -m studies.benchmarks", description=__doc__)
     parser.add_argument(
-        "--quick", action="store_true",
-        help="leave out what takes longest: many points, scikit-learn's Gaussian process at 3750",
-    )  # fmt: skip
-    parser.add_argument(
         "--mujoco", action="store_true",
         help="MuJoCo models instead: speed beside mujoco.rollout, and find_gap beside MuJoCo's own "
         "system identification (extra mujoco[sysid])",
     )  # fmt: skip
-    parser.add_argument("--read", type=str | None, help="tables of this JSON; measure nothing")
-    parser.add_argument("--json", type=str | None, help="keep what was measured in this file")
+    parser.add_argument(
+        "--read",
+        type=str | None,
+        help="tables of what pytest --benchmark-json wrote; measure nothing",
+    )
     parser.add_argument(
         "--output", type=str | None,
         help="write the Markdown to this file too, and its figure into images/ beside it",
@@ -54,12 +51,11 @@ def build_parser() -> Parser:
     return parser
 
 
-def run_suite(target: Path, quick: bool) -> bool:
+def run_suite(target: Path) -> bool:
     """Run the benchmarks in a process of their own; progress goes to stderr.
 
     Args:
         target: JSON file to write.
-        quick: Leave out what takes longest.
 
     Returns:
         Whether every benchmark passed.
@@ -71,7 +67,6 @@ def run_suite(target: Path, quick: bool) -> bool:
     check_suite()
     command = [sys.executable, "-m", "pytest", str(SUITE), "-o", "addopts=", "--benchmark-only"]
     command += ["--benchmark-json", str(target), "-q", "-rs", "-p", "no:cacheprovider"]
-    command += ["-k", QUICK] if quick else []
     done = subprocess.run(command, cwd=ROOT, env=os.environ | ONE_THREAD, stdout=sys.stderr)
     if not target.is_file() or not target.stat().st_size:
         raise ChildProcessError(
@@ -113,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if given.mujoco:
         robots(given.output)
         return
-    data, complete = measure(given.quick) if not given.read else (read_json(given.read), True)
+    data, complete = measure() if not given.read else (read_json(given.read), True)
     try:
         found = records(data)
     except ValueError as problem:
@@ -122,8 +117,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     page = document(data, picture is not None and write_figure(found, picture) is not None)
     page = joined(page, parts_of(given.output)[1])
     print(page)
-    if given.json:
-        atomic_write_json(given.json, data)
     if given.output:
         atomic_write_text(given.output, page)
     if not complete:
@@ -171,14 +164,14 @@ def joined(page: str, section: str) -> str:
     return f"{page.strip()}\n\n{section.strip()}".rstrip() + "\n"
 
 
-def measure(quick: bool) -> tuple[dict[str, Any], bool]:
+def measure() -> tuple[dict[str, Any], bool]:
     """Run the suite: what it measured, and whether every benchmark passed; see ``run_suite``."""
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder, "benchmarks.json")
-        complete = run_suite(target, quick)
+        complete = run_suite(target)
         data = read_json(target)
     # What decides the figures; where they are written to does not.
-    data["command"] = "python -m studies.benchmarks" + (" --quick" if quick else "")
+    data["command"] = "python -m studies.benchmarks"
     return data, complete
 
 

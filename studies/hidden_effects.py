@@ -44,7 +44,7 @@ from studies.hidden.rivals import one_step, regression, sparse
 from studies.hidden.scores import replaceable, score, score_names
 from studies.hidden.strengths import draw, truth
 from studies.running.command import Parser
-from studies.running.ending import check_output, fail, guarded
+from studies.running.ending import check_output, fail, guarded, run_as_imported
 from studies.running.progress import Progress
 from studies.running.trials import Execution, read_trials, run_trials, tell_failures, trial_folder
 
@@ -153,7 +153,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    # By its importable name, which worker processes need to find the same classes.
-    from studies import hidden_effects
-
-    hidden_effects.main()
+    run_as_imported("studies.hidden_effects")

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from jsonargparse.typing import NonNegativeInt, PositiveFloat, PositiveInt
+from jsonargparse.typing import PositiveInt
 
 from studies.reporting.markdown import frame_markdown
 from studies.robots.cases import Case, Kind, ask, cases, nominal
@@ -43,9 +43,7 @@ def build_parser() -> Parser:
     )  # fmt: skip
     parser.add_argument("--hidden", type=str, nargs="*", help="hide these in place of a kind")
     parser.add_argument("--seeds", type=PositiveInt, default=1, help="how many seeds")
-    parser.add_argument("--first", type=NonNegativeInt, default=0, help="the first seed")
     parser.add_argument("--sample", type=PositiveInt | None, help="only so many, drawn at random")
-    parser.add_argument("--minutes", type=PositiveFloat, default=2.0, help="budget of each answer")
     parser.add_argument("--output", type=Path, required=True, help="JSON lines of answers")
     return parser
 
@@ -55,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     given = build_parser().parse_args(arguments)
     check_output(given.output.parent)
-    seeds = range(given.first, given.first + given.seeds)
+    seeds = range(given.seeds)
     if given.hidden:
         offered = [str(effect) for effect in nominal(given.robot).offered_effects()]
         for name in set(given.hidden) - set(offered):
@@ -65,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     else:
         wanted = list(cases(given.robot, given.kind, seeds))
     if given.sample:
-        order = np.random.default_rng(given.first).permutation(len(wanted))[: given.sample]
+        order = np.random.default_rng(0).permutation(len(wanted))[: given.sample]
         wanted = [wanted[i] for i in sorted(order)]
     try:
         known = _read(given.output)
@@ -76,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for number, case in enumerate(wanted, start=1):
         answer = known.get(_key(case))
         if answer is None:
-            answer = json.loads(json.dumps(ask(case, given.minutes)))
+            answer = json.loads(json.dumps(ask(case)))
             with given.output.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(answer) + "\n")
         answers.append(answer)

@@ -33,7 +33,7 @@ from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
 from studies.running.command import Parser
-from studies.running.ending import check_output, guarded
+from studies.running.ending import check_output, guarded, run_as_imported
 from studies.running.progress import Progress
 from studies.running.trials import Execution, run_trials, trial_folder
 
@@ -122,7 +122,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    # By its importable name, which worker processes need to find the same classes.
-    from studies.hidden import calibration
-
-    calibration.main()
+    run_as_imported("studies.hidden.calibration")

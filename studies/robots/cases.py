@@ -118,7 +118,7 @@ def _deviation(
     return float(np.median(np.abs(two - one).max(axis=(1, 2))))
 
 
-def ask(case: Case, minutes: float) -> dict[str, Any]:
+def ask(case: Case) -> dict[str, Any]:
     """Measure the robot and let find_gap answer.
 
     Returns:
@@ -134,7 +134,7 @@ def ask(case: Case, minutes: float) -> dict[str, Any]:
     logs = measure(case.robot, sizes, seed=case.seed, runs=runs)
     simulator = nominal(case.robot)
     begin = time.process_time()
-    result = find_gap(simulator, logs, minutes=minutes)
+    result = find_gap(simulator, logs)
     processor = time.process_time() - begin
     chosen = [v for v in result.verdicts if v.effect and v.kind in NAMES]
     forms = {verdict.label: {verdict.label, *verdict.form} for verdict in chosen}
