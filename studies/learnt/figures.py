@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from studies.learnt.statistics import mean
 from studies.learnt.words import Results, policy_name
-from studies.reporting.figures import PALETTE, draw_lines, draw_over_time, new_figure, styled
+from studies.reporting.figures import PALETTE, draw_lines, legend_above, new_figure, styled
 
 Drawn = tuple[Figure, pd.DataFrame]
 
@@ -71,11 +71,9 @@ def curves_figure(results: Results) -> Drawn:
     if series:
         figure.legend(loc="outside upper left", ncols=2, handlelength=1.4)
     rows = [
-        {"policy": name, "steps": a, "return": b}
-        for name, (x, y) in series.items()
-        for a, b in zip(x, y, strict=True)
+        pd.DataFrame({"policy": name, "steps": x, "return": y}) for name, (x, y) in series.items()
     ]
-    return figure, pd.DataFrame(rows)
+    return figure, pd.concat(rows) if rows else pd.DataFrame()
 
 
 def drawn_steps(dt: float) -> int:
@@ -103,9 +101,8 @@ def episodes_figure(
     if len(about["actions"]) == 1:
         wanted.append(("actions", 0, about["actions"][0]))
     figure, axes = new_figure(len(wanted), 1, height=1.2 + 1.7 * len(wanted), share_x=True)
-    rows, data = {}, []
-    for what, column, channel in wanted:
-        label = f"{channel['name']} ({channel['unit']})"
+    data = []
+    for axis, (what, column, channel) in zip(axes[:, 0], wanted, strict=True):
         series = {}
         for name, episode in episodes.items():
             values = episode[what][:steps, column]
@@ -114,10 +111,12 @@ def episodes_figure(
                 values = values - 2 * np.pi * np.round(values[-1] / (2 * np.pi))
             time = np.arange(len(values)) * about["dt"]
             series[name] = (time, values)
-            data.append(pd.DataFrame({"time_s": time, "policy": name, "channel": channel["name"],
-                                      "value": values}))  # fmt: skip
-        rows[label] = series
-    draw_over_time(figure, axes[:, 0], rows)
+            columns = {"time_s": time, "policy": name, "channel": channel["name"], "value": values}
+            data.append(pd.DataFrame(columns))
+        draw_lines(axis, series)
+        axis.set_ylabel(f"{channel['name']} ({channel['unit']})")
+    axes[-1, 0].set_xlabel("time (s)")
+    legend_above(figure, axes[0, 0])
     return figure, pd.concat(data, ignore_index=True)
 
 

@@ -30,11 +30,6 @@ def policy_name(record: Record) -> str:
     return POLICY_WORDS[record["name"]].format(**record)
 
 
-def by_name(results: Results, name: str) -> list[Record]:
-    """The records of one kind of policy, in order."""
-    return [record for record in results["policies"] if record["name"] == name]
-
-
 def measures_of(record: Record) -> dict[str, float]:
     """The mean of a policy's tests on the true system, by measure."""
     table = pd.DataFrame(record.get("tests", []))
@@ -64,8 +59,8 @@ def duration(seconds: float) -> str:
 def shown(results: Results) -> dict[str, str]:
     """The policies that pictures and films show: name of their files, and in words."""
     names = ("idealised", "difference", "corrected", "true")
-    last = [record for name in names for record in by_name(results, name)[-1:]]
-    return {record_key(record): policy_name(record) for record in last}
+    last = {record["name"]: record for record in results["policies"]}
+    return {record_key(last[name]): policy_name(last[name]) for name in names if name in last}
 
 
 def record_key(record: Record) -> str:

@@ -31,7 +31,7 @@ def judged(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
         ratio=errors["corrected"] / errors["oracle"],
         worsening=errors["corrected"] / errors["nominal"],
         clear=errors["nominal"] >= 1.5 * errors["oracle"],
-        either=data["covered"].where(data["covered"] != False, data["covered_truth"]),  # noqa: E712
+        either=data["covered"].where(data["covered"].eq(True), data["covered_truth"]),
         any_name=data["named"].map(bool),
         any_sure=data["sure"].map(bool),
         wrong=data["wrong_sure"].map(bool),
