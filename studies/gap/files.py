@@ -22,7 +22,7 @@ from studies.gap.forecasts import bars, rollouts, set_aside, tiles, where
 from studies.gap.lead import lead
 from studies.gap.verdicts import apart, banners, blind, evidence
 from studies.gap.words import found_once
-from studies.reporting import Code, Prose, Report, Section, Table
+from studies.reporting.sections import Code, Prose, Report, Section, Table
 from studies.running.versions import versions
 
 # Findings beyond these are in gap.json.

@@ -20,8 +20,7 @@ from studies.gap.words import (
     unit_text,
     with_unit,
 )
-from studies.reporting import Figure, Gallery, KeyValues, Prose, Section, Table
-from studies.reporting.sections import Cell
+from studies.reporting.sections import Cell, Figure, Gallery, KeyValues, Prose, Section, Table
 
 # Pictures of the same kind beyond these say nothing new.
 ROLLOUTS, PROFILES = 4, 6

@@ -17,8 +17,7 @@ from studies.gap.answer import (
 )
 from studies.gap.lead import lead
 from studies.gap.words import effect_name, names_of, set_name, unit_text
-from studies.reporting import Prose, Section, Table, Verdict
-from studies.reporting.sections import Cell
+from studies.reporting.sections import Cell, Prose, Section, Table, Verdict
 
 Tone = Literal["good", "warning", "bad", "neutral"]
 TONES: dict[str, Tone] = {

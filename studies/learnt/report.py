@@ -30,8 +30,8 @@ from studies.learnt.sections import (
 from studies.learnt.tables import apart, tables_of
 from studies.learnt.verdict import headline
 from studies.learnt.words import Results, measures_of, record_key, shown
-from studies.reporting import Animation, Code, Figure, Gallery, KeyValues, Report, Section
 from studies.reporting.figures import save_figure
+from studies.reporting.sections import Animation, Code, Figure, Gallery, KeyValues, Report, Section
 
 Episodes = Mapping[str, Mapping[str, np.ndarray]]
 #: Name of its file, the figure with its numbers, heading, what it shows, caption.

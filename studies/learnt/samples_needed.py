@@ -9,7 +9,7 @@ import pandas as pd
 
 from studies.learnt.statistics import mean
 from studies.learnt.words import NEAR, POLICY_WORDS, Results
-from studies.reporting import Section, Table
+from studies.reporting.sections import Section, Table
 
 
 def samples_section(

@@ -12,7 +12,7 @@ import pandas as pd
 from studies.learnt.errors import by_group, model_errors
 from studies.learnt.statistics import Mean, above, mean, starts
 from studies.learnt.words import POLICY_WORDS, duration
-from studies.reporting import Section, Table
+from studies.reporting.sections import Section, Table
 
 About = Mapping[str, Any]
 

@@ -15,7 +15,7 @@ import pandas as pd
 from studies.learnt.errors import by_group, model_errors, no_gap
 from studies.learnt.statistics import Mean, above, mean, return_text, starts
 from studies.learnt.words import NEAR, POLICY_WORDS, duration
-from studies.reporting import KeyValues, Section, Verdict
+from studies.reporting.sections import KeyValues, Section, Verdict
 
 About = Mapping[str, Any]
 Tone = Literal["good", "warning", "bad", "neutral"]

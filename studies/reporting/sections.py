@@ -1,4 +1,7 @@
-"""A report and its building blocks: frozen dataclasses, each with the template of its name."""
+"""A report and its building blocks: frozen dataclasses, each with the template of its name.
+
+``Report("Pendulum", "One update.", [Verdict("It works.", tone="good")]).write(path)``
+"""
 
 from __future__ import annotations
 

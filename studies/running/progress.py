@@ -47,18 +47,20 @@ def stderr() -> TextIO | Lines:
     return sys.stderr if sys.stderr.isatty() else Lines(sys.stderr)
 
 
+#: Numbers by name to draw as curves.
+Numbers = Mapping[str, float] | None
+
+
 class Advance(Protocol):
     """Says how far a step is."""
 
-    def __call__(
-        self, done: int, note: str = "", values: Mapping[str, float] | None = None
-    ) -> None:
+    def __call__(self, done: int, note: str = "", values: Numbers = None) -> None:
         """``done`` units of the step are done.
 
         Args:
             done: Units done so far.
             note: A few words for the user, such as ``"return -660"``.
-            values: Numbers by name to draw as curves over ``done``.
+            values: To draw as curves over ``done``.
         """
         ...
 
@@ -82,9 +84,7 @@ class Bars:
             bar_format="{desc} {percentage:3.0f}% |{bar:20}| {elapsed}<{remaining} {postfix}",
         ) as bar:  # fmt: skip
 
-            def advance(
-                done: int, note: str = "", values: Mapping[str, float] | None = None
-            ) -> None:
+            def advance(done: int, note: str = "", values: Numbers = None) -> None:
                 bar.set_postfix_str(note, refresh=False)
                 bar.update(done - bar.n)
 
@@ -103,9 +103,7 @@ class Several:
         with ExitStack() as stack:
             all_of_them = [stack.enter_context(each.task(title, total)) for each in self.others]
 
-            def advance(
-                done: int, note: str = "", values: Mapping[str, float] | None = None
-            ) -> None:
+            def advance(done: int, note: str = "", values: Numbers = None) -> None:
                 for each in all_of_them:
                     each(done, note, values)
 
@@ -135,9 +133,7 @@ class Curves:
         with contextlib.ExitStack() as stack:
             writer: SummaryWriter | None = None
 
-            def advance(
-                done: int, note: str = "", values: Mapping[str, float] | None = None
-            ) -> None:
+            def advance(done: int, note: str = "", values: Numbers = None) -> None:
                 nonlocal writer
                 if not values:
                     return

@@ -19,7 +19,7 @@ from typing import Any
 from tqdm import tqdm
 
 from simgap_files import atomic_write_json, read_json
-from studies.running.progress import Advance, stderr
+from studies.running.progress import Advance, Numbers, stderr
 
 STATUS = "status.json"
 WRITE_EVERY = 10.0  # seconds; hundreds of trials share a file system
@@ -39,7 +39,7 @@ class StatusFile:
         """A step of ``total`` units; written at its start and every ten seconds."""
         self._write(title, 0, total, "")
 
-        def advance(done: int, note: str = "", values: Mapping[str, float] | None = None) -> None:
+        def advance(done: int, note: str = "", values: Numbers = None) -> None:
             if time.monotonic() - self._written >= WRITE_EVERY:
                 self._write(title, done, total, note)
 
