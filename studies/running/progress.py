@@ -7,7 +7,6 @@ import re
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import Protocol, TextIO
 
@@ -68,7 +67,7 @@ class Advance(Protocol):
 class Progress(Protocol):
     """Told of every step that takes a while."""
 
-    def task(self, title: str, total: int) -> AbstractContextManager[Advance]:
+    def task(self, title: str, total: int) -> contextlib.AbstractContextManager[Advance]:
         """A context; inside, ``advance(done, note)`` says how far the step is."""
         ...
 
@@ -76,7 +75,7 @@ class Progress(Protocol):
 class Bars:
     """Progress bars: in a notebook its own, else on stderr, or lines there without a terminal."""
 
-    @contextmanager
+    @contextlib.contextmanager
     def task(self, title: str, total: int) -> Iterator[Advance]:
         """A bar of ``total`` units."""
         with tqdm(
@@ -97,10 +96,10 @@ class Several:
     def __init__(self, *others: Progress) -> None:
         self.others = others
 
-    @contextmanager
+    @contextlib.contextmanager
     def task(self, title: str, total: int) -> Iterator[Advance]:
         """A task of each."""
-        with ExitStack() as stack:
+        with contextlib.ExitStack() as stack:
             all_of_them = [stack.enter_context(each.task(title, total)) for each in self.others]
 
             def advance(done: int, note: str = "", values: Numbers = None) -> None:
