@@ -22,7 +22,7 @@ Record = dict[str, Any]
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Learnt:
-    """What the loop leaves.
+    """The result of the learning loop.
 
     Attributes:
         system: What it was about, in plain values.
