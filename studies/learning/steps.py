@@ -95,8 +95,7 @@ class Steps:
         settings: dict[str, Any] = {"policy": policy.key, "samples": samples, "update": update}
         if known:
             settings |= {"known": known.key, **self._estimator}
-        code = (self.estimator,) if known else ()
-        return self._kept("collect", settings, compute, Samples.load, *code)
+        return self._kept("collect", settings, compute, Samples.load)
 
     def fit(self, samples: Sequence[Samples]) -> Model:
         """The difference model on all transitions so far."""
@@ -121,7 +120,7 @@ class Steps:
             **self._estimator,
         }  # fmt: skip
         load = functools.partial(Model.load, unfitted=unfitted)
-        return self._kept("fit", settings, compute, load, self.estimator)
+        return self._kept("fit", settings, compute, load)
 
     def train(
         self,
@@ -141,7 +140,6 @@ class Steps:
             update: Which update it belongs to.
         """
         settings: dict[str, Any] = {"steps": steps, "update": update, "replay": self.replay}
-        code: tuple[Any, ...] = ()
         if isinstance(start, WarmStart):
             settings |= start.settings()
         elif start:
@@ -149,17 +147,15 @@ class Steps:
         if isinstance(on, Model):
             settings |= {"model": on.key, "uncertainty_penalty": self.uncertainty_penalty}
             settings |= self._estimator
-            code = (self.estimator,)
         elif on is not None:
             settings["on"] = settings_of(on)
-            code = (on,)
 
         def load(folder: Path, key: str) -> Training:
             env = self.system.environment(self.system.nominal)
             return Training.load(folder, key, self.algorithm, env)
 
         compute = functools.partial(train, self, kind, steps, start, on, update)
-        return self._kept(kind, settings, compute, load, *code)
+        return self._kept(kind, settings, compute, load)
 
     def measure(self, model: Model, policy: Training, update: int) -> Measured:
         """Accuracy of the model along fresh true rollouts of the policy trained on it."""
@@ -173,7 +169,7 @@ class Steps:
                 found["uniform"] = accuracy
             return Measured(jsonable(found))
 
-        return self._kept("measure", settings, compute, Measured.load, self.estimator)
+        return self._kept("measure", settings, compute, Measured.load)
 
     def corrected(self, model: Model) -> CorrectedSimulator:
         """The simulator at hand with a difference model."""
@@ -201,10 +197,11 @@ class Steps:
             "scaled": self.scaled,
         }
 
-    def _kept(self, name: str, settings: Any, compute: Any, load: Any, *code: Any) -> Any:
+    def _kept(self, name: str, settings: Any, compute: Any, load: Any) -> Any:
         if self.keeper is None:
             return compute()
         everything = {**self._common, **settings}
-        roots = [Steps, self.algorithm.kind(), *self.system.code(), *code]
+        # The classes of the estimator and of whatever else settings tell are among the modules.
+        roots = [Steps, self.algorithm.kind(), *self.system.code()]
         roots += sorted(modules_in(everything))
         return self.keeper.run(name, everything, roots, compute, load)

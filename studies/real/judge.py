@@ -50,21 +50,15 @@ class Named:
 def named(rig: Rig, simulator: HostSimulator, verdicts: Sequence[Verdict]) -> Named:
     """Compare verdicts with the key of a rig."""
     family = {str(effect): _family(effect, simulator) for effect in library(simulator)}
+    chosen = [v for v in verdicts if v.effect and v.kind in ("confirmed", "ambiguous")]
     right = []
     for accepted in rig.wanted:
-        found = "missing"
-        for verdict in verdicts:
-            label = verdict.label
-            offered = {label, *verdict.alternatives} if verdict.effect else set()
-            if not offered & accepted or verdict.kind not in ("confirmed", "ambiguous"):
-                continue
-            if verdict.kind == "confirmed" and label in accepted:
-                found = "confirmed"
-                break
-            if found == "missing":
-                families = {family.get(name, name) for name in offered}
-                found = f"one of {len(families)}"
-        right.append(found)
+        offers = [{v.label, *v.alternatives} for v in chosen]
+        families = [{family.get(name, name) for name in some} for some in offers if some & accepted]
+        if any(v.kind == "confirmed" and v.label in accepted for v in chosen):
+            right.append("confirmed")
+        else:
+            right.append(f"one of {len(families[0])}" if families else "missing")
     sure = [v.label for v in verdicts if v.kind == "confirmed" and v.effect]
     return Named(tuple(right), tuple(label for label in sure if label not in rig.allowed))
 
