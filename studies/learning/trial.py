@@ -149,9 +149,7 @@ def code_of_trial(study: Study, config: Config) -> str:
     system = study.system_of(trial)
     corrected = [] if trial.corrected is None else [trial.corrected]
     settings = [fingerprint(system), settings_of(trial.estimator), settings_of(corrected)]
-    code = code_of(
-        run_trial, study.trial, study.system, *system.code(), trial.estimator,
-        trial.algorithm.kind(), *corrected, *sorted(modules_in(settings)),
-    )  # fmt: skip
+    roots = [run_trial, study.trial, study.system, *system.code(), trial.algorithm.kind()]
+    code = code_of(*roots, *sorted(modules_in(settings)))
     told = json.dumps([settings, code], sort_keys=True)
     return hashlib.sha256(told.encode()).hexdigest()
