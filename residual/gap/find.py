@@ -10,32 +10,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.aliases import aliases, representatives
-from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
-from residual.gap.candidates import Candidate, candidates
-from residual.gap.confirmation import CLEARLY
-from residual.gap.conventions import otherwise
-from residual.gap.data import examine
-from residual.gap.excerpt import excerpt
-from residual.gap.explain import Explanation, explain
-from residual.gap.free_parameters import better, worth_freeing
-from residual.gap.horizon import usual_horizon
-from residual.gap.known import KNOWN
-from residual.gap.numerics import (
-    fits_better,
-    forecast_error,
-    held_as,
-    held_otherwise,
-    how_held,
-    stride_for,
-)
-from residual.gap.prepare import Prepared, prepare
+from residual.gap.answer.answer import confirm, judged_apart, matters, summed_up, told
+from residual.gap.answer.free_parameters import better, worth_freeing
+from residual.gap.confirmation.aliases import aliases, representatives
+from residual.gap.confirmation.certainty import CLEARLY
+from residual.gap.confirmation.numerics import fits_better, forecast_error
+from residual.gap.confirmation.twins import exact_twins, with_twins
+from residual.gap.data.examine import examine
+from residual.gap.data.excerpt import excerpt
+from residual.gap.fitting.smooth import LEAD, SmoothFitter
+from residual.gap.model.candidates import Candidate, candidates
+from residual.gap.model.workers import workers
+from residual.gap.preparation.conventions import otherwise
+from residual.gap.preparation.horizon import usual_horizon
+from residual.gap.preparation.numerics import held_as, held_otherwise, how_held, stride_for
+from residual.gap.preparation.prepare import Prepared, prepare
+from residual.gap.preparation.suited import beyond_noise, horizon_of_windows, needs_closer_rows
 from residual.gap.result import GapResult
-from residual.gap.search import Search
-from residual.gap.smooth import LEAD, SmoothFitter
-from residual.gap.suited import beyond_noise, horizon_of_windows, needs_closer_rows
-from residual.gap.twins import exact_twins, with_twins
-from residual.gap.workers import workers
+from residual.gap.search.explain import Explanation, explain
+from residual.gap.search.known import KNOWN
+from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
 from sims.contract import refuse_unsound
 from sims.effects.base import Effect
@@ -80,7 +74,7 @@ def find_gap(
         measured_input: True if the logged inputs were measured at the actuator's output; what
             happens before that (dead zone, saturation, lag) is then no candidate.
         horizon: Forecast length in seconds; by default a third of the usual period of the motion,
-            see ``residual.gap.horizon``.
+            see ``residual.gap.preparation.horizon``.
         parameter_tolerance: How well the simulator's parameters are known, as a share of each: an
             effect is certain only if they cannot stand in for it within that, and its interval
             allows for them. 0 takes them for exact, so that intervals are of the data alone.
