@@ -11,6 +11,8 @@ Or walks of the true Leo under a policy that studies.leo_gap learnt (docs/leo.md
 steps of a fifth of the simulator's; one CSV file per episode, cut at its fall.
 
   python -m studies.make_log --system leo --policy idealised.safetensors --output walks
+  python -m studies.make_log --system leo --policy idealised.safetensors \
+      --learner stable_baselines3.SAC --output walks
 """
 
 from __future__ import annotations
