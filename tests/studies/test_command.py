@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 from residual.gap.data.windows import Windows
 from residual.logs.units import find_unit
+from studies import learn
 from studies.learning.settings import build_parser
 from studies.pendulum_gap import STUDY
 from studies.running import ending
@@ -260,3 +261,13 @@ def test_what_is_not_there_is_named(name, arguments, says, capsys, tmp_path, mon
     assert said.startswith("error: ") and said.count("\n") == 1
     assert says in said
     assert not Path("out").exists()
+
+
+def test_a_system_file_that_is_no_python_is_the_users(tmp_path, monkeypatch, capsys):
+    (tmp_path / "unclosed.py").write_text("from sims import System\n\nSYSTEM = System('x',\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SystemExit, match="2"):
+        learn.main(["--system", "unclosed.SYSTEM", "--output", str(tmp_path / "out")])
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and f"{tmp_path / 'unclosed.py'}, line 3" in said
+    assert "never closed" in said and not (tmp_path / "out").exists()

@@ -255,7 +255,7 @@ def test_an_argument_of_another_kind_is_one_line(name, given, says):
 
 def test_without_an_update_there_is_no_model():
     with pytest.raises(ValueError, match="no update was made"):
-        _ = Learnt.of(SYSTEM).model
+        Learnt.of(SYSTEM).model  # noqa: B018
 
 
 def test_systems_of_one_file_have_folders_of_their_own():

@@ -1,20 +1,10 @@
-"""Files of one's own that do not run, or that fail while they run, end in one line."""
+"""Files of one's own that fail while they run end in one line."""
 
 from pathlib import Path
 
 import pytest
 
 from studies import learn
-
-
-def test_a_system_file_that_is_no_python_is_the_users(tmp_path, monkeypatch, capsys):
-    (tmp_path / "unclosed.py").write_text("from sims import System\n\nSYSTEM = System('x',\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(SystemExit, match="2"):
-        learn.main(["--system", "unclosed.SYSTEM", "--output", str(tmp_path / "out")])
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and f"{tmp_path / 'unclosed.py'}, line 3" in said
-    assert "never closed" in said and not (tmp_path / "out").exists()
 
 
 def test_a_sensor_that_drops_out_ends_the_run_and_leaves_no_step(tmp_path, monkeypatch, capsys):
