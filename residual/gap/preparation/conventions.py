@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.fitting.contract import Fitter
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model import paths
 from residual.gap.model.model import Model
@@ -53,8 +54,10 @@ class Convention:
     inputs: Array
 
 
-def otherwise(simulator: HostSimulator, fitter: SmoothFitter) -> Conventions | None:
+def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
     """Conventions with which the nominal simulator forecasts far better.
+
+    Not asked of systems that strike the ground, whose forecasts are too short for it.
 
     Args:
         simulator: The nominal simulator.
@@ -63,6 +66,8 @@ def otherwise(simulator: HostSimulator, fitter: SmoothFitter) -> Conventions | N
     Returns:
         The best of them and what is as good; None where none is.
     """
+    if not isinstance(fitter, SmoothFitter):
+        return None
     own = _error(simulator, fitter, _as_said(simulator))
     if own < POOR:
         return None
