@@ -35,6 +35,7 @@ DOUBTS: dict[Doubt, str] = {
     "unsteady": "its size differs between parts of the data",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
+    "may_be_at_bound": "its interval ends at its bound, as if it wanted to be larger",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
     "no_time": "there was no time to ask whether parameters that are a few percent off would do as "
     "well, give more --minutes",

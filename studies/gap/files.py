@@ -15,7 +15,7 @@ import yaml
 
 from residual.gap import GapResult
 from residual.logs import Finding
-from simgap_files import atomic_write_text, write_sealed
+from simgap_files import atomic_write_text, flush_to_disk, write_sealed
 from sims.loading import corrected_settings
 from sims.model_files import relative
 from studies.gap.forecasts import bars, rollouts, set_aside, tiles, where
@@ -176,6 +176,7 @@ def staged(folder: Path) -> Iterator[Path]:
         for source in sorted(path for path in stage.rglob("*") if path.is_file()):
             target = folder / source.relative_to(stage)
             target.parent.mkdir(parents=True, exist_ok=True)
+            flush_to_disk(source)
             os.replace(source, target)
     finally:
         shutil.rmtree(stage, ignore_errors=True)

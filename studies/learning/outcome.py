@@ -114,11 +114,11 @@ class Learnt:
     def __repr__(self) -> str:
         if not self.policies:
             return f"Learnt({self.system['name']}: nothing yet)"
-        first, last = self.policies[0], self._last()
+        first, last, updates = self.policies[0], self._last(), len(self.models)
         return (
             f"Learnt({self.system['name']}: return on the true system "
             f"{first['return_true']:.4g} -> {last['return_true']:.4g} "
-            f"with {last['true_samples']} true samples, {len(self.models)} updates)"
+            f"with {last['true_samples']} true samples, {updates} update{'s' * (updates != 1)})"
         )
 
     def _last(self) -> Mapping[str, Any]:
