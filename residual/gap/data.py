@@ -11,6 +11,7 @@ from collections.abc import Container, Sequence
 
 import numpy as np
 
+from residual.gap.copies import once
 from residual.gap.inspection import (
     bounds,
     clipped,
@@ -60,7 +61,8 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
     Raises:
         ValueError: No answer could mean anything; the message says why and what to do.
     """
-    found = findings(simulator, trajectories)
+    trajectories, copied = once(trajectories)
+    found = [*copied, *findings(simulator, trajectories)]
     for finding in found:
         if finding.severity == "refuse":
             raise ValueError(f"{finding.where}: {finding.says}" if finding.where else finding.says)

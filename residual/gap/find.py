@@ -15,6 +15,7 @@ from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
 from residual.gap.candidates import Candidate, candidates
 from residual.gap.confirmation import CLEARLY
 from residual.gap.conventions import otherwise
+from residual.gap.copies import copies
 from residual.gap.data import examine
 from residual.gap.excerpt import excerpt
 from residual.gap.explain import Explanation, explain
@@ -112,6 +113,11 @@ def find_gap(
     chosen_by_user = horizon is not None
     horizon = horizon or usual_horizon(simulator, runs)
     runs, left_out = excerpt(runs, stride_for(runs, horizon))
+    quality += [
+        f"{copy.name} is set aside, and holds the same samples as {first.name}, which is fitted: "
+        "what is said of records set aside is no test"
+        for copy, first in copies(held, trajectories)[:1]
+    ]
     for says in [*quality, *left_out]:
         tell(says)
     tell("looking for effects that move alike")

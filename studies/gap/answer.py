@@ -26,6 +26,8 @@ from studies.gap.words import (
 
 #: Share of the gap without a name that is a footnote.
 FOOTNOTE = 0.02
+#: Verdicts that name no effect.
+NAMELESS = ("unexplained", "calibrated", "needs_data", "no_gap")
 #: Part of an interval below which one with an exact simulator is worth a line.
 MUCH = 0.7
 
@@ -200,10 +202,12 @@ def span(number: Number) -> str:
 def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
     gap = result.gap
     found = [f"{gap.windows_after:.3g} times the noise is left"]
+    few = gap.blocks < TOO_FEW and all(v.kind in NAMELESS for v in result.verdicts)
     if result.adequate:
         times = gap.after.value / max(gap.noise_floor.value, 1e-300)
-        found = [f"nothing of the library explains it: forecasts err {times:.3g} times as by noise"]
-    if gap.blocks < TOO_FEW and not result.effects:
+        by = f"forecasts err {times:.3g} times as by noise"
+        found = [by if few else f"nothing of the library explains it: {by}"]
+    if few:
         more = duration_text((TOO_FEW - gap.blocks) * gap.horizon_s)
         found.append(
             f"nothing is named from {gap.blocks} {_blocks(gap)} of data, {TOO_FEW} are needed: "

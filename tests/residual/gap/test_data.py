@@ -148,3 +148,27 @@ def test_a_simulator_that_breaks_down_on_a_recorded_state_is_refused_with_its_ti
 
     with pytest.raises(ValueError, match=r"run: .* returns (nan|-?inf) for .* at [\d.]+ s"):
         examine(Broken(), [noisy()])
+
+
+def test_a_record_that_is_given_twice_counts_once():
+    logs = make_logs(Truth(), 3, "strong", "A", 5)
+    again = dataclasses.replace(logs[1], name="copy.csv", times=logs[1].times + 100.0)
+    examined = examine(PendulumEquation(), [*logs, again])
+    assert [run.name for run in examined.trajectories] == [run.name for run in logs]
+    (told,) = [one for one in examined.findings if one.kind == "copy"]
+    assert told.where == "copy.csv"
+    assert logs[1].name in told.says
+    assert not [one for one in examine(PendulumEquation(), logs).findings if one.kind == "copy"]
+
+
+def test_records_at_rest_are_alike_and_no_copies():
+    rest = Trajectory("rest", 0.1 * np.arange(30), np.zeros((30, 2)), np.zeros((29, 1)))
+    logs = [*swings(1.0), rest, dataclasses.replace(rest, name="rest again")]
+    assert len(examine(PendulumEquation(), logs).trajectories) == 3
+
+
+def test_a_record_set_aside_that_is_fitted_too_is_told():
+    logs = make_logs(Truth(), 4, "strong", "A", 5)
+    copy = dataclasses.replace(logs[0], name="test.csv")
+    found = find_gap(PendulumEquation(), logs, held=[copy], effects=["mass"], minutes=0.2)
+    assert any("test.csv" in says and "is no test" in says for says in found.quality)
