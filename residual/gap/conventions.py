@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap import paths
+from residual.gap.confirmation import CLEARLY
 from residual.gap.model import Model
-from residual.gap.result import Conventions
+from residual.gap.result import Conventions, Gap
 from residual.gap.smooth import SmoothFitter
 from residual.logs.units import UNITS, Unit, units_of
 from sims.host import HostSimulator
@@ -77,6 +78,11 @@ def otherwise(simulator: HostSimulator, fitter: SmoothFitter) -> Conventions | N
     return Conventions(alike, own / least)
 
 
+def outdone(conventions: Conventions, table: Gap) -> bool:
+    """Whether what was named explains clearly more than counting otherwise does."""
+    return table.before.value > CLEARLY * conventions.times * table.after.value
+
+
 def _conventions(simulator: HostSimulator, fitter: SmoothFitter) -> list[Convention]:
     """What a column map may have to say: signs, zeros of angles, units."""
     found = []
@@ -102,8 +108,6 @@ def _turned(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
     """Counted the other way round, or from a quarter or half turn away."""
     channels = [simulator.physical_channels[i] for i in joint]
     first = channels[0]
-    if first.kind == "other":
-        return []
     turns = (first.angle or first.unit == "rad") and first.kind == "position"
     found = []
     for sign, zero in itertools.product((1.0, -1.0), QUARTERS if turns else QUARTERS[:1]):
