@@ -27,6 +27,7 @@ from residual.gap.inspection import (
 )
 from residual.gap.kinematics import kinematics
 from residual.gap.nominal import nominal
+from residual.gap.wild_inputs import without_wild_inputs
 from residual.logs.checks import Finding
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
@@ -62,7 +63,8 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
         ValueError: No answer could mean anything; the message says why and what to do.
     """
     trajectories, copied = once(trajectories)
-    found = [*copied, *findings(simulator, trajectories)]
+    trajectories, wild = without_wild_inputs(simulator, trajectories)
+    found = [*copied, *wild, *findings(simulator, trajectories)]
     for finding in found:
         if finding.severity == "refuse":
             raise ValueError(f"{finding.where}: {finding.says}" if finding.where else finding.says)

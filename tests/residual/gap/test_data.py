@@ -172,3 +172,39 @@ def test_a_record_set_aside_that_is_fitted_too_is_told():
     copy = dataclasses.replace(logs[0], name="test.csv")
     found = find_gap(PendulumEquation(), logs, held=[copy], effects=["mass"], minutes=0.2)
     assert any("test.csv" in says and "is no test" in says for says in found.quality)
+
+
+def spoilt(value, rows=(100,)):
+    """Logs whose first voltage is wild in some samples."""
+    logs = make_logs(Truth(), 2, "strong", "A", 5)
+    volts = np.array(logs[0].actions)
+    volts[list(rows), 0] = value
+    return [dataclasses.replace(logs[0], actions=volts), logs[1]]
+
+
+class Unbounded(PendulumEquation):
+    """A pendulum of which nobody said what it can be told."""
+
+    action_channels = (dataclasses.replace(PendulumEquation.action_channels[0], low=-np.inf,
+                                           high=np.inf),)  # fmt: skip
+
+
+@pytest.mark.parametrize("simulator", [PendulumEquation(), Unbounded()])
+def test_a_record_is_cut_at_a_command_that_nobody_can_have_meant(simulator):
+    logs = spoilt(3000.0)
+    examined = examine(simulator, logs)
+    (told,) = [one for one in examined.findings if one.kind == "wild"]
+    assert told.where == "voltage"
+    assert "3000 V in 1 of" in told.says
+    assert [len(run.times) for run in examined.trajectories] == [
+        101, len(logs[0].times) - 101, len(logs[1].times)
+    ]  # fmt: skip
+    assert max(np.abs(run.actions).max() for run in examined.trajectories) < 10
+
+
+@pytest.mark.parametrize(("value", "rows"), [(3000.0, (100, 101)), (20.0, (100,))])
+def test_a_command_that_may_have_been_meant_is_left(value, rows):
+    """A kick of two samples, or one not so far beyond the others."""
+    examined = examine(Unbounded(), spoilt(value, rows))
+    assert len(examined.trajectories) == 2
+    assert not [one for one in examined.findings if one.kind == "wild"]
