@@ -19,7 +19,7 @@ from residual.gap.confirmation import CLEARLY
 from residual.gap.model import Model
 from residual.gap.result import Conventions, Gap
 from residual.gap.smooth import SmoothFitter
-from residual.logs.units import UNITS, Unit, units_of
+from residual.logs.units import Unit, find_unit, units_of
 from sims.host import HostSimulator
 from sims.simulator import Channel
 
@@ -135,7 +135,7 @@ def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Conv
 
 
 def _other_units(channel: Channel) -> list[tuple[str, Unit]]:
-    units = [(name, UNITS[name]) for name in units_of(channel.unit)]
+    units = [(name, find_unit(name, channel.unit)) for name in units_of(channel.unit)]
     return [(name, unit) for name, unit in units if (unit.factor, unit.offset) != (1.0, 0.0)]
 
 

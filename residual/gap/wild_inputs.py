@@ -21,7 +21,7 @@ Mask = NDArray[np.bool_]
 #: where none are declared, if it was not meant.
 BEYOND_BOUNDS, BEYOND_OTHERS = 3.0, 20.0
 #: No more than this share of all commands are accidents.
-FEW = 0.01
+FEW = 0.05
 #: Samples of the shortest piece that is kept.
 SHORTEST = 5
 

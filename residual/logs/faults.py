@@ -19,8 +19,12 @@ Mask = NDArray[np.bool_]
 _WILD = 8.0
 # More of them than this share are noise with heavy tails, no accidents.
 _RARE = 0.01
+# But none reaches out of nine tenths of all samples by so many times their range, in up to so many.
+_ABSURD, _SOME = 100.0, 0.1
 # Equal samples in a row that a moving channel does not have by chance.
 _STILL = 10
+# Changes that say how a channel scatters, and the part of them that turn back where it is noise.
+_KNOWN, _TURNS = 50, 0.3
 # A sensor that thaws leaps so many times as far as it moves after that; what breaks away speeds up.
 _CATCHES_UP = 2.0
 # Samples in a row at the end of a sensor's range.
@@ -58,8 +62,23 @@ def wild_samples(runs: Sequence[Array]) -> list[Mask]:
                     & (np.abs(before + after) < 0.3 * least)
                 )
         found.append(mask)
-    share = sum(int(mask.sum()) for mask in found) / max(1, sum(map(len, runs)))
-    return found if share <= _RARE else [np.zeros(len(values), bool) for values in runs]
+    if _share(found) <= _RARE:
+        return found
+    absurd = [mask & far for mask, far in zip(found, _absurd(runs), strict=True)]
+    return absurd if _share(absurd) <= _SOME else [np.zeros(len(own), bool) for own in runs]
+
+
+def _share(masks: Sequence[Mask]) -> float:
+    return sum(int(mask.sum()) for mask in masks) / max(1, sum(map(len, masks)))
+
+
+def _absurd(runs: Sequence[Array]) -> list[Mask]:
+    """Values that lie out of what nine in ten are by a hundred times their range."""
+    low, high = np.nanquantile(np.concatenate(list(runs)), [0.05, 0.95])
+    reach = _ABSURD * (high - low)
+    if not reach > 0:
+        return [np.zeros(len(values), bool) for values in runs]
+    return [(values > high + reach) | (values < low - reach) for values in runs]
 
 
 def dropped_samples(runs: Sequence[Array], turn: float = 0.0) -> list[Mask]:
@@ -126,7 +145,9 @@ def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) 
 
     A system at rest gives equal samples too, and dry friction stops it at once. A frozen sensor
     does not slow down before, and has to catch up when it thaws, by more than it moves from then
-    on; if it does not thaw, only another sensor can tell.
+    on; if it does not thaw, only another sensor can tell. Where samples scatter so that two are
+    hardly ever equal, ten in a row are no rest either, but for those at zero or at an end of the
+    range, where sensors hold still.
 
     Args:
         runs: As for ``wild_samples``.
@@ -142,10 +163,15 @@ def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) 
     if not moving.size:
         return found
     typical, step = float(np.median(moving)), rounding(runs)
+    known = np.concatenate(list(runs))
+    noisy, ends = _noisy(runs), (0.0, np.nanmin(known), np.nanmax(known))
     others = moved or [np.zeros(len(change)) for change in changes]
     for values, change, other, mask in zip(runs, changes, others, found, strict=True):
         for a, b in _stretches(change == 0):  # samples a to b are equal
             if b - a < _STILL or a < 3:
+                continue
+            if noisy and values[a] not in ends:
+                mask[a + 1 : b + 1] = True
                 continue
             least = max(_WILD * typical, 2.1 * step)
             leap, after = np.abs(np.diff(values[b : b + 3], append=[np.nan, np.nan]))[:2]
@@ -155,6 +181,21 @@ def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) 
             if (thawed or contradicted) and _in_full_motion(values[a - 3 : a + 1], entry, 1):
                 mask[a + 1 : b + 1] = True
     return found
+
+
+def _noisy(runs: Sequence[Array]) -> bool:
+    """Whether samples scatter more than they are rounded, and more than the channel moves."""
+    steps = [np.diff(values) for values in runs]
+    for step in steps:
+        for a, b in _stretches(step == 0):
+            if b - a >= _STILL:
+                step[a:b] = np.nan
+    loose = np.concatenate(steps)
+    loose = loose[np.isfinite(loose)]
+    if len(loose) < _KNOWN:
+        return False
+    turns = float((loose[1:] * loose[:-1] < 0).mean())
+    return bool((loose == 0).mean() <= _RARE and turns >= _TURNS)
 
 
 def _in_full_motion(values: Array, least: float, steps: int) -> bool:

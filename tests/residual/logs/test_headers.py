@@ -84,3 +84,19 @@ def test_a_log_without_times_is_told_what_to_say(tmp_path):
     assert "no column 'time'" in message
     assert "time: {column: NAME, unit: s}" in message
     assert "period: 0.01" in message
+
+
+@pytest.mark.parametrize(("unit", "header", "factor", "zero"), [
+    ("kPa", "pressure [bar]", 0.01, 0.0), ("kPa", "pressure (Pa)", 1000.0, 0.0),
+    ("degC", "pressure [K]", 1.0, 273.15), ("degC", "pressure [degF]", 1.8, 32.0),
+    ("%", "pressure [1]", 0.01, 0.0),
+])  # fmt: skip
+def test_a_channel_may_count_in_another_unit_than_that_of_the_table(
+    tmp_path, unit, header, factor, zero
+):
+    """As the temperatures of a tutorial do."""
+    values = 20 + np.sin(0.1 * np.arange(50))
+    channels = ((Channel("pressure", unit, "other"),), ())
+    logged = {"time": 0.1 * np.arange(50), header: factor * values + zero}
+    (run,) = read(write(tmp_path / "log.csv", logged), channels).trajectories
+    np.testing.assert_allclose(run.states[:, 0], values, rtol=1e-12)
