@@ -38,7 +38,7 @@ class Claim:
         slight: Whether they are without these, too: the parameters do nothing of its work.
         unasked: Whether there was no time to ask that.
         brief: Whether it is a time too short for the log's own clock.
-        counted: Whether the log may count otherwise than the simulator, which explains as much.
+        counted: Whether the log may count otherwise than the simulator does.
         gross: Whether it is a sensor further off than sensors are, beside a remainder.
         by_fit: Whether a fit to all data leaves three times as much without it: forecasts of single
             blocks may go astray all the same, where motion hangs on a hair.

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap import paths
-from residual.gap.confirmation import CLEARLY
 from residual.gap.model import Model
-from residual.gap.result import Conventions, Gap
+from residual.gap.result import Conventions
 from residual.gap.smooth import SmoothFitter
 from residual.logs.units import Unit, find_unit, units_of
 from sims.host import HostSimulator
@@ -76,11 +75,6 @@ def otherwise(simulator: HostSimulator, fitter: SmoothFitter) -> Conventions | N
         return None
     alike = tuple(one.says for error, one in errors if error < ALIKE * least)
     return Conventions(alike, own / least)
-
-
-def outdone(conventions: Conventions, table: Gap) -> bool:
-    """Whether what was named explains clearly more than counting otherwise does."""
-    return table.before.value > CLEARLY * conventions.times * table.after.value
 
 
 def _conventions(simulator: HostSimulator, fitter: SmoothFitter) -> list[Convention]:

@@ -14,7 +14,7 @@ from residual.gap.aliases import aliases, representatives
 from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
 from residual.gap.candidates import Candidate, candidates
 from residual.gap.confirmation import CLEARLY
-from residual.gap.conventions import otherwise, outdone
+from residual.gap.conventions import otherwise
 from residual.gap.copies import copies
 from residual.gap.data import examine
 from residual.gap.excerpt import excerpt
@@ -204,7 +204,7 @@ def find_gap(
         )
         clock.lap("confirm")
         table = summed_up(answer)
-        if conventions is not None and not outdone(conventions, table):
+        if conventions is not None:  # it is asked first, so that nothing is certain before
             doubted = [dataclasses.replace(claim, counted=True) for claim in answer.claims]
             answer = dataclasses.replace(answer, claims=tuple(doubted))
         apart = None

@@ -123,7 +123,7 @@ def effect_verdict(
     if claim.brief:
         says.append("shorter than half a sample, as late time stamps and filters in sensors are")
     if claim.counted:
-        says.append("the log may count otherwise than the simulator, which explains as much")
+        says.append("the log may count otherwise than the simulator")
     if claim.gross:
         says.append("a sensor is seldom wrong by a fifth of all that it showed")
     if not claim.needed:

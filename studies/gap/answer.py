@@ -37,7 +37,7 @@ DOUBTS: dict[Doubt, str] = {
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
-    "conventions": "the log may count otherwise than the simulator, which explains as much",
+    "conventions": "it has to be seen first whether the log counts as the simulator does",
     "gross": "a sensor is seldom wrong by a fifth of all that it showed, and something that the "
     "library lacks may look so",
     "no_time": "there was no time to ask whether parameters that are a few percent off would do as "

@@ -118,11 +118,15 @@ def test_a_turned_sign_of_any_channel_is_told():
     assert "`scale: -1` for room" in found.changes
 
 
-def test_nothing_is_certain_that_another_sign_explains_as_well():
+@pytest.mark.parametrize("factor", [-1.0, 1000.0])
+def test_nothing_is_certain_before_it_is_seen_how_the_log_counts(factor):
     run = log((CoulombFriction("pivot", 0.003),))
-    offered = ["actuator_gain@voltage", "delay@voltage", "coulomb_friction@pivot"]
-    turned = dataclasses.replace(run, actions=-run.actions)
-    found = find_gap(PendulumEquation(dt=0.02), [turned], effects=offered, minutes=0.5)
+    offered = ["mass", "delay@voltage", "coulomb_friction@pivot"]
+    wrong = dataclasses.replace(run, actions=factor * run.actions)
+    free = dataclasses.replace(PendulumEquation.action_channels[0], low=-np.inf, high=np.inf)
+    simulator = PendulumEquation(dt=0.02)
+    simulator.action_channels = (free,)
+    found = find_gap(simulator, [wrong], effects=offered, minutes=0.5)
     named = [v for v in found.verdicts if v.kind in ("confirmed", "ambiguous")]
     assert found.conventions is not None
     assert named

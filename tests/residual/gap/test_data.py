@@ -208,3 +208,13 @@ def test_a_command_that_may_have_been_meant_is_left(value, rows):
     examined = examine(Unbounded(), spoilt(value, rows))
     assert len(examined.trajectories) == 2
     assert not [one for one in examined.findings if one.kind == "wild"]
+
+
+@pytest.mark.parametrize("step", [0.05, 0.12, 0.2])
+def test_a_coarse_encoder_is_no_reason_to_blame_the_rate(step):
+    """In most stretches its angle does not change at all."""
+    (run,) = swings(1.0)
+    coarse = np.round(run.states / np.array([step, 1e-9])) * np.array([step, 1e-9])
+    noisy = coarse + np.random.default_rng(0).standard_normal(coarse.shape) * np.array([0.0, 0.02])
+    coarse = dataclasses.replace(run, states=noisy)
+    assert kinematics(PendulumEquation(), [coarse])[1] == []
