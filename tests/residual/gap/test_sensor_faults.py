@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from swing import changed, kinds, noisy, sticking
 
 from residual.gap.data import examine, findings
-from residual.logs.faults import dropped_samples, frozen_samples, wild_samples
+from residual.logs.faults import dropped_samples, wild_samples
+from residual.logs.frozen import frozen_samples
 from residual.trajectories import Trajectory
 from sims.pendulum_equation import PendulumEquation
 
@@ -95,7 +96,6 @@ def test_a_frozen_encoder_is_told_when_it_thaws(row, count):
     assert np.isnan(done.trajectories[0].states[rows, 0]).all()
 
 
-@pytest.mark.xfail(strict=True, reason="a long freeze may go unseen, by where it begins and ends")
 @pytest.mark.parametrize(("row", "count"), [(160, 73), (160, 74), (285, 80)])
 def test_a_longer_freeze_is_told_too(row, count):
     run = turning()
@@ -190,3 +190,18 @@ def test_heavy_tails_are_noise():
     values = pressure(0)
     values[np.arange(10, 190, 25)] += 60.0
     assert not wild_samples([values])[0].any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_frozen_reading_of_what_rises_amid_noise_is_told_when_it_catches_up(seed):
+    for noise in (0.0, 0.3):
+        values = pressure(seed, noise, 0.001)
+        values[30:45] = values[30]
+        assert frozen_samples([values])[0][31:45].all()
+    values[45:] -= values[45] - values[44] - 1.0  # what stuck goes on from where it was
+    values[30:45] = values[30]
+    assert not frozen_samples([np.round(values)])[0].any()
+
+
+def test_stairs_are_not_frozen():
+    assert not frozen_samples([np.repeat(np.arange(20.0), 12)])[0].any()
