@@ -29,8 +29,8 @@ USUAL_STARTS = 5
 class EvaluationProtocol:
     """How policies are tested while they learn and afterwards, and where accuracy is measured.
 
-    On a simulator tests are free; on the true system they are measurement and not counted, as
-    in the paper.
+    Tests on a simulator are free. Tests on the true system are not counted as samples, as in the
+    paper.
 
     Args:
         every: Steps of learning on a simulator between tests.
@@ -38,14 +38,14 @@ class EvaluationProtocol:
         episodes: Rollouts without noise per test, each from its own start state.
         noisy: Rollouts with a little noise per test on a model; they keep a policy from being
             chosen for one lucky path through the model's errors.
-        finalists: So many of the best policies of a training are tested once more at its end.
+        finalists: How many of the best policies of a training are tested once more at its end.
         final_episodes: Rollouts of each of them, from other starts; 0 for no final.
         true_episodes: Rollouts of the policy kept on the true system: the result. All policies of
             a seed begin in the same states. None: 5, or 1 where every reset gives the same state.
-        visited_seconds: Accuracy is measured over the first so many seconds of fresh rollouts, at
+        visited_seconds: Accuracy is measured over this many first seconds of fresh rollouts, at
             least 20 control periods.
         visited_rollouts: How many of those.
-        visited_stride: Open-loop predictions start at every so many-th state of them.
+        visited_stride: Open-loop predictions start at every n-th state of them, this being n.
     """
 
     every: int = 500
@@ -87,7 +87,7 @@ class System:
         shown: State channels drawn over time; by default the first three.
         path: Two state channels, along and up, of a place whose path is drawn.
         target: A return that counts as success, if there is one.
-        best: Computes the best return that is possible, if it can be known.
+        best: The best return that is possible, if it is known.
         elsewhere: Draws states (n, T + 1, n_s) and actions (n, T, n_a) of rollouts of the true
             system from anywhere, to compare with where policies go; by default uniformly, if the
             true system is a simulator.
@@ -111,7 +111,7 @@ class System:
     shown: tuple[str, ...] | None = None
     path: tuple[str, str] | None = None
     target: float | None = None
-    best: Callable[[], float] | None = None
+    best: float | None = None
     elsewhere: Callable[[np.random.Generator], tuple[Array, Array]] | None = None
     published: Mapping[str, str] = dataclasses.field(default_factory=dict)
     cold_noise_sigma: float = 0.20
@@ -243,5 +243,6 @@ class System:
             "shown": list(self.shown or [channel.name for channel in channels[:3]]),
             "path": list(self.path or []),
             "target": self.target,
+            "best": self.best,
             "published": dict(self.published),
         }

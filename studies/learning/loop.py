@@ -43,7 +43,7 @@ def run_loop(steps: Steps, budget: Budget, corrected: Simulator | None = None) -
         corrected: The simulator with what it lacked: a policy is trained on it as well, from the
             idealised one, without a true sample.
     """
-    learnt, samples, model = Learnt.of(steps.system), [], None
+    learnt, samples, model = Learnt(steps.system.description()), [], None
     policy = idealised = steps.train("idealised", budget.idealised_steps)
     learnt.add_policy("idealised", idealised)
     start = begin = WarmStart.begin(idealised, steps.replay)
@@ -126,7 +126,7 @@ def learn_by_difference(
         Policies, difference models and their accuracy, with ``report`` and ``plot``.
 
     Raises:
-        TypeError: An argument is no such object as it says.
+        TypeError: An argument is of another type than it should be.
         ValueError: The parts do not fit together, or a budget is too small to learn anything.
     """
     _expect("estimator", estimator, Regressor, "residual.Linear()")

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from residual.gap.blocks import Blocks
-from residual.gap.currency import Currency
-from residual.gap.windows import Windows
+from residual.gap.data.blocks import Blocks
+from residual.gap.data.windows import Windows
+from residual.gap.search.currency import Currency
 from sims.effects import (
     ActuatorGain,
     ConstantLoad,
@@ -81,7 +81,9 @@ class Toy:
         self.unfit, self.refused, self.nearly = set(), {}, set()
         self.candidates = [
             SimpleNamespace(
-                effect=e, label=str(e), knobs=(SimpleNamespace(field="change", strength=True),)
+                effect=e,
+                label=str(e),
+                knobs=(SimpleNamespace(field="change", strength=True, low=-1.0, high=1.0),),
             )
             for e in EFFECTS
         ]
