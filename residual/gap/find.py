@@ -97,6 +97,9 @@ def find_gap(
         answer, on_time = inquiry.confirmed(prepared, found, asked, parameter_tolerance)
         clock.lap("confirm")
 
+        if conventions is not None:  # it is asked first, so that nothing is certain before
+            doubted = [dataclasses.replace(claim, counted=True) for claim in answer.claims]
+            answer = dataclasses.replace(answer, claims=tuple(doubted))
         table, apart = summed_up(answer), None
         if held:
             others, _ = excerpt(

@@ -23,7 +23,7 @@ Kind = Literal[
 #: holds zero, or an effect of another kind does as well.
 Doubt = Literal[
     "not_needed", "unsteady", "numerics", "at_bound", "may_be_at_bound", "calibration", "slight",
-    "no_time", "clock", "may_be_zero", "share_may_be_zero", "rivals",
+    "no_time", "clock", "gross", "conventions", "may_be_zero", "share_may_be_zero", "rivals",
 ]  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from residual.gap.confirmation.aliases import aliases, representatives
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
 from residual.gap.confirmation.twins import exact_twins, with_twins
+from residual.gap.data.copies import copies
 from residual.gap.data.examine import examine
 from residual.gap.data.excerpt import excerpt
 from residual.gap.fitting.smooth import LEAD
@@ -87,6 +88,11 @@ def look(
     examined = examine(simulator, trajectories)
     simulator = simulator.for_motion([run.states for run in [*examined.trajectories, *held]])
     findings = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
+    findings += [
+        f"{copy.name} is set aside, and holds the same samples as {first.name}, which is fitted: "
+        "what is said of records set aside is no test"
+        for copy, first in copies(held, trajectories)[:1]
+    ]
     horizon = horizon or usual_horizon(simulator, examined.trajectories)
     every = examined.trajectories
     log = Log(simulator, every, every, horizon, findings, []).at(horizon)

@@ -16,13 +16,11 @@ Mask = NDArray[np.bool_]
 
 # A sample is wild if it leaves its neighbours, and comes back, by so many times what nearly all
 # changes between samples reach.
-_WILD = 8.0
+WILD = 8.0
 # More of them than this share are noise with heavy tails, no accidents.
-_RARE = 0.01
-# Equal samples in a row that a moving channel does not have by chance.
-_STILL = 10
-# A sensor that thaws leaps so many times as far as it moves after that; what breaks away speeds up.
-_CATCHES_UP = 2.0
+RARE = 0.01
+# But none reaches out of nine tenths of all samples by so many times their range, in up to so many.
+_ABSURD, _SOME = 100.0, 0.1
 # Samples in a row at the end of a sensor's range.
 _CLIPPED = 4
 # Part of the samples that are one step on, where the sensor's steps made the samples.
@@ -54,12 +52,27 @@ def wild_samples(runs: Sequence[Array]) -> list[Mask]:
             with np.errstate(invalid="ignore"):
                 mask[1:-1] = (
                     (before * after < 0)
-                    & (least > _WILD * max(usual, step))
+                    & (least > WILD * max(usual, step))
                     & (np.abs(before + after) < 0.3 * least)
                 )
         found.append(mask)
-    share = sum(int(mask.sum()) for mask in found) / max(1, sum(map(len, runs)))
-    return found if share <= _RARE else [np.zeros(len(values), bool) for values in runs]
+    if _share(found) <= RARE:
+        return found
+    absurd = [mask & far for mask, far in zip(found, _absurd(runs), strict=True)]
+    return absurd if _share(absurd) <= _SOME else [np.zeros(len(own), bool) for own in runs]
+
+
+def _share(masks: Sequence[Mask]) -> float:
+    return sum(int(mask.sum()) for mask in masks) / max(1, sum(map(len, masks)))
+
+
+def _absurd(runs: Sequence[Array]) -> list[Mask]:
+    """Values that lie out of what nine in ten are by a hundred times their range."""
+    low, high = np.nanquantile(np.concatenate(list(runs)), [0.05, 0.95])
+    reach = _ABSURD * (high - low)
+    if not reach > 0:
+        return [np.zeros(len(values), bool) for values in runs]
+    return [(values > high + reach) | (values < low - reach) for values in runs]
 
 
 def dropped_samples(runs: Sequence[Array], turn: float = 0.0) -> list[Mask]:
@@ -109,55 +122,19 @@ def _jumped_to(
     found = []
     for values, far, at in zip(runs, rest, there, strict=True):
         mask, times = np.zeros(len(values), bool), 0
-        for a, b in _stretches(at):
+        for a, b in stretches(at):
             if a == 0 or b == len(values) or b - a > _LONGEST_DROP:
                 continue
             least = min(abs(far[a - 1]), abs(far[b]))
             # What comes back elsewhere, or crosses it on its way, is motion.
             same = abs(values[a - 1] - values[b]) < 0.5 * least
-            mask[a:b] = same and least > _WILD * usual
+            mask[a:b] = same and least > WILD * usual
             times += bool(mask[a])
         found.append((mask, times))
     return found
 
 
-def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) -> list[Mask]:
-    """Repeats of one value where the channel was moving until then.
-
-    A system at rest gives equal samples too, and dry friction stops it at once. A frozen sensor
-    does not slow down before, and has to catch up when it thaws, by more than it moves from then
-    on; if it does not thaw, only another sensor can tell.
-
-    Args:
-        runs: As for ``wild_samples``.
-        moved: What another sensor says of the change from each sample to the next, (n - 1,) for
-            each run; the integral of a measured rate, for example.
-
-    Returns:
-        True where a value repeats the one before and should not.
-    """
-    changes = [np.abs(np.diff(values)) for values in runs]
-    moving = np.concatenate([change[change > 0] for change in changes] or [np.zeros(0)])
-    found = [np.zeros(len(values), bool) for values in runs]
-    if not moving.size:
-        return found
-    typical, step = float(np.median(moving)), rounding(runs)
-    others = moved or [np.zeros(len(change)) for change in changes]
-    for values, change, other, mask in zip(runs, changes, others, found, strict=True):
-        for a, b in _stretches(change == 0):  # samples a to b are equal
-            if b - a < _STILL or a < 3:
-                continue
-            least = max(_WILD * typical, 2.1 * step)
-            leap, after = np.abs(np.diff(values[b : b + 3], append=[np.nan, np.nan]))[:2]
-            thawed = leap > least and leap > _CATCHES_UP * after > 0.0
-            contradicted = float(np.abs(np.nancumsum(other[a:b])).max()) > least
-            entry = max(0.3 * typical, 1.5 * step)
-            if (thawed or contradicted) and _in_full_motion(values[a - 3 : a + 1], entry, 1):
-                mask[a + 1 : b + 1] = True
-    return found
-
-
-def _in_full_motion(values: Array, least: float, steps: int) -> bool:
+def in_full_motion(values: Array, least: float, steps: int) -> bool:
     """Whether four samples go one way, by ``least`` on average, and would for some steps more.
 
     Dry friction slows down evenly before it stops, a sensor that fails does not.
@@ -188,20 +165,20 @@ def clipped_samples(runs: Sequence[Array]) -> list[Mask]:
     least = max(0.3 * float(np.median(moving)), 1.5 * rounding(runs))
     for end in (known.min(), known.max()):
         reached = [
-            [(a, b) for a, b in _stretches(values == end) if b - a >= _CLIPPED] for values in runs
+            [(a, b) for a, b in stretches(values == end) if b - a >= _CLIPPED] for values in runs
         ]
         # The last step to the end is cut short, and so is the first from it.
         times = sum(
             all(
-                _in_full_motion(part, least, 2)
+                in_full_motion(part, least, 2)
                 for part in (values[max(a - 4, 0) : a], values[b : b + 4][::-1])
             )
-            for values, stretches in zip(runs, reached, strict=True)
-            for a, b in stretches
+            for values, spans in zip(runs, reached, strict=True)
+            for a, b in spans
         )
         if times > 1:
-            for mask, stretches in zip(found, reached, strict=True):
-                for a, b in stretches:
+            for mask, spans in zip(found, reached, strict=True):
+                for a, b in spans:
                     mask[a:b] = True
     return found
 
@@ -235,7 +212,7 @@ def _usual_change(runs: Sequence[Array]) -> float:
     return min(high, usual) if usual > 0 else high
 
 
-def _stretches(mask: Mask) -> list[tuple[int, int]]:
+def stretches(mask: Mask) -> list[tuple[int, int]]:
     """First and one-past-last index of every stretch of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -71,6 +71,7 @@ def _read_text(
     rows = _split(path, lines, delimiter)
     first, names_row = rows[0]
     names: tuple[str | int, ...] = tuple(range(1, len(names_row) + 1))
+    repeated = 0
     if header:
         if all(_is_number(field) for field in names_row):
             raise LogError(
@@ -80,7 +81,9 @@ def _read_text(
                 path,
                 first,
             )
-        names, rows = tuple(names_row), rows[1:]
+        below = [row for row in rows[1:] if row[1] != names_row]
+        repeated = len(rows) - 1 - len(below)
+        names, rows = tuple(names_row), below
     if not rows:
         raise LogError("only the header is there, expected one row per sample below it", path)
     cut_off = len(rows) > 1 and len(rows[-1][1]) < len(names)
@@ -99,7 +102,7 @@ def _read_text(
     columns: dict[str | int, list[str]] = {}
     for name, *fields in zip(names, *(fields for _, fields in rows), strict=True):
         columns.setdefault(name, fields)
-    return Table(path, columns, names, np.array([number for number, _ in rows]), cut_off)
+    return Table(path, columns, names, np.array([number for number, _ in rows]), cut_off, repeated)
 
 
 def _decoded(path: Path, data: bytes) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from residual.logs.checks import Finding
 from residual.logs.layout import Column, named_column
@@ -36,22 +36,54 @@ def columns_of(
     if given:
         return {name: named_column(column, name) for name, column in given.items()}
     found = {channel.name: _named_like(table, channel, findings) for channel in channels}
+    taken = {column.column for column in found.values() if column is not None}
+    for channel in channels:
+        if found[channel.name] is None:
+            found[channel.name] = _named_like(table, channel, findings, taken, str.casefold)
     return {name: column for name, column in found.items() if column is not None}
 
 
 def time_column(table: Table, given: str | int | Column, findings: list[Finding]) -> Column:
-    """The column of the times; of the default name also with a unit."""
-    found = _named_like(table, TIME, findings) if given == TIME.name else None
-    return found or named_column(given, TIME.name)
+    """The column of the times; of the default name also with a unit, and in capitals.
+
+    Raises:
+        LogError: Nothing is named so, or two columns are.
+    """
+    if given != TIME.name:
+        return named_column(given, TIME.name)
+    found = _named_like(table, TIME, findings)
+    found = found or _named_like(table, TIME, findings, spelt=str.casefold)
+    if found is None:
+        raise LogError(
+            f"no column 'time', the file has {table.listed}; say which one it is, as "
+            "time: {column: NAME, unit: s}, or, if it holds no times, the seconds between its "
+            "samples, as period: 0.01, with --columns FILE",
+            table.path,
+        )
+    return found
 
 
-def _named_like(table: Table, channel: Channel, findings: list[Finding]) -> Column | None:
-    if channel.name in table.columns:
-        return Column(channel.name)
+def _named_like(
+    table: Table,
+    channel: Channel,
+    findings: list[Finding],
+    taken: Collection[str | int] = (),
+    spelt: Callable[[str], str] = str,
+) -> Column | None:
+    """The column that is named like a channel, if any, but for those that are taken.
+
+    Args:
+        spelt: What of a name counts.
+    """
     fits = []
     for header in table.names:
-        match = _WITH_UNIT.fullmatch(str(header).strip())
-        if match and match["name"] == channel.name:
+        plain = str(header).strip()
+        if header in taken:
+            continue
+        if spelt(plain) == spelt(channel.name):
+            return _told(table, Column(header), channel, findings)
+        match = _WITH_UNIT.fullmatch(plain)
+        if match and spelt(match["name"]) == spelt(channel.name):
             unit = match["square"] if match["round"] is None else match["round"]
             fits.append(Column(header, unit.strip()))
     if not fits:
@@ -74,4 +106,12 @@ def _named_like(table: Table, channel: Channel, findings: list[Finding]) -> Colu
     if (unit.factor, unit.offset) != (1.0, 0.0):
         says = f"Column {column.column!r} was converted to {channel.unit}."
         findings.append(Finding("unit", table.path.name, says))
+    return _told(table, column, channel, findings)
+
+
+def _told(table: Table, column: Column, channel: Channel, findings: list[Finding]) -> Column:
+    """A column, and what is to be said if it is spelt otherwise than its channel."""
+    if channel.name not in str(column.column):
+        says = f"Column {column.column!r} was taken for {channel.name!r}."
+        findings.append(Finding("named", table.path.name, says))
     return column

@@ -71,6 +71,9 @@ def read_logs(
             if table.cut_off:
                 says = "The last row is cut off and was left out."
                 findings.append(Finding("cut_off", str(path), says))
+            if table.headers:
+                says = f"The header stands there {table.headers} times more, and was left out."
+                findings.append(Finding("headers", str(path), says))
             runs += runs_of(table, layout, channels, action_channels, findings)
         runs = tidy(
             runs, columns.gap, columns.minimum_samples, findings, [c.name for c in channels]

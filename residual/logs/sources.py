@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,10 +14,12 @@ from residual.logs import hdf5, lerobot
 from residual.logs.checks import Finding
 from residual.logs.clocks import Signal, on_one_clock
 from residual.logs.files import read_table
-from residual.logs.layout import LogFormat
+from residual.logs.headers import TIME, time_column
+from residual.logs.layout import Column, LogFormat
 from residual.logs.mcap_file import read_mcap
 from residual.logs.memory import table_of
 from residual.logs.table import LogError, Table
+from residual.logs.units import find_unit
 from sims.simulator import Channel
 
 HDF5, MCAP = (".h5", ".hdf5"), (".mcap",)
@@ -81,7 +84,8 @@ def open_log(
 def signals_of(source: str | Path) -> tuple[dict[str, Signal], dict[str, str]]:
     """Every field of a file with its times, for a look at what there is; and which hold no numbers.
 
-    Fields of a table without a column ``time`` have the numbers of its rows for times.
+    Fields of a table without a column of times (``time``, ``Time [ms]``) have the numbers of its
+    rows for times.
 
     Returns:
         Signals by name, and for all other fields what was found in place of a number.
@@ -94,9 +98,11 @@ def signals_of(source: str | Path) -> tuple[dict[str, Signal], dict[str, str]]:
         return read_mcap(path), {}
     table, _ = open_log(path, 1, LogFormat(), (), (), [])
     times = np.arange(len(table), dtype=float)
-    clock = next((name for name in ("time", lerobot.TIME) if name in table.columns), None)
-    if clock is not None:
-        times = table.numbers(clock)
+    with contextlib.suppress(LogError):
+        clock = Column(lerobot.TIME)
+        if lerobot.TIME not in table.columns:
+            clock = time_column(table, TIME.name, [])
+        times = find_unit(clock.unit, TIME.unit).factor * table.numbers(clock.column)
     found, others = {}, {}
     for name in table.names:
         try:

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
+
+from residual.logs.dates import DATED, looks_dated, seconds_of
 
 Array = NDArray[np.float64]
 
-_DATE = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}")
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
@@ -52,6 +52,7 @@ class Table:
         names: Column names in the order of the file; those that occur twice also twice.
         rows: Row of the file that each value stands in, as an editor counts: from 1.
         cut_off: True if the file ends in the middle of a row, which was left out.
+        headers: Rows that repeat the header, which were left out.
     """
 
     path: Path
@@ -59,6 +60,7 @@ class Table:
     names: tuple[str | int, ...]
     rows: NDArray[np.int64]
     cut_off: bool = False
+    headers: int = 0
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -137,10 +139,9 @@ class Table:
         with contextlib.suppress(ValueError):
             if decimal == "." and not any("_" in text for text in texts):
                 return np.array(texts, dtype=float)
-        if texts and _DATE.match(texts[0]):
-            with contextlib.suppress(ValueError):
-                dates = pd.to_datetime(list(texts), format="ISO8601", utc=True)
-                return self._from_array(dates.tz_localize(None).to_numpy(), column)
+        dated = seconds_of(texts)
+        if dated is not None:
+            return dated
         if decimal == "." and _commas(texts):
             decimal = ","
         numbers = np.empty(len(texts))
@@ -154,6 +155,8 @@ class Table:
                 if text.lower() not in _MISSING:
                     comma = "," in text and decimal == "."
                     fix = "set decimal: ','" if comma else "correct the value or leave it empty"
+                    if looks_dated(text):
+                        fix = f"write times in seconds, or {DATED}"
                     raise LogError(
                         f"found {shortened(text)}, expected a number; {fix}",
                         self.path,

@@ -128,7 +128,7 @@ def find_unit(unit: str, target: str) -> Unit:
 
     Args:
         unit: As written in a config; empty means ``target`` itself.
-        target: The SI unit of the channel; also one that the table does not know.
+        target: The unit of the channel, of the table or not.
 
     Raises:
         ValueError: The unit is unknown, or measures something else than ``target``.
@@ -145,16 +145,17 @@ def find_unit(unit: str, target: str) -> Unit:
             f"unknown unit {unit!r}: {hint}expected one of {', '.join(possible)}; or leave the "
             f"unit out and give scale, the {plain} in one of it"
         )
-    found = UNITS[unit]
-    if found.base != plain:
+    found, wanted = UNITS[unit], UNITS.get(plain, Unit(plain, 1.0))
+    if found.base != wanted.base:
         fitting = ", ".join(units_of(plain)) or target
         raise ValueError(
             f"unit {unit!r} is converted to {found.base}, but {target} is needed: "
             f"expected one of {fitting}"
         )
-    return found
+    return Unit(plain, found.factor / wanted.factor, (found.offset - wanted.offset) / wanted.factor)
 
 
 def units_of(target: str) -> list[str]:
     """All units of the table that can be converted to ``target``."""
-    return [name for name, unit in UNITS.items() if unit.base == target]
+    base = UNITS[target].base if target in UNITS else target
+    return [name for name, unit in UNITS.items() if unit.base == base]

@@ -27,6 +27,8 @@ from studies.gap.words import (
 
 #: Share of the gap without a name that is a footnote.
 FOOTNOTE = 0.02
+#: Verdicts that name no effect.
+NAMELESS = ("unexplained", "calibrated", "needs_data", "no_gap")
 #: Part of an interval below which one with an exact simulator is worth a line.
 MUCH = 0.7
 
@@ -37,6 +39,9 @@ DOUBTS: dict[Doubt, str] = {
     "at_bound": "its size lies at its bound",
     "may_be_at_bound": "its interval ends at its bound, as if it wanted to be larger",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
+    "conventions": "it has to be seen first whether the log counts as the simulator does",
+    "gross": "a sensor is seldom wrong by a fifth of all that it showed, and something that the "
+    "library lacks may look so",
     "no_time": "there was no time to ask whether parameters that are a few percent off would do as "
     "well, give more --minutes",
     "may_be_zero": "its interval holds zero, or nearly",
@@ -178,10 +183,12 @@ def span(number: Number) -> str:
 def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
     gap = result.gap
     found = [f"{gap.windows_after:.3g} times the noise is left"]
+    few = gap.blocks < TOO_FEW and all(v.kind in NAMELESS for v in result.verdicts)
     if result.adequate:
         times = gap.after.value / max(gap.noise_floor.value, 1e-300)
-        found = [f"nothing of the library explains it: forecasts err {times:.3g} times as by noise"]
-    if gap.blocks < TOO_FEW and not result.effects:
+        by = f"forecasts err {times:.3g} times as by noise"
+        found = [by if few else f"nothing of the library explains it: {by}"]
+    if few:
         more = duration_text((TOO_FEW - gap.blocks) * gap.horizon_s)
         found.append(
             f"nothing is named from {gap.blocks} {_blocks(gap)} of data, {TOO_FEW} are needed: "

@@ -273,3 +273,15 @@ def test_a_twin_is_told_with_its_size_and_what_it_does_to_the_others():
     )  # fmt: skip
     both = result(heavier, rubbing)
     assert "0.0835 N m s/rad if length is meant, not mass" in notes(rubbing, both)
+
+
+@pytest.mark.parametrize("effects", [[], [ParameterChange("mass", 0.001)]])
+def test_too_few_blocks_are_no_verdict_on_the_library(effects):
+    """Whether or not parameters were moved within their tolerance."""
+    moved = Verdict("calibrated", "", "", {}, (), "", "never parsed", Span(0.4, 0.3, 0.5))
+    verdicts = [*([moved] if effects else []), rest(0.6)]
+    told = notes(rest(0.6), result(*verdicts, effects=effects, blocks=2))
+    assert any("nothing is named from 2 blocks of data, 4 are needed" in note for note in told)
+    assert not any("nothing of the library" in note for note in told)
+    enough = notes(rest(0.6), result(*verdicts, effects=effects, blocks=20))
+    assert any("nothing of the library explains it" in note for note in enough)

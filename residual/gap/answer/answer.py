@@ -122,6 +122,8 @@ def confirm(
         lost = [c for c in made if not nameable(search, c, blocks, found.adequate)]
         if not lost and key in search.refused:  # without those that went, it cannot be right
             lost = made
+        if not lost and found.adequate and key and material(search, key, ()):
+            lost = made  # what fits the noise of one part may forecast nothing of another
         if not lost:
             made = allow_for_parameters(
                 search, key, made, found.adequate, parameter_tolerance, until

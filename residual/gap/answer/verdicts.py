@@ -135,6 +135,10 @@ def effect_verdict(
         says.append("there was no time to ask what parameters a few percent off would do")
     if claim.brief:
         says.append("shorter than half a sample, as late time stamps and filters in sensors are")
+    if claim.counted:
+        says.append("the log may count otherwise than the simulator")
+    if claim.gross:
+        says.append("a sensor is seldom wrong by a fifth of all that it showed")
     if not claim.needed:
         says.append("forecasts are not clearly worse without it")
     if not claim.steady:
@@ -171,6 +175,8 @@ def doubts(claim: Claim, vanishes: bool, ends: bool) -> tuple[Doubt, ...]:
         "slight": claim.slight,
         "no_time": claim.unasked,
         "clock": claim.brief,
+        "gross": claim.gross,
+        "conventions": claim.counted,
         "may_be_zero": vanishes,
         "share_may_be_zero": not claim.gains,
         "rivals": bool(claim.rivals or claim.alike),

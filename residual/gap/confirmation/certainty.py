@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from residual.gap.confirmation.claim import Claim, other_than
 from residual.gap.confirmation.numerics import at_half_step
 from residual.gap.fitting.intervals import bounded, deviations, ended
+from residual.gap.fitting.plausible import gross
 from residual.gap.search.choice import AT_ONE, no_match
 from residual.gap.search.exchange import exchanged, split
 from residual.gap.search.sets import Key, Search, all_but
@@ -76,6 +77,7 @@ def claims(
                 any(ended(fit, j) for j in strengths),
                 taken,
                 brief=brief(search, number, fit.theta[own]),
+                gross=not adequate and not twins and gross_fault(search, key, place),
                 by_fit=by_fit(search, key, number),
             )
         )
@@ -254,6 +256,13 @@ def brief(search: Search, number: int, values: Array) -> bool:
         knob.unit == "s" and 0 < abs(value) < clock
         for knob, value in zip(candidate.knobs, values, strict=True)
     )
+
+
+def gross_fault(search: Search, key: Key, place: int) -> bool:
+    """Whether a member of a set is a sensor that would be further off than sensors are."""
+    fit = search.tried[key]
+    effects = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
+    return gross(effects[place], search.simulator, search.fitter.samples)
 
 
 def share(search: Search, key: Key, number: int) -> tuple[float, float, float]:

@@ -38,6 +38,8 @@ class Claim:
         slight: Whether they are without these, too: the parameters do nothing of its work.
         unasked: Whether there was no time to ask that.
         brief: Whether it is a time too short for the log's own clock.
+        counted: Whether the log may count otherwise than the simulator does.
+        gross: Whether it is a sensor further off than sensors are, beside a remainder.
         by_fit: Whether a fit to all data leaves three times as much without it: forecasts of single
             blocks may go astray all the same, where motion hangs on a hair.
         meant: Numbers of its twins in its place.
@@ -59,6 +61,8 @@ class Claim:
     slight: bool = False
     unasked: bool = False
     brief: bool = False
+    gross: bool = False
+    counted: bool = False
     by_fit: bool = False
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
@@ -80,6 +84,8 @@ class Claim:
             self.bounded,
             self.calibration,
             self.brief,
+            self.gross,
+            self.counted,
             self.rivals,
             self.alike,
             self.unasked,

@@ -11,6 +11,7 @@ from collections.abc import Container, Sequence
 
 import numpy as np
 
+from residual.gap.data.copies import once
 from residual.gap.data.inspection import (
     bounds,
     clipped,
@@ -26,6 +27,7 @@ from residual.gap.data.inspection import (
 )
 from residual.gap.data.kinematics import kinematics
 from residual.gap.data.nominal import nominal
+from residual.gap.data.wild_inputs import without_wild_inputs
 from residual.logs.checks import Finding
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
@@ -60,7 +62,9 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
     Raises:
         ValueError: No answer could mean anything; the message says why and what to do.
     """
-    found = findings(simulator, trajectories)
+    trajectories, copied = once(trajectories)
+    trajectories, wild = without_wild_inputs(simulator, trajectories)
+    found = [*copied, *wild, *findings(simulator, trajectories)]
     for finding in found:
         if finding.severity == "refuse":
             raise ValueError(f"{finding.where}: {finding.says}" if finding.where else finding.says)

@@ -9,13 +9,8 @@ from numpy.typing import NDArray
 
 from residual.logs.checks import Finding
 from residual.logs.derived import differenced, summed_up
-from residual.logs.faults import (
-    clipped_samples,
-    dropped_samples,
-    frozen_samples,
-    rounding,
-    wild_samples,
-)
+from residual.logs.faults import clipped_samples, dropped_samples, rounding, wild_samples
+from residual.logs.frozen import frozen_samples
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 from sims.simulator import Channel

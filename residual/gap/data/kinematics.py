@@ -9,10 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.logs.checks import Finding
+from residual.logs.faults import rounding
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
+
+
+#: Values of a position that tell nothing of a scale.
+FEW = 8
 
 
 def kinematics(
@@ -56,6 +61,9 @@ def _scale(
 ) -> tuple[float, float]:
     """Change of the position per integral of the rate, with its standard error over stretches."""
     moved, integrals, noises = [], [], []
+    seen = np.concatenate([run.states[:, position] for run in runs])
+    if len(np.unique(seen[np.isfinite(seen)])) < FEW:
+        return np.nan, np.inf
     for run in runs:
         x, v = run.states[:, position], run.states[:, rate]
         for a in range(0, len(run) - 7, 8):
@@ -69,6 +77,9 @@ def _scale(
         return np.nan, np.inf
     y, z = np.array(moved), np.array(integrals)
     of_x, of_v = np.median(np.array(noises), axis=0)
+    # Where most readings repeat, a cubic leaves nothing, and rounding is all the noise there is.
+    of_x = max(of_x, rounding([run.states[:, position] for run in runs]) ** 2 / 12)
+    of_v = max(of_v, rounding([run.states[:, rate] for run in runs]) ** 2 / 12)
     step = float(np.median([np.median(run.durations) for run in runs]))
     # Variance of the change (two readings) and of the integral (eight steps of readings).
     in_y, in_z = max(2 * of_x, 1e-300), max(8 * step**2 * of_v, 1e-300)

@@ -17,6 +17,7 @@ from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
 from sims.effects.aliases import probes, shortly_after
 from sims.effects.base import Effect
 from sims.effects.parameter import ParameterChange
+from sims.effects.sensor import USUAL, SensorEffect, SensorOffset
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -80,6 +81,31 @@ def nearly(fit: Fit, number: int, fitter: Fitter) -> bool:
     reach = np.where(fit.model.owner == number, half, 0.0)
     nearer = fit.theta - np.clip(fit.theta, -reach, reach)
     return not absurd(fit.model, nearer, fitter.samples)[1]
+
+
+def gross(effect: Effect, simulator: HostSimulator, samples: Samples) -> bool:
+    """Whether a sensor would be wrong by more than calibration ever is: a fifth of all it showed.
+
+    Where an encoder's zero lies is a matter of mounting, and its scale one of gears, so that of
+    positions any size is likely. Of what else is measured, an equilibrium or a loss that the
+    simulator lacks looks like a zero far off much more often than it is one.
+
+    Args:
+        effect: With its numbers.
+        simulator: Has the channels.
+        samples: The measured table.
+    """
+    if not isinstance(effect, SensorEffect):
+        return False
+    names = [channel.name for channel in simulator.physical_channels]
+    place = names.index(effect.channel)
+    if simulator.physical_channels[place].kind == "position":
+        return False
+    if not isinstance(effect, SensorOffset):
+        return effect.surprising
+    shown = samples.seen[:, place]
+    span = float(np.ptp(shown[np.isfinite(shown)])) if np.isfinite(shown).any() else 0.0
+    return bool(np.max(np.abs(effect.offset)) > USUAL * span)
 
 
 def surprises(fit: Fit) -> int:

@@ -19,7 +19,7 @@ from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model import paths
 from residual.gap.model.model import Model
 from residual.gap.result import Conventions
-from residual.logs.units import UNITS, Unit, units_of
+from residual.logs.units import Unit, find_unit, units_of
 from sims.host import HostSimulator
 from sims.simulator import Channel
 
@@ -107,8 +107,6 @@ def _turned(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
     """Counted the other way round, or from a quarter or half turn away."""
     channels = [simulator.physical_channels[i] for i in joint]
     first = channels[0]
-    if first.kind == "other":
-        return []
     turns = (first.angle or first.unit == "rad") and first.kind == "position"
     found = []
     for sign, zero in itertools.product((1.0, -1.0), QUARTERS if turns else QUARTERS[:1]):
@@ -136,7 +134,7 @@ def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Conv
 
 
 def _other_units(channel: Channel) -> list[tuple[str, Unit]]:
-    units = [(name, UNITS[name]) for name in units_of(channel.unit)]
+    units = [(name, find_unit(name, channel.unit)) for name in units_of(channel.unit)]
     return [(name, unit) for name, unit in units if (unit.factor, unit.offset) != (1.0, 0.0)]
 
 

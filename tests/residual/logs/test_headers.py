@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from swings import error, kinds, read, swing, write
 
+from sims.simulator import Channel
+
 
 @pytest.mark.parametrize("header", ["angle [deg]", "angle (°)", "angle[degrees] "])
 def test_a_unit_in_the_header_is_converted_and_told(tmp_path, header):
@@ -44,3 +46,57 @@ def test_a_header_that_does_not_fit_is_refused_and_not_taken_for_unmeasured(
     message = error(write(tmp_path / "log.csv", logged))
     assert says in message
     assert "--columns" in message
+
+
+def test_capitals_in_a_header_do_not_matter_and_are_told(tmp_path):
+    columns = swing()
+    logged = {
+        "Time (ms)": 1000 * columns["time"], "Angle [deg]": np.degrees(columns["angle"]),
+        "RATE": columns["rate"], "Voltage": columns["voltage"],
+    }  # fmt: skip
+    data = read(write(tmp_path / "log.csv", logged))
+    (run,) = data.trajectories
+    np.testing.assert_allclose(run.times, columns["time"], atol=1e-9)
+    np.testing.assert_allclose(run.states, np.stack([columns["angle"], columns["rate"]], 1))
+    np.testing.assert_array_equal(run.actions[:, 0], columns["voltage"][:-1])
+    assert "Column 'Voltage' was taken for 'voltage'." in [one.says for one in data.findings]
+
+
+def test_a_column_that_is_another_channel_is_not_taken_for_one_in_capitals(tmp_path):
+    channels = ((Channel("x", "m", "position"), Channel("X", "m", "position")), ())
+    columns = {"time": 0.1 * np.arange(50), "x": np.sin(np.arange(50))}
+    (run,) = read(write(tmp_path / "log.csv", columns), channels).trajectories
+    np.testing.assert_allclose(run.states[:, 0], columns["x"])
+    assert np.isnan(run.states[:, 1]).all()
+
+
+def test_two_columns_that_differ_in_capitals_alone_are_asked_for(tmp_path):
+    columns = swing()
+    logged = {name: columns[name] for name in ("time", "rate", "voltage")}
+    logged |= {"Angle [rad]": columns["angle"], "ANGLE (deg)": columns["angle"]}
+    assert "both named like 'angle'" in error(write(tmp_path / "log.csv", logged))
+
+
+def test_a_log_without_times_is_told_what_to_say(tmp_path):
+    columns = swing()
+    del columns["time"]
+    message = error(write(tmp_path / "log.csv", columns))
+    assert "no column 'time'" in message
+    assert "time: {column: NAME, unit: s}" in message
+    assert "period: 0.01" in message
+
+
+@pytest.mark.parametrize(("unit", "header", "factor", "zero"), [
+    ("kPa", "pressure [bar]", 0.01, 0.0), ("kPa", "pressure (Pa)", 1000.0, 0.0),
+    ("degC", "pressure [K]", 1.0, 273.15), ("degC", "pressure [degF]", 1.8, 32.0),
+    ("%", "pressure [1]", 0.01, 0.0),
+])  # fmt: skip
+def test_a_channel_may_count_in_another_unit_than_that_of_the_table(
+    tmp_path, unit, header, factor, zero
+):
+    """As the temperatures of a tutorial do."""
+    values = 20 + np.sin(0.1 * np.arange(50))
+    channels = ((Channel("pressure", unit, "other"),), ())
+    logged = {"time": 0.1 * np.arange(50), header: factor * values + zero}
+    (run,) = read(write(tmp_path / "log.csv", logged), channels).trajectories
+    np.testing.assert_allclose(run.states[:, 0], values, rtol=1e-12)

@@ -157,3 +157,13 @@ def test_constant_action(csv, tmp_path):
     other = write(tmp_path / "other.csv", swing())
     assert len(read_logs([path, other], STATES, ACTIONS).trajectories) == 2
     assert len(read(path, channels=(STATES, ())).trajectories) == 1
+
+
+@pytest.mark.parametrize("when", ["05/01/2026 12:00:00", "5-1-26 12:00", "2026/05/01"])
+def test_a_date_that_may_be_read_two_ways_is_asked_for(csv, when):
+    def change(lines):
+        return [lines[0], *(",".join([when, *line.split(",")[1:]]) for line in lines[1:])]
+
+    message = error(csv(change))
+    assert f"found {when!r}" in message
+    assert "write times in seconds, or as 2024-05-01 12:00:00.5" in message

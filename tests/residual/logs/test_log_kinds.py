@@ -159,6 +159,15 @@ def test_fields_of_an_mcap_are_listed_when_none_fits(tmp_path, capsys):
     assert "cannot be read as MCAP" in capsys.readouterr().err
 
 
+def test_log_info_knows_the_clock_by_its_header(tmp_path, capsys):
+    path = tmp_path / "run.csv"
+    rows = [f"{10 * i},{value}" for i, value in enumerate(HIP)]
+    path.write_text("\n".join(["Time (ms),hip", *rows]))
+    log_info([str(path)])
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if "hip" in line]
+    assert line.split()[1:3] == ["120", "100"]
+
+
 FLAT = {"time": TIMES, "hip_qpos": HIP, "knee_qpos": KNEE, "motor": MOTOR}
 
 

@@ -212,9 +212,10 @@ def test_decimal_commas_are_read_where_they_cannot_be_thousands(csv):
     assert np.array_equal(comma.trajectories[0].states, plain.trajectories[0].states)
 
 
-@pytest.mark.parametrize(
-    "form", ["%Y-%m-%dT%H:%M:%S.%f", "%Y-%m-%d %H:%M:%S.%fZ", "%Y-%m-%dT%H:%M:%S.%f+02:00"]
-)
+@pytest.mark.parametrize("form", [
+    "%Y-%m-%dT%H:%M:%S.%f", "%Y-%m-%d %H:%M:%S.%fZ", "%Y-%m-%dT%H:%M:%S.%f+02:00",
+    "%d.%m.%Y %H:%M:%S.%f", "%H:%M:%S.%f",
+])  # fmt: skip
 def test_times_may_be_dates(tmp_path, form):
     columns = swing()
     begun = datetime.datetime(2026, 10, 25, 1, 59, 55)

@@ -135,3 +135,11 @@ def test_short_pieces_are_left_out(tmp_path):
     assert [len(run.times) for run in data.trajectories] == [197]
     (finding,) = [finding for finding in data.findings if finding.kind == "left_out"]
     assert finding.numbers["samples"] == 3
+
+
+def test_a_header_in_the_middle_is_left_out_and_told(csv):
+    data = read(csv(lambda lines: [*lines[:90], lines[0], *lines[90:], lines[0]]))
+    plain = read(csv())
+    np.testing.assert_array_equal(data.trajectories[0].states, plain.trajectories[0].states)
+    (told,) = [finding.says for finding in data.findings if finding.kind == "headers"]
+    assert "2 times" in told

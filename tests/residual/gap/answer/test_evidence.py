@@ -53,3 +53,26 @@ def test_reasons_are_those_of_the_set_that_is_left():
     assert told["a", "b"] == "takes only 5 % off what remains"
     assert told["a", "b", "e"] == "takes only 17 % off what remains with 2 effects more"
     assert told["a",] == ""
+
+
+def test_what_fits_down_to_the_noise_and_forecasts_worse_than_nothing_is_not_named(monkeypatch):
+    for name, found in {
+        "claims": lambda search, key, *_: [SimpleNamespace(number=n, needed=True) for n in key],
+        "nameable": lambda *_: True,
+        "allow_for_parameters": lambda search, key, made, *_: made,
+        "other_numerics": lambda *_: [],
+        "may_vanish": lambda *_: False,
+        "add_exchanged": lambda *_: None,
+        "imitated": lambda *_: (),
+    }.items():
+        monkeypatch.setattr(answer, name, found)
+
+    def named(error):
+        toy = Toy({(1,): error, (0, 1): error})
+        toy.merged = lambda key, _, drop: (tuple(k for k in key if k not in drop), None)
+        toy.add = lambda fits: None
+        return answer.confirm(SimpleNamespace(search=toy, key=(1,), adequate=True), {}).key
+
+    assert named(0.3) == (1,)
+    assert named(1.1) == (1,)  # by chance
+    assert named(2.9) == ()

@@ -148,3 +148,73 @@ def test_a_simulator_that_breaks_down_on_a_recorded_state_is_refused_with_its_ti
 
     with pytest.raises(ValueError, match=r"run: .* returns (nan|-?inf) for .* at [\d.]+ s"):
         examine(Broken(), [noisy()])
+
+
+def test_a_record_that_is_given_twice_counts_once():
+    logs = make_logs(Truth(), 3, "strong", "A", 5)
+    again = dataclasses.replace(logs[1], name="copy.csv", times=logs[1].times + 100.0)
+    examined = examine(PendulumEquation(), [*logs, again])
+    assert [run.name for run in examined.trajectories] == [run.name for run in logs]
+    (told,) = [one for one in examined.findings if one.kind == "copy"]
+    assert told.where == "copy.csv"
+    assert logs[1].name in told.says
+    assert not [one for one in examine(PendulumEquation(), logs).findings if one.kind == "copy"]
+
+
+def test_records_at_rest_are_alike_and_no_copies():
+    rest = Trajectory("rest", 0.1 * np.arange(30), np.zeros((30, 2)), np.zeros((29, 1)))
+    logs = [*swings(1.0), rest, dataclasses.replace(rest, name="rest again")]
+    assert len(examine(PendulumEquation(), logs).trajectories) == 3
+
+
+def test_a_record_set_aside_that_is_fitted_too_is_told():
+    logs = make_logs(Truth(), 4, "strong", "A", 5)
+    copy = dataclasses.replace(logs[0], name="test.csv")
+    found = find_gap(PendulumEquation(), logs, held=[copy], effects=["mass"], minutes=0.2)
+    assert any("test.csv" in says and "is no test" in says for says in found.quality)
+
+
+def spoilt(value, rows=(100,)):
+    """Logs whose first voltage is wild in some samples."""
+    logs = make_logs(Truth(), 2, "strong", "A", 5)
+    volts = np.array(logs[0].actions)
+    volts[list(rows), 0] = value
+    return [dataclasses.replace(logs[0], actions=volts), logs[1]]
+
+
+class Unbounded(PendulumEquation):
+    """A pendulum of which nobody said what it can be told."""
+
+    action_channels = (dataclasses.replace(PendulumEquation.action_channels[0], low=-np.inf,
+                                           high=np.inf),)  # fmt: skip
+
+
+@pytest.mark.parametrize("simulator", [PendulumEquation(), Unbounded()])
+def test_a_record_is_cut_at_a_command_that_nobody_can_have_meant(simulator):
+    logs = spoilt(3000.0)
+    examined = examine(simulator, logs)
+    (told,) = [one for one in examined.findings if one.kind == "wild"]
+    assert told.where == "voltage"
+    assert "3000 V in 1 of" in told.says
+    assert [len(run.times) for run in examined.trajectories] == [
+        101, len(logs[0].times) - 101, len(logs[1].times)
+    ]  # fmt: skip
+    assert max(np.abs(run.actions).max() for run in examined.trajectories) < 10
+
+
+@pytest.mark.parametrize(("value", "rows"), [(3000.0, (100, 101)), (20.0, (100,))])
+def test_a_command_that_may_have_been_meant_is_left(value, rows):
+    """A kick of two samples, or one not so far beyond the others."""
+    examined = examine(Unbounded(), spoilt(value, rows))
+    assert len(examined.trajectories) == 2
+    assert not [one for one in examined.findings if one.kind == "wild"]
+
+
+@pytest.mark.parametrize("step", [0.05, 0.12, 0.2])
+def test_a_coarse_encoder_is_no_reason_to_blame_the_rate(step):
+    """In most stretches its angle does not change at all."""
+    (run,) = swings(1.0)
+    coarse = np.round(run.states / np.array([step, 1e-9])) * np.array([step, 1e-9])
+    noisy = coarse + np.random.default_rng(0).standard_normal(coarse.shape) * np.array([0.0, 0.02])
+    coarse = dataclasses.replace(run, states=noisy)
+    assert kinematics(PendulumEquation(), [coarse])[1] == []

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from swing import changed, kinds, noisy, sticking
 
 from residual.gap.data.examine import examine, findings
-from residual.logs.faults import dropped_samples
+from residual.logs.faults import dropped_samples, wild_samples
+from residual.logs.frozen import frozen_samples
 from residual.trajectories import Trajectory
 from sims.pendulum_equation import PendulumEquation
 
@@ -95,7 +96,6 @@ def test_a_frozen_encoder_is_told_when_it_thaws(row, count):
     assert np.isnan(done.trajectories[0].states[rows, 0]).all()
 
 
-@pytest.mark.xfail(strict=True, reason="a long freeze may go unseen, by where it begins and ends")
 @pytest.mark.parametrize(("row", "count"), [(160, 73), (160, 74), (285, 80)])
 def test_a_longer_freeze_is_told_too(row, count):
     run = turning()
@@ -146,3 +146,62 @@ def test_a_servo_that_sticks_has_no_broken_encoder(breakaway, gain, seed):
     states = np.stack([angle, np.full(len(angle), np.nan)], axis=1)
     run = Trajectory("run", 0.02 * np.arange(len(angle)), states, volts[:-1, None] / 300)
     assert not {kind for kind, _ in kinds(run)} & {"frozen", "clipped", "dropped", "wild"}
+
+
+def pressure(seed, noise=2.0, step=0.01):
+    """A tank that fills, and is full, with a pump that makes its pressure scatter."""
+    rng = np.random.default_rng(seed)
+    level = 100 * (1 - np.exp(-np.arange(200) / 40))
+    return np.round((level + noise * rng.standard_normal(200)) / step) * step
+
+
+@pytest.mark.parametrize("row", [20, 60, 150, 180])
+@pytest.mark.parametrize("seed", range(3))
+def test_where_readings_scatter_equal_ones_are_frozen(row, seed):
+    """Also where the channel turns, or rests, so that nothing has to be caught up."""
+    values = pressure(seed)
+    assert not frozen_samples([values])[0].any()
+    values[row : row + 15] = values[row]
+    (frozen,) = frozen_samples([values])
+    assert set(np.flatnonzero(frozen)) == set(range(row + 1, row + 15))
+
+
+def test_where_readings_are_rounded_more_than_they_scatter_equal_ones_are_rest():
+    for noise, step in ((0.1, 1.0), (0.0, 0.01)):
+        assert not frozen_samples([pressure(0, noise, step)])[0].any()
+
+
+def test_a_sensor_with_a_dead_band_about_zero_rests():
+    speed = 5 + np.random.default_rng(0).standard_normal(200)
+    speed[80:120] = 0.0
+    assert not frozen_samples([speed])[0].any()
+
+
+def test_absurd_readings_are_wild_however_many():
+    """As where a decimal point was lost, in one sample of 25."""
+    values = pressure(0)
+    rows = np.arange(10, 190, 25)
+    values[rows] *= 1e5
+    (wild,) = wild_samples([values])
+    assert set(np.flatnonzero(wild)) == set(rows)
+
+
+def test_heavy_tails_are_noise():
+    values = pressure(0)
+    values[np.arange(10, 190, 25)] += 60.0
+    assert not wild_samples([values])[0].any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_frozen_reading_of_what_rises_amid_noise_is_told_when_it_catches_up(seed):
+    for noise in (0.0, 0.3):
+        values = pressure(seed, noise, 0.001)
+        values[30:45] = values[30]
+        assert frozen_samples([values])[0][31:45].all()
+    values[45:] -= values[45] - values[44] - 1.0  # what stuck goes on from where it was
+    values[30:45] = values[30]
+    assert not frozen_samples([np.round(values)])[0].any()
+
+
+def test_stairs_are_not_frozen():
+    assert not frozen_samples([np.repeat(np.arange(20.0), 12)])[0].any()

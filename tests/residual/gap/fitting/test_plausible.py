@@ -7,7 +7,7 @@ import pytest
 
 from residual.gap.data.samples import Samples
 from residual.gap.fitting import plausible
-from residual.gap.fitting.plausible import absurd, nearly, surprises
+from residual.gap.fitting.plausible import absurd, gross, nearly, surprises
 from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
 from residual.trajectories import Trajectory
@@ -17,6 +17,8 @@ from sims.effects import (
     LinearSpring,
     ParameterChange,
     Saturation,
+    SensorOffset,
+    SensorScale,
     ViscousFriction,
 )
 from sims.pendulum_equation import PendulumEquation
@@ -98,3 +100,14 @@ def test_what_ends_at_a_bound_surprises():
     assert surprises(SimpleNamespace(model=model, theta=theta)) == 0
     theta[rest] = model.knobs[rest].low
     assert surprises(SimpleNamespace(model=model, theta=theta)) == 1
+
+
+@pytest.mark.parametrize(("effect", "far"), [
+    (SensorOffset("rate", 0.3), False), (SensorOffset("rate", -3.0), True),
+    (SensorScale("rate", 0.1), False), (SensorScale("rate", -0.5), True),
+    (SensorOffset("angle", 3.0), False),  # of an encoder any zero is likely
+    (ActuatorGain("voltage", 2.0), False),
+])  # fmt: skip
+def test_a_sensor_is_seldom_wrong_by_a_fifth_of_what_it_shows(effect, far):
+    samples = built(ActuatorGain("voltage"), gain=0.0)[2]
+    assert gross(effect, PendulumEquation(), samples) is far

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from residual.gap import find_gap
 from residual.gap.preparation.conventions import otherwise
 from residual.gap.preparation.prepare import prepare
 from residual.trajectories import Trajectory
@@ -104,6 +105,32 @@ def test_degrees_celsius_are_no_kelvin():
         run = Trajectory("room", 10.0 * np.arange(len(warm)), warm - zero, watts[0])
         found = otherwise(simulator, prepare(simulator, [run], 300.0).fitter)
         assert (found and found.changes) == wanted
+
+
+def test_a_turned_sign_of_any_channel_is_told():
+    rng = np.random.default_rng(0)
+    watts = np.repeat(rng.uniform(0.0, 3000.0, (1, 20, 1)), 30, axis=1)
+    warm = Room().rollout(np.array([[293.0]]), watts)[0]
+    warm += 0.1 * rng.standard_normal(warm.shape)
+    run = Trajectory("room", 10.0 * np.arange(len(warm)), -warm, watts[0])
+    found = otherwise(Room(), prepare(Room(), [run], 300.0).fitter)
+    assert found is not None
+    assert "`scale: -1` for room" in found.changes
+
+
+@pytest.mark.parametrize("factor", [-1.0, 1000.0])
+def test_nothing_is_certain_before_it_is_seen_how_the_log_counts(factor):
+    run = log((CoulombFriction("pivot", 0.003),))
+    offered = ["mass", "delay@voltage", "coulomb_friction@pivot"]
+    wrong = dataclasses.replace(run, actions=factor * run.actions)
+    free = dataclasses.replace(PendulumEquation.action_channels[0], low=-np.inf, high=np.inf)
+    simulator = PendulumEquation(dt=0.02)
+    simulator.action_channels = (free,)
+    found = find_gap(simulator, [wrong], effects=offered, minutes=0.5)
+    named = [v for v in found.verdicts if v.kind in ("confirmed", "ambiguous")]
+    assert found.conventions is not None
+    assert named
+    assert all("conventions" in v.doubts and v.kind == "ambiguous" for v in named)
 
 
 class Lift(EquationOfMotion):

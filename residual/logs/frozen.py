@@ -1,0 +1,98 @@
+"""Sensors that froze: repeats of one value that no rest explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.logs.faults import RARE, WILD, in_full_motion, rounding, stretches
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# Equal samples in a row that a moving channel does not have by chance.
+_STILL = 10
+# Part of the samples before that have to differ, and usual changes that make a way, of what moved.
+_MOVING, _CLEAR = 0.8, 4.0
+# Changes that say how a channel scatters, and the part of them that turn back where it is noise.
+_KNOWN, _TURNS = 50, 0.3
+# A sensor that thaws leaps so many times as far as it moves after that; what breaks away speeds up.
+_CATCHES_UP = 2.0
+
+
+def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) -> list[Mask]:
+    """Repeats of one value where the channel was moving until then.
+
+    A system at rest gives equal samples too, and dry friction stops it at once. A frozen sensor
+    does not slow down before, and has to catch up when it thaws, by more than it moves from then
+    on, or by what it would have gone meanwhile; if it does not thaw, only another sensor can tell.
+    Where samples scatter so that two are
+    hardly ever equal, ten in a row are no rest either, but for those at zero or at an end of the
+    range, where sensors hold still.
+
+    Args:
+        runs: As for ``wild_samples``.
+        moved: What another sensor says of the change from each sample to the next, (n - 1,) for
+            each run; the integral of a measured rate, for example.
+
+    Returns:
+        True where a value repeats the one before and should not.
+    """
+    changes = [np.abs(np.diff(values)) for values in runs]
+    moving = np.concatenate([change[change > 0] for change in changes] or [np.zeros(0)])
+    found = [np.zeros(len(values), bool) for values in runs]
+    if not moving.size:
+        return found
+    typical, step = float(np.median(moving)), rounding(runs)
+    known = np.concatenate(list(runs))
+    noisy, ends = _noisy(runs), (0.0, np.nanmin(known), np.nanmax(known))
+    others = moved or [np.zeros(len(change)) for change in changes]
+    for values, change, other, mask in zip(runs, changes, others, found, strict=True):
+        for a, b in stretches(change == 0):  # samples a to b are equal
+            if b - a < _STILL or a < 3:
+                continue
+            if (noisy and values[a] not in ends) or _owed(values, a, b):
+                mask[a + 1 : b + 1] = True
+                continue
+            least = max(WILD * typical, 2.1 * step)
+            leap, after = np.abs(np.diff(values[b : b + 3], append=[np.nan, np.nan]))[:2]
+            thawed = leap > least and leap > _CATCHES_UP * after > 0.0
+            contradicted = float(np.abs(np.nancumsum(other[a:b])).max()) > least
+            entry = max(0.3 * typical, 1.5 * step)
+            if (thawed or contradicted) and in_full_motion(values[a - 3 : a + 1], entry, 1):
+                mask[a + 1 : b + 1] = True
+    return found
+
+
+def _owed(values: Array, a: int, b: int) -> bool:
+    """Whether what a channel leaps after equal samples a to b is what it would have gone meanwhile,
+    at the pace of as many samples before, with noise or without.
+
+    What stuck begins again at the pace of one sample.
+    """
+    if a < _STILL or b + 1 >= len(values):
+        return False
+    before = np.diff(values[max(0, 2 * a - b) : a + 1])
+    if not np.isfinite(before).all() or np.mean(before != 0) < _MOVING:
+        return False
+    pace, usual = float(before.mean()), float(np.median(np.abs(before)))
+    gone, leap = pace * (b - a + 1), float(values[b + 1] - values[b])
+    clear = min(abs(gone), abs(leap)) > _CLEAR * usual
+    return bool(clear and 0.5 < leap / gone < 2.0)
+
+
+def _noisy(runs: Sequence[Array]) -> bool:
+    """Whether samples scatter more than they are rounded, and more than the channel moves."""
+    steps = [np.diff(values) for values in runs]
+    for step in steps:
+        for a, b in stretches(step == 0):
+            if b - a >= _STILL:
+                step[a:b] = np.nan
+    loose = np.concatenate(steps)
+    loose = loose[np.isfinite(loose)]
+    if len(loose) < _KNOWN:
+        return False
+    turns = float((loose[1:] * loose[:-1] < 0).mean())
+    return bool((loose == 0).mean() <= RARE and turns >= _TURNS)
