@@ -21,6 +21,7 @@ from residual.gap.explain import Explanation, explain
 from residual.gap.free_parameters import better, worth_freeing
 from residual.gap.horizon import usual_horizon
 from residual.gap.known import KNOWN
+from residual.gap.lone import explains_the_rest, lone_stretch
 from residual.gap.numerics import (
     fits_better,
     forecast_error,
@@ -181,6 +182,17 @@ def find_gap(
         tell("confirming")
         asked = matters(found, tolerance)
         answer = confirm(found, groups, asked, parameter_tolerance, at_last)
+        stretch = lone_stretch(answer) if asked else None
+        if stretch is not None:
+            left_out = False
+            if time.process_time() < until:
+                tell("once more without a stretch that nothing explains")
+                ready = prepare(found.search.simulator, stretch.cut_from(runs), horizon)
+                again = explained(found.search.simulator, ready)
+                second = confirm(again, groups, asked, parameter_tolerance, at_last)
+                if left_out := explains_the_rest(second):
+                    prepared, found, answer = ready, again, second
+            quality.append(stretch.says(left_out))
         beside = worth_freeing(answer, parameter_tolerance) if asked else []
         if beside and time.process_time() > over:
             quality.append(
