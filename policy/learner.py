@@ -100,7 +100,7 @@ class Algorithm:
         noise_sigma: float | None = None,
         scaling: Scaling | None = None,
     ) -> Learner:
-        """A learner that knows nothing yet.
+        """A learner before any training.
 
         Args:
             env: For its spaces.

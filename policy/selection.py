@@ -118,7 +118,7 @@ def learn_and_select(
         callback: Called with every evaluation; learning stops if it returns True.
         random_steps: As in ``DDPG.learn``.
         episodes: Rollouts without noise per evaluation, each from its own start state.
-        finalists: So many of the best policies are rolled out once more at the end.
+        finalists: How many of the best policies are rolled out once more at the end.
         final_episodes: Rollouts of each finalist, without noise and from other starts; their mean
             decides. With 0 the best score does.
         theta: As ``DDPGConfig.noise_theta``, of the noise of evaluations.

@@ -69,8 +69,8 @@ def accuracy_along(
         actions: Actions applied, each of shape (T, n_a).
         horizons: Prediction horizons in s, each at least a step; one longer than every rollout is
             left out. By default those of ``usual_steps``.
-        stride: Open-loop predictions start at every so many-th state that has the horizon
-            ahead of it; more than 1 saves time with a slow simulator.
+        stride: Open-loop predictions start at every n-th state that has the horizon ahead of it,
+            this being n; more than 1 saves time with a slow simulator.
 
     Returns:
         The errors.

@@ -20,7 +20,7 @@ class CorrectedSimulator(Simulator):
 
     It stays finite: rates are held within 8 times their scale, or 4 times the largest in the data
     if that is more, and other channels within 8 times their scale, or their range in the data, of
-    where they were one step before. What is no number stays as it was.
+    where they were one step before. A value that is NaN stays as it was before the step.
 
     Args:
         simulator: The idealised simulator f.
@@ -90,9 +90,9 @@ class CorrectedSimulator(Simulator):
         return middle + known.clip(-self._limits, self._limits)
 
     def augment(self, states: ArrayLike, actions: ArrayLike | None = None) -> Array:
-        """As the simulator below fills its memory."""
+        """See ``Simulator.augment``: as the simulator below does it."""
         return self.simulator.augment(states, actions)
 
     def renderer(self) -> object:
-        """Looks like the simulator below."""
+        """The renderer of the simulator below."""
         return self.simulator.renderer()  # type: ignore[attr-defined]

@@ -20,12 +20,12 @@ class Ensemble(Estimator):
     """n copies of a regressor that differ by their rows or by their seeds.
 
     The mean is that of the copies. The variance is that of their means, plus the mean of their own
-    variances if the regressor tells them (Lakshminarayanan et al., Simple and scalable predictive
+    variances if the regressor has them (Lakshminarayanan et al., Simple and scalable predictive
     uncertainty estimation using deep ensembles, NIPS 2017), or else plus the mean squared error at
-    rows that a copy did not see, less what of it the copies' disagreement there explains.
+    rows that a copy did not see, less the part of it that the copies' disagreement explains.
 
-    Rows that have to stay in order, as those of ``NamedEffects``, cannot be drawn: give it
-    ``bootstrap=False``, and the copies differ by their seeds alone.
+    ``NamedEffects`` needs rows in order, which cannot be drawn: give it ``bootstrap=False``; the
+    copies then differ by their seeds alone.
 
     Args:
         regressor: Any scikit-learn regressor, ours included; by default

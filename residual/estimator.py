@@ -94,7 +94,7 @@ class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
         Raises:
             sklearn.exceptions.NotFittedError: ``fit`` was not called.
             ValueError: X has another width than in ``fit``, or a value is not finite.
-            NotFinite: X lies so far from the data that the prediction is no number.
+            NotFinite: X lies so far from the data that the prediction is not finite.
         """
         rows = self._rows(X)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -174,7 +174,7 @@ _COMMON = ("n_features_in_", "flat_", "target_mean_", "target_scale_")
 
 
 class NotFinite(ValueError):
-    """A prediction that would be no number; it is never returned."""
+    """A prediction that would not be finite; it is never returned."""
 
 
 def _far(name: str, rows: Array, mean: Array) -> str:

@@ -28,22 +28,23 @@ class GaussianProcess(Estimator):
 
     Fit in two steps. The length scales, signal variance and noise variance of each output
     maximise the marginal likelihood (gpytorch, L-BFGS) of at most ``hyper_points`` random rows.
-    Where they do not predict as many other rows well, the likelihood is maximised again with 30 %
-    of the variance or more as noise, and what predicts those rows better is taken; an output that
-    neither predicts is all noise. Of a target that jumps, as at impacts, the likelihood has a
-    second maximum with next to no noise, at length scales so short that the process remembers
-    rows and predicts little. The process is then conditioned, in double precision, on
+    If they do not predict as many other rows well, the likelihood is maximised again with 30 %
+    of the variance or more as noise, and the fit that predicts those rows better is taken; an
+    output that neither predicts is all noise. (For a target that jumps, as at impacts, the
+    likelihood has a second maximum with next to no noise, at length scales so short that the
+    process remembers rows and predicts little.) The process is then conditioned, in double
+    precision, on
 
     * all n rows exactly if n <= ``max_points`` (cost n^3 / 3 per output), else
     * ``inducing`` of the rows that summarise all of them (Titsias, Variational learning of
       inducing variables in sparse Gaussian processes, AISTATS 2009; cost n * inducing^2 per
-      output), with the noise variance that maximises his bound, so that what the summary
+      output), with the noise variance that maximises that paper's bound, so that what the summary
       loses is counted as noise.
 
-    Where all rows are kept, the standard deviation is then scaled for each output: with whole
-    neighbourhoods left out, intervals of 90 % shall cover 90 % (``residual.calibration``). A
-    noise variance at its lower bound keeps matrices well conditioned and says nothing about
-    observations, so it hides no error there.
+    If all rows are kept, the standard deviation is then scaled for each output so that intervals of
+    90 % cover 90 % of whole neighbourhoods that are left out (``residual.calibration``). A
+    noise variance at its lower bound only keeps matrices well conditioned; it says nothing about
+    observations.
 
     The default crossover of 4000 rows is where the exact factor of one output takes about a
     second and 128 MB. Factors are needed for the standard deviation only; they are kept while
@@ -52,7 +53,7 @@ class GaussianProcess(Estimator):
     Args:
         kernel: ``"rbf"`` or ``"matern"`` (smoothness 5/2).
         max_points: Most rows to be conditioned on exactly.
-        inducing: Number of inducing points beyond.
+        inducing: Number of inducing points if there are more rows.
         hyper_points: Rows to learn length scales and variances from.
         max_iter: Most iterations of L-BFGS per output.
         calibrate: Scale the standard deviation by neighbourhoods left out.
@@ -64,7 +65,7 @@ class GaussianProcess(Estimator):
         noise_: Noise variance, shape (n_out,), in the same unit.
         spread_factor_: Factor of the noise-free standard deviation, shape (n_out,).
         points_: The rows or inducing points conditioned on, standardised, shape (m, n_in).
-        exact_: Whether they are all rows.
+        exact_: Whether ``points_`` are all rows.
         n_iter_: Iterations of L-BFGS for each output, shape (n_out,).
     """
 

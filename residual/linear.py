@@ -30,8 +30,8 @@ class Linear(Estimator):
     noise variance s^2, gives mean and standard deviation (Bishop, Pattern Recognition and
     Machine Learning, 2006, section 3.3). By default alpha and s^2 maximise the evidence of the
     training data for each output by itself (section 3.5), so that 40 rows and 10^5 rows both
-    get a fitting amount of shrinkage. The deviation knows noise and few data, not that the true
-    function may lie outside the span of the features.
+    get a fitting amount of shrinkage. The deviation accounts for noise and few data, not for
+    a true function outside the span of the features.
 
     Memory grows with the square of the number of features, not with the number of rows.
 

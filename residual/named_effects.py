@@ -27,7 +27,7 @@ class NamedEffects(Estimator):
 
     Args:
         simulator: The simulator whose difference is learnt, as ``for_simulator`` sets it.
-        most_rows: At most so many rows are looked at, in pieces spread over all of them.
+        most_rows: Most rows to look at, in pieces spread over all of them.
 
     Attributes:
         effects_: The effects found, each with its numbers; empty if there is no gap above noise.
@@ -111,7 +111,7 @@ class NamedEffects(Estimator):
         return mean, np.sqrt(variance)
 
     def corrected(self) -> HostSimulator:
-        """The simulator with the effects in it: one step of it is a step and its difference."""
+        """The simulator with the effects: its step is the simulator's plus the difference."""
         simulator = self._host()
         return simulator.with_effects((*simulator.effects, *self.effects_))
 

@@ -25,8 +25,8 @@ class EquationOfMotion(HostSimulator):
     """A mechanical system q'' = f(q, v, u, force); it hosts every effect.
 
     A subclass gives ``state_channels`` (each position and its rate, in any order),
-    ``action_channels``, ``dt``, ``parameters`` and ``acceleration``; ``joints`` only if the
-    forces are not called after the positions or not in N m (angles) and N (the rest).
+    ``action_channels``, ``dt``, ``parameters`` and ``acceleration``. It needs ``joints`` only if
+    forces are not to be called after the positions, or not in N m (angles) and N (the rest).
 
     Runge-Kutta 4 over ``substeps`` equal sub-steps advances all rows at once. With dry
     friction a rate that reaches zero is located in the sub-step and held exactly.
@@ -207,7 +207,7 @@ class FirstOrderSystem(HostSimulator):
         """Rates of change, by row: (n, n_s), (n, n_a) and parameters -> (n, n_s)."""
 
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
-        """See ``HostSimulator.integrate``: the states are rates of positions that nobody asks."""
+        """See ``HostSimulator.integrate``: the states are rates of positions that are not used."""
         names = [channel.name for channel in self.physical_channels]
         forces = [(names.index(e.joint), e) for e in self.joint_effects()]
 

@@ -41,7 +41,7 @@ class HostSimulator(Simulator):
         substeps: Sub-steps in one control period.
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
         has_contacts: True if motion jumps at impacts, so that it can be compared with logs over
-            short windows only (``residual.gap.impacts``); see ``for_motion``.
+            short windows only (``residual.gap.fitting.impacts``); see ``for_motion``.
         advances_rows_at_once: True if ``integrate`` advances all rows together, each with its own
             values of effects and parameters, so that a batch costs little more than a row.
         lagged: How an input with a lag acts in sub-steps, see ``sims.drive.lagged``.

@@ -78,10 +78,10 @@ class Parameter:
     """A physical parameter that a simulator declares: value, unit, meaning and bounds.
 
     ``value`` may be an array with one entry per row of a batch. ``scale`` is a typical size, for
-    a parameter whose value is zero; otherwise the value tells. ``family`` is that of the effects
+    a parameter whose value is zero; by default it is the value. ``family`` is that of the effects
     which a change of it resembles, ``"dissipation"`` for a damping (``sims.effects.Effect``).
     ``bold`` is a change, as a share of the value, that a search tries in full, for a parameter of
-    which small changes may do nothing: friction that holds as it is.
+    which small changes may do nothing, such as friction that holds anyway.
     """
 
     value: float | Array

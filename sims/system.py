@@ -29,8 +29,8 @@ USUAL_STARTS = 5
 class EvaluationProtocol:
     """How policies are tested while they learn and afterwards, and where accuracy is measured.
 
-    On a simulator tests are free; on the true system they are measurement and not counted, as
-    in the paper.
+    Tests on a simulator are free. Tests on the true system are not counted as samples, as in the
+    paper.
 
     Args:
         every: Steps of learning on a simulator between tests.
@@ -38,14 +38,14 @@ class EvaluationProtocol:
         episodes: Rollouts without noise per test, each from its own start state.
         noisy: Rollouts with a little noise per test on a model; they keep a policy from being
             chosen for one lucky path through the model's errors.
-        finalists: So many of the best policies of a training are tested once more at its end.
+        finalists: How many of the best policies of a training are tested once more at its end.
         final_episodes: Rollouts of each of them, from other starts; 0 for no final.
         true_episodes: Rollouts of the policy kept on the true system: the result. All policies of
             a seed begin in the same states. None: 5, or 1 where every reset gives the same state.
-        visited_seconds: Accuracy is measured over the first so many seconds of fresh rollouts, at
+        visited_seconds: Accuracy is measured over this many first seconds of fresh rollouts, at
             least 20 control periods.
         visited_rollouts: How many of those.
-        visited_stride: Open-loop predictions start at every so many-th state of them.
+        visited_stride: Open-loop predictions start at every n-th state of them, this being n.
     """
 
     every: int = 500

@@ -14,8 +14,8 @@ from sims.simulator import Array, wrap
 class Task(abc.ABC):
     """A task on top of a simulator; rewards are computed on the state the system reached.
 
-    States have the physical channels in order, n_s of them; the hidden memory of effects, such as
-    the commands that a delay holds back, is no task's business.
+    States have the physical channels in order, n_s of them. The hidden memory of effects, such as
+    the commands that a delay holds back, is not shown to tasks.
 
     Attributes:
         horizon: Steps after which an episode is cut (a time-out, not a failure).

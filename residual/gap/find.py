@@ -1,53 +1,25 @@
-"""The pipeline: data, numerics, search, choice, confirmation, verdict."""
+"""The pipeline: look, settle, search, confirm, judge."""
 
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from residual.gap.aliases import aliases, representatives
-from residual.gap.answer import confirm, judged_apart, matters, summed_up, told
-from residual.gap.candidates import Candidate, candidates
-from residual.gap.confirmation import CLEARLY
-from residual.gap.conventions import otherwise
-from residual.gap.data import examine
-from residual.gap.excerpt import excerpt
-from residual.gap.explain import Explanation, explain
-from residual.gap.free_parameters import better, worth_freeing
-from residual.gap.horizon import usual_horizon
-from residual.gap.known import KNOWN
-from residual.gap.lone import explains_the_rest, lone_stretch
-from residual.gap.numerics import (
-    fits_better,
-    forecast_error,
-    held_as,
-    held_otherwise,
-    how_held,
-    stride_for,
-)
-from residual.gap.prepare import Prepared, prepare
+from residual.gap.answer.answer import judged_apart, matters, summed_up, told
+from residual.gap.data.examine import examine
+from residual.gap.data.excerpt import excerpt
+from residual.gap.model.workers import workers
+from residual.gap.preparation.conventions import otherwise
+from residual.gap.preparation.numerics import held_as, stride_for
 from residual.gap.result import GapResult
-from residual.gap.search import Search
-from residual.gap.smooth import LEAD, SmoothFitter
-from residual.gap.suited import beyond_noise, horizon_of_windows, needs_closer_rows
-from residual.gap.twins import exact_twins, with_twins
-from residual.gap.workers import workers
+from residual.gap.search.known import KNOWN
+from residual.gap.steps import Clock, Inquiry, Offered, look, settle
 from residual.trajectories import Trajectory
 from sims.contract import refuse_unsound
 from sims.effects.base import Effect
 from sims.host import HostSimulator
-from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Hold
-
-Array = NDArray[np.float64]
-
-#: Part of the time budget after which nothing new is tried.
-SEARCHING = 0.7
 
 
 def find_gap(
@@ -81,7 +53,7 @@ def find_gap(
         measured_input: True if the logged inputs were measured at the actuator's output; what
             happens before that (dead zone, saturation, lag) is then no candidate.
         horizon: Forecast length in seconds; by default a third of the usual period of the motion,
-            see ``residual.gap.horizon``.
+            see ``residual.gap.preparation.horizon``.
         parameter_tolerance: How well the simulator's parameters are known, as a share of each: an
             effect is certain only if they cannot stand in for it within that, and its interval
             allows for them. 0 takes them for exact, so that intervals are of the data alone.
@@ -99,141 +71,39 @@ def find_gap(
             position of a system that strikes the ground was not measured.
     """
     refuse_unsound(simulator)
-    clock = Clock()
+    clock = Clock(minutes)
     tell = progress or (lambda _: None)
-    over = time.process_time() + 60 * minutes
-    until, at_last = over - 60 * minutes * (1 - SEARCHING), over + 60 * minutes
-    offered = chosen_effects(simulator, [LIBRARY] if effects is None else list(effects))
-    if measured_input:
-        offered = tuple(e for e in offered if not e.upstream_of_sensor)
-    examined = examine(simulator, trajectories)
-    runs = examined.trajectories
-    simulator = simulator.for_motion([run.states for run in [*runs, *held]])
-    quality = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
-    chosen_by_user = horizon is not None
-    horizon = horizon or usual_horizon(simulator, runs)
-    runs, left_out = excerpt(runs, stride_for(runs, horizon))
-    for says in [*quality, *left_out]:
-        tell(says)
+    log = look(simulator, trajectories, held, horizon, tell)
     tell("looking for effects that move alike")
-    groups, sets = aliases(simulator, offered, runs)
-    kept = representatives(simulator, offered, groups)
-    named = {str(effect): effect for effect in offered}
-
-    def explained(
-        simulator: HostSimulator,
-        ready: Prepared,
-        beside: Sequence[Candidate] = (),
-        earlier: Search | None = None,
-    ) -> Explanation:
-        free = {candidate.label for candidate in beside}
-        pool = ready.pool(candidates(simulator, kept, ready.fitter.samples))
-        pool = [candidate for candidate in pool if candidate.label not in free]
-        others = {label: effect for label, effect in named.items() if label not in free}
-        twins = exact_twins(simulator, ready.fitter.samples, groups, others)
-        lead = 0.0 if simulator.has_contacts else ready.horizon * LEAD / (1 - LEAD)
-        begun = f" begun from {lead:.3g} s before" if lead else ""
-        ahead = f"forecasts over {ready.horizon:.3g} s{begun}"
-        tell(f"{len(ready.fitter.blocks)} blocks of data, {ahead}, {len(pool)} candidate effects")
-        tell("screening them")
-        return explain(
-            simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, tell, until,
-            beside, earlier, twins,
-        )  # fmt: skip
-
+    offered = Offered.of(log, effects, measured_input)
+    inquiry = Inquiry(offered, clock, tell)
     with workers(n_jobs):
-        simulator = held_as(simulator, hold)
+        simulator = held_as(log.simulator, hold)
         clock.lap("read")
-        tell("fitting the nominal simulator")
-        prepared = prepare(simulator, runs, horizon)
-        if not chosen_by_user and not simulator.has_contacts:
-            if needs_closer_rows(runs, prepared):
-                horizon = horizon_of_windows(prepared)
-                tell(f"windows end early, where motion is unstable: rows for {horizon:.3g} s")
-                every = examined.trajectories
-                runs, left_out = excerpt(every, stride_for(every, horizon))
-                prepared = prepare(simulator, runs, horizon)
-            prepared = beyond_noise(simulator, runs, prepared)
-            horizon = prepared.horizon
-        conventions = None
-        if isinstance(prepared.fitter, SmoothFitter):
-            conventions = otherwise(simulator, prepared.fitter)
+
+        log, prepared = settle(simulator, log, horizon is not None, tell)
+        conventions = otherwise(simulator, prepared.fitter)
         if conventions is not None:
             tell(f"does the log count otherwise, by {' or '.join(conventions.changes)}?")
-        quality += left_out
-        found = explained(simulator, prepared)
-        other = held_otherwise(simulator) if hold is None else None
-        if other is not None and fits_better(found.search, found.key, other):
-            tell("inputs held the other way fit better: once more so")
-            ready = prepare(other, runs, horizon)
-            again = explained(other, ready)
-            if clearly_better(again, found):
-                prepared, found = ready, again
-                quality.append(
-                    f"inputs were taken to {how_held(other)}: the data fit better so; set hold to "
-                    "say otherwise"
-                )
-            elif again.search.late:
-                quality.append(
-                    f"the data fit better with inputs taken to {how_held(other)}, but there was no "
-                    "time to search so: set hold to say which it is, or give more --minutes"
-                )
+
+        found = inquiry.explained(simulator, prepared)
+        on_hold: list[str] = []
+        if hold is None:
+            prepared, found, on_hold = inquiry.other_hold(log, prepared, found)
         clock.lap("search")
+
         tell("confirming")
         asked = matters(found, tolerance)
-        answer = confirm(found, groups, asked, parameter_tolerance, at_last)
-        stretch = lone_stretch(answer) if asked else None
-        if stretch is not None:
-            left_out = False
-            if time.process_time() < until:
-                tell("once more without a stretch that nothing explains")
-                ready = prepare(found.search.simulator, stretch.cut_from(runs), horizon)
-                again = explained(found.search.simulator, ready)
-                second = confirm(again, groups, asked, parameter_tolerance, at_last)
-                if left_out := explains_the_rest(second):
-                    prepared, found, answer = ready, again, second
-            quality.append(stretch.says(left_out))
-        beside = worth_freeing(answer, parameter_tolerance) if asked else []
-        if beside and time.process_time() > over:
-            quality.append(
-                "parameters within their tolerance may hide what is missing, or explain some of "
-                "what is left: there was no time to look, give more --minutes"
-            )
-        elif beside:
-            tell("once more with parameters free within their tolerance")
-            again = explained(found.search.simulator, prepared, beside, found.search)
-            second = confirm(again, groups, asked, parameter_tolerance, at_last)
-            if better(second, answer):
-                answer = second
-        answer = dataclasses.replace(
-            answer, claims=with_twins(answer.found.search, answer.key, answer.claims)
-        )
+        prepared, answer, said = inquiry.confirmed(log, prepared, found, asked, parameter_tolerance)
         clock.lap("confirm")
-        table = summed_up(answer)
-        apart = None
+
+        table, apart = summed_up(answer), None
         if held:
-            others, _ = excerpt(examine(simulator, held).trajectories, stride_for(held, horizon))
+            others, _ = excerpt(
+                examine(simulator, held).trajectories, stride_for(held, log.horizon)
+            )
             apart = judged_apart(answer, prepared, others, table)
         clock.lap("forecast")
-    result = told(answer, table, apart, sets, tolerance, quality, clock.laps)
+    quality = [*log.findings, *log.left_out, *on_hold, *said]
+    result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)
     return dataclasses.replace(result, conventions=conventions)
-
-
-def clearly_better(one: Explanation, other: Explanation) -> bool:
-    """Whether one explanation's forecasts are so much better that the other's are excluded."""
-    errors = [forecast_error(found.search, found.key) for found in (one, other)]
-    return CLEARLY**2 * errors[0] < errors[1]
-
-
-class Clock:
-    """Seconds by stage."""
-
-    def __init__(self) -> None:
-        self.laps: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def lap(self, stage: str) -> None:
-        """End of a stage."""
-        now = time.perf_counter()
-        self.laps[stage] = now - self._last
-        self._last = now

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.where import Where
+from residual.gap.fitting.where import Where
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 

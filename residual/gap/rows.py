@@ -12,11 +12,11 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.aliases import aliases
-from residual.gap.candidates import candidates
-from residual.gap.explain import explain
-from residual.gap.intervals import deviations
-from residual.gap.prepare import prepare
+from residual.gap.confirmation.aliases import aliases
+from residual.gap.fitting.intervals import deviations
+from residual.gap.model.candidates import candidates
+from residual.gap.preparation.prepare import prepare
+from residual.gap.search.explain import explain
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.effects.library import library, typical

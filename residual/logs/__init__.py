@@ -1,4 +1,4 @@
-"""Measured logs (CSV, Parquet, NPZ) as trajectories in SI units, or one clear error."""
+"""Measured logs (text, Parquet, NPZ, MCAP, HDF5, data sets) as trajectories in SI units."""
 
 from residual.logs.checks import Finding
 from residual.logs.layout import Column, LogFormat

@@ -31,7 +31,7 @@ def read_table(
             number of blanks), or ``"auto"``.
         header: Whether the first row of text that is no comment names the columns.
         comment: Lines of text that begin with it are left out.
-        skip: So many lines at the top of a text are left out.
+        skip: How many lines at the top of a text to leave out.
 
     Raises:
         LogError: The file cannot be read, or does not look like a table.

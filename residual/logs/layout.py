@@ -53,7 +53,7 @@ class LogFormat:
         delimiter: Of a text file: a character or ``comma``, ``semicolon``, ``tab``, ``blank``;
             ``auto`` looks at the first row.
         comment: Lines of a text file that begin with it are left out.
-        skip: So many lines at the top of a text file are left out.
+        skip: How many lines at the top of a text file to leave out.
         decimal: Decimal sign of a text file.
         gap: A trajectory is cut where samples are further apart than this many usual periods: the
             median step, or that of the longest tenth.

@@ -104,7 +104,7 @@ class Leo(HostSimulator):
         stops: Whether the joints have the mechanical stops of the robot; the authors' model
             has none.
         voltage: Largest voltage of the motors; 8.6 V in the authors' code at the time of the paper,
-            which learning takes longer with (docs/deviations.md).
+            with which learning takes longer (docs/deviations.md).
         dt: Control period in seconds.
         substeps: Sub-steps per control period, each of five steps of Pymunk.
         effects: What acts beside all that.

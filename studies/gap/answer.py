@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from residual.gap import GapResult
-from residual.gap.confirmation import FEW, TOO_FEW
+from residual.gap.confirmation.certainty import FEW, TOO_FEW
 from residual.gap.result import Doubt, Gap, Meant, Number, Verdict
 from studies.gap.words import (
     KINDS,

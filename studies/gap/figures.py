@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from residual.gap import GapResult
+from residual.gap.fitting.where import Profile
 from residual.gap.result import Rollout
-from residual.gap.where import Profile
 from studies.gap.words import FLOOR, gap_rows, quantity_text, typeset
 from studies.reporting.figures import (
     AMBER,

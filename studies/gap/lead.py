@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from residual.gap import GapResult
-from residual.gap.forecasts import own_channels
+from residual.gap.fitting.forecasts import own_channels
 from residual.gap.result import ChannelGap, Verdict
 from studies.gap.answer import rivals
 from studies.gap.words import (

@@ -19,15 +19,15 @@ import pandas as pd
 import threadpoolctl
 from jsonargparse.typing import PositiveInt
 
-from residual.gap.adequacy import remainder
-from residual.gap.aliases import aliases, representatives
-from residual.gap.candidates import candidates
-from residual.gap.horizon import usual_horizon
-from residual.gap.noise import Floor
-from residual.gap.prepare import prepare
-from residual.gap.screening import gains
-from residual.gap.search import Search
-from residual.gap.smooth import SmoothFitter
+from residual.gap.confirmation.aliases import aliases, representatives
+from residual.gap.fitting.adequacy import remainder
+from residual.gap.fitting.noise import Floor
+from residual.gap.fitting.screening import gains
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.model.candidates import candidates
+from residual.gap.preparation.horizon import usual_horizon
+from residual.gap.preparation.prepare import prepare
+from residual.gap.search.sets import Search
 from simgap_files import atomic_write_text
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation

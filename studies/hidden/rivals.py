@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 from scipy.stats import chi2
 
-from residual.gap.aliases import aliases, representatives
-from residual.gap.candidates import candidates
-from residual.gap.model import Model
-from residual.gap.samples import Samples
+from residual.gap.confirmation.aliases import aliases, representatives
+from residual.gap.data.samples import Samples
+from residual.gap.model.candidates import candidates
+from residual.gap.model.model import Model
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.host import HostSimulator

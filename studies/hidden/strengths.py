@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.blocks import blocks
-from residual.gap.candidates import Trial, candidates
-from residual.gap.fitting import Fit
-from residual.gap.model import Model
-from residual.gap.samples import Samples
-from residual.gap.screening import signatures
-from residual.gap.screening import trials as trial_variants
-from residual.gap.slopes import slopes
-from residual.gap.smooth import SmoothFitter
-from residual.gap.windows import cut
+from residual.gap.data.blocks import blocks
+from residual.gap.data.samples import Samples
+from residual.gap.data.windows import cut
+from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.screening import signatures
+from residual.gap.fitting.screening import trials as trial_variants
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.model.candidates import Trial, candidates
+from residual.gap.model.model import Model
+from residual.gap.model.slopes import slopes
 from residual.trajectories import Trajectory
 from sims import effects as known
 from sims.effects.base import Effect

@@ -126,7 +126,7 @@ def learn_by_difference(
         Policies, difference models and their accuracy, with ``report`` and ``plot``.
 
     Raises:
-        TypeError: An argument is no such object as it says.
+        TypeError: An argument is of another type than it should be.
         ValueError: The parts do not fit together, or a budget is too small to learn anything.
     """
     _expect("estimator", estimator, Regressor, "residual.Linear()")

@@ -23,7 +23,7 @@ Record = dict[str, Any]
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Learnt:
-    """What the loop leaves.
+    """The result of the learning loop.
 
     Attributes:
         system: What it was about, in plain values.
@@ -41,7 +41,7 @@ class Learnt:
 
     @classmethod
     def of(cls, system: System) -> Learnt:
-        """Nothing yet."""
+        """An empty result for a system."""
         return cls(system.description())
 
     @property

@@ -90,7 +90,7 @@ class Steps:
 
         Args:
             policy: The last one.
-            samples: So many.
+            samples: How many.
             update: Which update they are for.
             known: What was learnt of the difference, for the state that the policy sees.
         """

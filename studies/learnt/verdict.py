@@ -33,7 +33,7 @@ class Evidence:
 
     Attributes:
         gain: Return above the idealised policy's, over the pairs.
-        seeds: So many were compared; a single one is compared start by start.
+        seeds: How many were compared; a single one is compared start by start.
         worth: The same above the control's; None without a control.
         unchanged: Whether the return is the idealised policy's.
         error: One-step error of the model where the policy goes, as a share of the gap, of its

@@ -12,7 +12,7 @@ import pandas as pd
 from damage import OTHER, REFUSED, SAME, TOLD, Defect, damaged
 from sound_logs import BINARY, LAYOUTS, SIMULATOR, TABLE, TEXT, folder_of, sound
 
-from residual.gap.data import findings
+from residual.gap.data.examine import findings
 from residual.logs import Column, LogError, LogFormat, read_logs
 
 KINDS = (*TEXT, *BINARY)

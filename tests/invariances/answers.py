@@ -9,8 +9,8 @@ from changes import CHANGES, joined, other_units
 from logs import Log, log
 
 from residual.gap import GapResult, find_gap
-from residual.gap.data import examine
-from residual.gap.horizon import usual_horizon
+from residual.gap.data.examine import examine
+from residual.gap.preparation.horizon import usual_horizon
 
 #: Kinds that the answer consists of; the others (minor, what this log cannot show) are notes.
 ANSWERS = ("confirmed", "ambiguous", "unexplained", "no_gap")

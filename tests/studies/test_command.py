@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from residual.gap.windows import Windows
+from residual.gap.data.windows import Windows
 from residual.logs.units import find_unit
 from studies import learn
 from studies.learning.settings import build_parser

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from residual.gap import find_gap
-from residual.gap.adequacy import CHANCE, ERRORS
+from residual.gap.fitting.adequacy import CHANCE, ERRORS
 from sims.effects import Backlash
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation

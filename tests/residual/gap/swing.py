@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from residual.gap.data import findings
+from residual.gap.data.examine import findings
 from residual.trajectories import Trajectory
 from sims.pendulum_equation import PendulumEquation
 

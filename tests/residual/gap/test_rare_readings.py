@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from residual.gap import find_gap
-from residual.gap.prepare import prepare
-from residual.gap.samples import Samples
+from residual.gap.data.samples import Samples
+from residual.gap.preparation.prepare import prepare
 from residual.trajectories import Trajectory
 from sims.effects import ConstantLoad, CoulombFriction
 from sims.pendulum_equation import PendulumEquation

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from residual.gap import find_gap
-from residual.gap.data import findings
-from residual.gap.forecasts import own_channels
+from residual.gap.data.examine import findings
+from residual.gap.fitting.forecasts import own_channels
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorBias
 from sims.equations import FirstOrderSystem

@@ -11,15 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from swing import sticking
 
-from residual.gap.candidates import candidates
+from residual.gap.data.samples import Samples
 from residual.gap.find import find_gap
-from residual.gap.global_search import GlobalSearch, _Space
-from residual.gap.horizon import usual_horizon
-from residual.gap.model import Model
-from residual.gap.paths import variation
-from residual.gap.prepare import Prepared, prepare
-from residual.gap.samples import Samples
-from residual.gap.short_forecasts import ShortForecasts
+from residual.gap.fitting.short_forecasts import ShortForecasts
+from residual.gap.model.candidates import candidates
+from residual.gap.model.model import Model
+from residual.gap.model.paths import variation
+from residual.gap.preparation.horizon import usual_horizon
+from residual.gap.preparation.prepare import Prepared, prepare
+from residual.gap.search.global_search import GlobalSearch, _Space
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorGain, StribeckFriction
 from sims.equations import EquationOfMotion

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from residual.gap import find_gap
-from residual.gap.prepare import prepare
+from residual.gap.preparation.prepare import prepare
 from residual.trajectories import Trajectory
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.simulator import Channel, Parameter

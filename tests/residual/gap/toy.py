@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from residual.gap.blocks import Blocks
-from residual.gap.currency import Currency
-from residual.gap.windows import Windows
+from residual.gap.data.blocks import Blocks
+from residual.gap.data.windows import Windows
+from residual.gap.search.currency import Currency
 from sims.effects import (
     ActuatorGain,
     ConstantLoad,

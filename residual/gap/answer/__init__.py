@@ -1,0 +1,1 @@
+"""From a choice to verdicts and tables, as plain data."""

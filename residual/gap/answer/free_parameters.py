@@ -1,0 +1,59 @@
+"""Parameters that are a little off may hide what is missing: when to look again with them free."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from residual.gap.answer.answer import Answer, summed_up, within_noise
+from residual.gap.confirmation.tolerance import allowed, calibrated
+from residual.gap.fitting.intervals import at_bound
+from residual.gap.model.candidates import Candidate
+from residual.gap.search.choice import takes_off
+from residual.gap.search.explain import FOOTNOTE
+
+
+def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
+    """Parameters within their tolerance, if they hide something or explain much of what is left.
+
+    They do where nothing could be named, though forecasts err by more than noise, or where they
+    take a material part of the error off, free beside what was named. Parameters that were named
+    are none of them.
+
+    Args:
+        answer: What was found with all parameters at their values.
+        tolerance: How well they are known, as a share of each.
+    """
+    search, key = answer.found.search, answer.key
+    left = search.fitter.left(search.tried[key], answer.found.floor)
+    if not tolerance or left.adequate or left.ratio <= FOOTNOTE:
+        return []
+    if not key and within_noise(summed_up(answer)):
+        return []
+    named = search.labels(key)
+    free = [one for one in allowed(search, tolerance) if one.label not in named]
+    if not free or not key:
+        return free
+    squares = calibrated(search, key, free).squares
+    return free if takes_off(search.currency, search.validated[key].squares, squares) else []
+
+
+def better(second: Answer, first: Answer) -> bool:
+    """Whether an answer with parameters free forecasts materially better than one without.
+
+    Where nothing is named beside them, most parameters must lie inside their tolerance: what pulls
+    them all to its end is something else.
+    """
+    search = first.found.search
+    if not second.key and _pinned(second) > 0.5:
+        return False
+    before = search.validated[first.key].squares
+    after = second.found.search.validated[second.key].squares
+    gained, error = search.currency.difference(before, after)
+    return gained > error and takes_off(search.currency, before, after)
+
+
+def _pinned(answer: Answer) -> float:
+    """Share of the free parameters that lie at an end of their tolerance."""
+    search = answer.found.search
+    fit, first = search.tried[answer.key], search.numbers(answer.key)
+    return float(np.mean([at_bound(fit, j) for j in range(first, len(fit.theta))]))

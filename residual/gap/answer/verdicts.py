@@ -1,0 +1,258 @@
+"""The answer: which effects are certain, which of several, what is minor, what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from residual.gap.confirmation.certainty import FEW, TOO_FEW
+from residual.gap.confirmation.claim import Claim
+from residual.gap.fitting.contract import Left
+from residual.gap.result import Blind, Doubt, Gap, Kind, Number, Span, Verdict
+from residual.gap.search.sets import Key, Search
+
+#: Families of which an effect may be one and still be worth a name, if forecasts do not clearly
+#: need it. What they do need makes a better simulator, whichever of many it is.
+UNNEEDED = 3
+#: Part of a strength below which an effect hardly acts.
+NEARLY_NONE = 0.1
+#: Part of what a parameter may change by that is a change.
+MOVED = 1e-3
+
+
+def nameable(search: Search, claim: Claim, blocks: int, adequate: bool) -> bool:
+    """Whether an effect has few enough rivals, a size, and data enough, to be named at all.
+
+    Nor is one named that makes forecasts worse, unless chance decides, or fits to all data.
+    """
+    if not adequate and claim.share[0] <= 0 and not claim.by_fit:
+        return False
+    few = claim.needed or len(families(search, claim)) <= UNNEEDED
+    there = claim.by_fit or not may_vanish(search, claim)
+    return few and blocks >= TOO_FEW and there
+
+
+def may_vanish(search: Search, claim: Claim) -> bool:
+    """Whether none of an effect's strengths is known to be other than zero."""
+    numbers = _strengths(search, claim)
+    return bool(numbers) and all(
+        n.low <= 0 <= n.high and (not n.at_bound or n.value == 0) for n in numbers
+    )
+
+
+def hardly_known(search: Search, claim: Claim) -> bool:
+    """Whether every strength of an effect may be less than a part of what was found."""
+    told = [n for n in _strengths(search, claim) if n.value and not n.at_bound]
+    return bool(told) and max(min(n.low / n.value, n.high / n.value) for n in told) < NEARLY_NONE
+
+
+def _strengths(search: Search, claim: Claim) -> list[Number]:
+    """The numbers of an effect without which it is absent."""
+    knobs = search.candidates[claim.number].knobs
+    fields = [knob.field for knob in knobs if knob.strength]
+    return [claim.numbers[field] for field in fields if field in claim.numbers]
+
+
+def families(search: Search, claim: Claim) -> set[str]:
+    """Families that an effect cannot be told from, its own included; a loner is its own.
+
+    What makes the same motion counts as one.
+    """
+    numbers = {candidate.label: i for i, candidate in enumerate(search.candidates)}
+    own = search.family(claim.number) or search.candidates[claim.number].label
+    # A rival that was not offered has a label only.
+    known = [search.family(numbers[label]) if label in numbers else "" for label in claim.rivals]
+    return {own} | {family or label for family, label in zip(known, claim.rivals, strict=True)}
+
+
+def effect_verdict(
+    search: Search,
+    claim: Claim,
+    blocks: int,
+    stand_ins: Sequence[str] = (),
+    together: Sequence[tuple[str, ...]] = (),
+) -> Verdict:
+    """One chosen effect.
+
+    Args:
+        search: With the candidates.
+        claim: What bears on it.
+        blocks: Blocks of data.
+        stand_ins: Effects that could stand in its place beside the other chosen ones, exactly.
+        together: Sets of effects that make the same motion in one exact proportion.
+    """
+    claim = claim.less(stand_ins)
+    effect = search.candidates[claim.number].effect
+    vanishes = may_vanish(search, claim) or hardly_known(search, claim)
+    sure = claim.sure and blocks >= TOO_FEW and not vanishes
+    kind: Kind = "confirmed" if sure else "ambiguous"
+    family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""
+    numbers = ", ".join(
+        f"{name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}"
+        for name, n in claim.numbers.items()
+    )
+    given = {
+        name: float(getattr(effect, name))
+        for name, quantity in effect.quantities(search.simulator).items()
+        if not quantity.fitted and getattr(effect, name) != 0
+    }
+    spelt = "".join(f", {name} {value:g}" for name, value in given.items())
+    says = [f"{effect}{spelt}: {numbers}"]
+    if claim.form:
+        says.append(f"{family}, form undecided: {', '.join(claim.form)} would do as well")
+    if claim.alike:
+        says.append(f"the same motion in these data: {', '.join(claim.alike)}")
+    if claim.rivals:
+        rivals = dict.fromkeys(
+            f"{name} of another order" if name == str(effect) else name for name in claim.rivals
+        )
+        says.append(f"these data cannot exclude {', '.join(rivals)}")
+    twins = tuple(dict.fromkeys((*claim.twins, *stand_ins)))
+    if twins:
+        says.append(f"the same motion as {', '.join(twins)}")
+    if together:
+        sets = " or ".join(" with ".join(names) for names in together[:2])
+        says.append(f"{sets}, in one exact proportion, would move alike")
+    if claim.slight:
+        says.append("what has no name may favour it by as much as it takes off")
+    elif claim.calibration:
+        says.append("parameters that are a few percent off would do as well")
+    if claim.unasked:
+        says.append("there was no time to ask what parameters a few percent off would do")
+    if claim.brief:
+        says.append("shorter than half a sample, as late time stamps and filters in sensors are")
+    if not claim.needed:
+        says.append("forecasts are not clearly worse without it")
+    if not claim.steady:
+        says.append("its size differs between parts of the data")
+    if not claim.sound:
+        says.append("its size changes with the integration step or the input's hold")
+    if claim.bounded:
+        says.append("its size is at its bound")
+    if vanishes:
+        says.append("its size may be zero")
+    if not claim.gains:
+        says.append("its share of the gap may be zero")
+    if claim.by_fit and not (claim.needed and claim.gains):
+        says.append("a fit to all data leaves three times as much without it")
+    return Verdict(
+        kind, effect.name, effect.where, claim.numbers,
+        tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
+        "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
+        doubts(claim, vanishes), shape=given, meant=claim.meant, beside=claim.beside,
+    )  # fmt: skip
+
+
+def doubts(claim: Claim, vanishes: bool) -> tuple[Doubt, ...]:
+    """Why an effect is not certain."""
+    why: dict[Doubt, bool] = {
+        "not_needed": not claim.needed,
+        "unsteady": not claim.steady,
+        "numerics": not claim.sound,
+        "at_bound": claim.bounded,
+        "calibration": claim.calibration and not claim.slight,
+        "slight": claim.slight,
+        "no_time": claim.unasked,
+        "clock": claim.brief,
+        "may_be_zero": vanishes,
+        "share_may_be_zero": not claim.gains,
+        "rivals": bool(claim.rivals or claim.alike),
+    }
+    return tuple(doubt for doubt, there in why.items() if there)
+
+
+def calibrated_verdict(search: Search, key: Key) -> Verdict:
+    """Parameters that were moved within their tolerance so that the rest can be seen.
+
+    Its parameters go by their own names; their intervals are all that was allowed.
+    """
+    fit, first = search.tried[key], search.numbers(key)
+    moved = {
+        str(candidate.effect): Number(float(value), knob.low, knob.high, knob.unit)
+        for candidate, value, knob in zip(
+            search.beside, fit.theta[first:], fit.model.knobs[first:], strict=True
+        )
+    }
+    taken = search.currency.share(
+        search.before.squares, search.validated[()].squares, np.random.default_rng(0)
+    )
+    moved = {name: n for name, n in moved.items() if abs(n.value) > MOVED * (n.high - n.low)}
+    changes = ", ".join(f"{name} {n.value:+.3g} {n.unit}" for name, n in moved.items())
+    return Verdict(
+        "calibrated", "", "", moved, (), "",
+        f"parameters moved within their tolerance, so that the rest can be seen: {changes}",
+        Span(*taken),
+    )  # fmt: skip
+
+
+def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdict:
+    """What has no name."""
+    share = Span(1 - gap.share.value, 1 - gap.share.high, 1 - gap.share.low)
+    says = f"{100 * share.value:.3g} % of the gap has no name: {left.ratio:.3g} times the noise"
+    if left.force:
+        says += f"; it looks like something that follows {left.force}"
+    if leads:
+        says += f"; {', '.join(leads)} might take some of it, but these data do not show that"
+    return Verdict("unexplained", "", "", {}, tuple(leads), "", says, share, follows=left.force)
+
+
+def parted_verdict(gap: Gap, leads: Sequence[str] = ()) -> Verdict:
+    """Forecasts past impacts that err by more than noise makes, whatever was named."""
+    times = gap.after.value / gap.noise_floor.value
+    share = Span(1 - gap.share.value, 1 - gap.share.high, 1 - gap.share.low)
+    says = (
+        f"{100 * share.value:.3g} % of the gap has no name: forecasts err {times:.3g} times as by "
+        "noise, and nothing of the library explains it"
+    )
+    if leads:
+        says += f"; {', '.join(leads)} might take some of it, but these data do not show that"
+    return Verdict("unexplained", "", "", {}, tuple(leads), "", says, share)
+
+
+def minor_verdict(search: Search, number: int, share: tuple[float, float, float]) -> Verdict:
+    """An effect that helps too little to be added."""
+    effect = search.candidates[number].effect
+    return Verdict(
+        "minor", effect.name, effect.where, {}, (), effect.family_in(search.simulator),
+        f"{effect}: takes too little off the error that is left without it (a fifth is asked, or "
+        "three tenths at one joint), so it is not added",
+        Span(*share),
+    )  # fmt: skip
+
+
+def no_gap_verdict(says: str) -> Verdict:
+    """Nothing above noise, or nothing that matters."""
+    return Verdict("no_gap", "", "", {}, (), "", says, Span(0.0, 0.0, 0.0))
+
+
+def blind_verdict(blind: Sequence[Blind]) -> Verdict:
+    """What this log could not show."""
+    names = ", ".join(f"{b.effect} (needs {b.needs})" for b in blind)
+    return Verdict(
+        "needs_data", "", "", {}, tuple(b.effect for b in blind), "",
+        f"this log could not show: {names}", Span(0.0, 0.0, 0.0),
+    )  # fmt: skip
+
+
+def dependent(
+    label: str, claimed: Sequence[str], sets: Sequence[tuple[str, ...]]
+) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    """What exactly dependent sets mean for one of several claimed effects.
+
+    Returns:
+        Effects that could stand in its place beside the other claimed ones, and sets of effects
+        that make the same motion together (those that share no member with the other claims).
+    """
+    stand_ins: list[str] = []
+    together: list[tuple[str, ...]] = []
+    for members in sets:
+        others = tuple(name for name in members if name != label)
+        free = tuple(name for name in others if name not in claimed)
+        if label not in members or not free:
+            continue
+        if len(free) == 1:
+            stand_ins += [name for name in free if name not in stand_ins]
+        elif len(free) == len(others):
+            together.append(free)
+    return tuple(stand_ins), tuple(together)

@@ -1,0 +1,1 @@
+"""How sure what was chosen is."""

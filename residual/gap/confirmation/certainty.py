@@ -1,0 +1,266 @@
+"""How sure a chosen effect is: without it, with rivals in its place, by folds, and numerics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.confirmation.claim import Claim, other_than
+from residual.gap.confirmation.numerics import at_half_step
+from residual.gap.fitting.intervals import bounded, deviations, ended
+from residual.gap.search.choice import AT_ONE, no_match
+from residual.gap.search.exchange import exchanged, split
+from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.significance import BETTER, score
+
+Array = NDArray[np.float64]
+
+#: Forecast error of a rival, over that of the chosen set, that excludes it while a remainder is
+#: left: model imperfection of that size may favour either.
+CLEARLY = 1.5
+#: Of a rival of the same family, which differs in form alone.
+FORM = 1.2
+#: The same from which on it is, whatever part of the data forecasts start from.
+HOPELESS = 3.0
+#: How far a strength may lie off in a fold, or with other numerics, as a share of it.
+STEADY = 0.5
+#: Standard errors by which forecasts must be worse without the effect.
+WORSE = 2.0
+#: Part of the time between samples below which a delay or lag is no more certain than the log's
+#: clock: time stamps, and filters in sensors, are as late.
+BRIEF = 0.5
+#: Blocks below which forms within a family are not told apart, and below which nothing is sure.
+FEW, TOO_FEW = 8, 4
+
+
+def claims(
+    search: Search,
+    key: Key,
+    adequate: bool,
+    groups: dict[str, tuple[str, ...]],
+    numerics: Sequence[Array],
+) -> list[Claim]:
+    """What is claimed of every chosen effect, the one that takes off most first.
+
+    Args:
+        search: With the chosen set, what is left of it without each member, and exchanges.
+        key: The chosen set.
+        adequate: Whether it leaves no more than noise, so that chance alone decides.
+        groups: Exact twins by label.
+        numerics: Its numbers at half the step and with the other hold, each (p,).
+    """
+    fit = search.tried[key]
+    half = 1.96 * deviations(fit, search.fitter.blocks)
+    limits = in_the_limit(fit.theta, numerics)
+    found = []
+    for place, number in enumerate(key):
+        own = [int(j) for j in np.flatnonzero(fit.model.owner == place)]
+        label = search.candidates[number].label
+        form, alike, rivals = near(search, key, number, adequate)
+        twins = tuple(name for name in groups.get(label, ()) if name != label)
+        strengths = [j for j in own if fit.model.knobs[j].strength] or own
+        taken = share(search, key, number)
+        found.append(
+            Claim(
+                number,
+                {fit.model.knobs[j].field: bounded(fit, j, half[j], numerics) for j in own},
+                other_than(twins, form),
+                other_than(twins, alike),
+                other_than(twins, rivals),
+                twins,
+                needed(search, key, number, adequate) and not (adequate and taken[1] < 0),
+                all(steady(search, key, j) for j in strengths),
+                all(survives(fit.theta[j], half[j], [n[j] for n in limits]) for j in strengths),
+                any(ended(fit, j) for j in strengths),
+                taken,
+                brief=brief(search, number, fit.theta[own]),
+                by_fit=by_fit(search, key, number),
+            )
+        )
+    return sorted(found, key=lambda claim: -claim.share[0])
+
+
+def near(
+    search: Search, key: Key, number: int, adequate: bool
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Effects that do nearly as well in place of a chosen one, see ``Claim``."""
+    rest, family = all_but(key, number), search.family(number)
+    form: list[str] = []
+    same: list[str] = []
+    others: list[str] = []
+    for other, rival in exchanged(search, key, number, nearly=True):
+        alike = bool(family) and search.family(other) == family
+        label = search.candidates[other].label
+        if excluded(search, key, rival, number, adequate, alike):
+            continue
+        if alike:
+            form.append(label)
+        elif not adequate and search.same_motion(rest, number, other):
+            same.append(label)
+        else:
+            others.append(label)
+    for rival, fresh in split(search, key, number):
+        if not excluded(search, key, rival, number, adequate, alike=False):
+            akin = [other for other in fresh if family and search.family(other) == family]
+            # A set with one of the family says how it acts, not whether.
+            form += [search.candidates[other].label for other in akin]
+            others += [] if akin else [search.candidates[other].label for other in fresh]
+    return tuple(dict.fromkeys(form)), tuple(same), tuple(dict.fromkeys(others))
+
+
+def excluded(
+    search: Search, key: Key, rival: Key, number: int, adequate: bool, alike: bool
+) -> bool:
+    """Whether a rival with one effect exchanged is out.
+
+    Down to the noise, chance decides, at half the step, too, where that matters: a delay may fit
+    what a lag did only because steps are coarse. Of what strikes the ground forecasts have to be
+    worse as well, since fits hang on luck in finding start states there. While a remainder is
+    left, a rival has to be clearly worse, also from starts that are better known: errors of the
+    start fade in a sluggish model otherwise than in a late one. One that differs in form alone
+    has to lose at the horizon and at half of it. What leaves three times as much of all data is
+    out.
+    """
+    if adequate:
+        if search.simulator.has_contacts and search.error(key) >= BETTER * search.error(rival):
+            return False
+        behind = score(search, rival) - score(search, key)
+        return behind > tie(search) and not _by_numerics(search, key, rival, behind)
+    if no_match(search, rival, key):
+        return True
+    group = where_it_matters(search, key, number)
+    own, its = (search.validated[k] for k in (key, rival))
+    worse = _ratio(search, its.squares, own.squares, group)
+    if worse > HOPELESS:
+        return True
+    if worse > CLEARLY:
+        longer = [search.from_longer_leads(k) for k in (rival, key)]
+        return _ratio(search, longer[0], longer[1], group) > CLEARLY
+    if not alike or len(search.fitter.blocks) < FEW:
+        return False
+    behind, error = search.currency.difference(its.squares, own.squares, group)
+    return behind > error and _ratio(search, its.half, own.half, group) > 1.0 and worse > FORM
+
+
+def in_plain_form(search: Search, key: Key, claims: Sequence[Claim]) -> Key | None:
+    """The set with a plainer form of an effect whose own numbers these data do not tell, if any.
+
+    A law of which a strength may be zero, or a number lies at its bound, is no better than one of
+    its family with fewer numbers that does as well.
+    """
+    for claim in claims:
+        own = search.candidates[claim.number]
+        strengths = {knob.field for knob in own.knobs if knob.strength}
+        told = not any(
+            n.at_bound or (field in strengths and n.low <= 0 <= n.high)
+            for field, n in claim.numbers.items()
+        )
+        forms = [
+            rival
+            for other, rival in exchanged(search, key, claim.number)
+            if search.numbers(rival) < search.numbers(key)
+            and search.candidates[other].label in claim.form
+        ]
+        if forms and not told:
+            return min(forms, key=lambda rival: (search.numbers(rival), search.error(rival)))
+    return None
+
+
+def _by_numerics(search: Search, key: Key, rival: Key, behind: float) -> bool:
+    """Whether a rival is behind at the usual step alone."""
+    own = at_half_step(search, key).merit - search.tried[key].merit
+    if behind > 2 * abs(own) or abs(own) < tie(search):
+        return False
+    its = at_half_step(search, rival).merit - search.tried[rival].merit
+    return behind + its - own <= tie(search)
+
+
+def tie(search: Search) -> float:
+    """Difference of scores beyond which chance excludes a rival."""
+    return search.fitter.tie(search.tried[()])
+
+
+def ratio(search: Search, one: Key, other: Key, group: int) -> float:
+    """Forecast error of a set over that of another at a joint."""
+    squares = search.validated[one].squares, search.validated[other].squares
+    return _ratio(search, *squares, group)
+
+
+def _ratio(search: Search, one: Array, other: Array, group: int) -> float:
+    errors = [search.currency.by_group(squares)[group] for squares in (one, other)]
+    return float(errors[0] / max(errors[1], 1e-12))
+
+
+def where_it_matters(search: Search, key: Key, number: int) -> int:
+    """The joint at which forecasts suffer most without an effect."""
+    rest = all_but(key, number)
+    base = rest if rest in search.validated else ()
+    before = search.currency.by_group(search.validated[base].squares)
+    after = search.currency.by_group(search.validated[key].squares)
+    return int(np.argmax((before - after) / np.maximum(before, 1e-12)))
+
+
+def needed(search: Search, key: Key, number: int, adequate: bool) -> bool:
+    """Whether forecasts are clearly worse without an effect."""
+    rest = all_but(key, number)
+    if rest not in search.validated:
+        return False
+    group = where_it_matters(search, key, number)
+    without, own = search.validated[rest].squares, search.validated[key].squares
+    lost, _ = search.currency.difference(without, own, group)
+    if adequate:
+        return score(search, rest) - score(search, key) > tie(search) and lost > 0
+    gone = 1 - 1 / max(_ratio(search, without, own, group), 1e-12)
+    return gone > 0.5 * AT_ONE and search.currency.clearly(without, own, group, True) > WORSE
+
+
+def by_fit(search: Search, key: Key, number: int) -> bool:
+    """Whether a set without one of its effects is no match for it."""
+    rest = all_but(key, number)
+    return rest in search.tried and no_match(search, rest, key)
+
+
+def steady(search: Search, key: Key, j: int) -> bool:
+    """Whether a number has one sign and about one size in every fold."""
+    value, folds = search.tried[key].theta[j], search.validated[key].thetas[:, j]
+    return bool((np.abs(folds - value) <= STEADY * abs(value)).all())
+
+
+def in_the_limit(theta: Array, numerics: Sequence[Array]) -> list[Array]:
+    """Numbers where the step goes to zero, and with the other hold, each (p,).
+
+    What half the step changes is doubled: an integrator of first order has as much again to go, so
+    that a number which only makes up for its error, and is half as large at half the step, ends
+    at zero (Richardson's extrapolation).
+    """
+    return [2 * numerics[0] - theta, *numerics[1:]] if len(numerics) else []
+
+
+def survives(value: float, half: float, others: Sequence[float]) -> bool:
+    """Whether a number keeps its sign and about its size under other numerics."""
+    return all(abs(other - value) <= max(STEADY * abs(value), half) for other in others)
+
+
+def brief(search: Search, number: int, values: Array) -> bool:
+    """Whether an effect of the actuator is a time too short for the log's own clock."""
+    candidate = search.candidates[number]
+    if candidate.effect.enters != "actuator":
+        return False
+    runs = search.fitter.samples.recorded
+    clock = BRIEF * float(np.median(np.concatenate([run.durations for run in runs])))
+    return any(
+        knob.unit == "s" and 0 < abs(value) < clock
+        for knob, value in zip(candidate.knobs, values, strict=True)
+    )
+
+
+def share(search: Search, key: Key, number: int) -> tuple[float, float, float]:
+    """Part of the nominal squared error that an effect takes off, last of all in its set."""
+    rest = all_but(key, number)
+    base = rest if rest in search.validated else ()
+    squares = search.validated
+    return search.currency.share(
+        squares[base].squares, squares[key].squares, np.random.default_rng(0)
+    )

@@ -1,0 +1,99 @@
+"""What was found under other numerics: finer steps, and inputs held the other way."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.fitting.contract import Fit
+from residual.gap.model.model import Model
+from residual.gap.preparation.numerics import FINE, held_otherwise
+from residual.gap.search.sets import Key, Search
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+#: Part of the misfit that the other hold must take off to be believed.
+CLEARER = 0.05
+#: Sub-steps of a corrected simulator, at most, over the nominal one's.
+FINEST = 32
+
+
+def with_enough_substeps(corrected: HostSimulator, search: Search, key: Key) -> HostSimulator:
+    """A corrected simulator with so many sub-steps that it moves as with twice as many.
+
+    What was found may be faster than anything in the nominal simulator: a time constant of a
+    quarter of the nominal one is unstable where that was fine. The step of a model that came from
+    a file of its own, and of one that strikes the ground, is its author's.
+
+    Args:
+        corrected: With effects whose values are numbers.
+        search: With the set that it is made of.
+        key: That set.
+    """
+    own = not corrected.has_contacts and not corrected.own_files()
+    if not (own and key and corrected.advances_rows_at_once):
+        return corrected
+    samples, fitter = search.fitter.samples, search.fitter
+    rows = np.unique(np.linspace(0, len(samples) - 1, min(len(samples), 400)).astype(int))
+    physical = len(corrected.physical_channels)
+    actions = samples.actions[rows]
+    states = corrected.augment(search.tried[key].inner.nodes[rows][:, :physical], actions)
+
+    def after(simulator: HostSimulator) -> Array:
+        return simulator.step(states, actions)[:, samples.measured]
+
+    now, coarse = corrected, after(corrected)
+    while now.substeps < FINEST * corrected.substeps:
+        finer = copy.copy(now)
+        finer.substeps = 2 * now.substeps
+        fine = after(finer)
+        if (np.quantile(np.abs(fine - coarse), 0.95, axis=0) <= FINE * fitter.sigma).all():
+            break
+        now, coarse = finer, fine
+    return now
+
+
+def fits_better(search: Search, key: Key, other: HostSimulator) -> bool:
+    """Whether the chosen set fits clearly better on a simulator with inputs held otherwise."""
+    fitter, fit = search.fitter, search.tried[key]
+    again = fitter.fit(Model(other, fit.model.chosen), fit.theta)
+    gained = fit.merit - again.merit
+    return gained > max(CLEARER * fit.merit, fitter.tie(search.tried[()]))
+
+
+def forecast_error(search: Search, key: Key) -> float:
+    """Cross-validated forecast error in units of the spread of each channel, all averaged."""
+    samples = search.fitter.samples
+    spread = np.nanvar(samples.seen[:, samples.measured], axis=0)
+    return float(np.nanmean(search.validated[key].squares / np.maximum(spread, 1e-300)))
+
+
+def at_half_step(search: Search, key: Key) -> Fit:
+    """A set fitted at half the integration step."""
+    if key not in search.halved:
+        fit = search.tried[key]
+        search.halved[key] = search.fitter.halved().fit(fit.model, fit.theta, fit)
+    return search.halved[key]
+
+
+def other_numerics(search: Search, key: Key, tie: float) -> list[Array]:
+    """Numbers of a set fitted at half the step, and with inputs held the other way, each (p,).
+
+    Where the data say clearly how inputs are held, the other hold is no question.
+
+    Args:
+        search: With the fitted set.
+        key: The set.
+        tie: Rise of the loss beyond which the other hold is out.
+    """
+    fitter, fit = search.fitter, search.tried[key]
+    found = [at_half_step(search, key).theta]
+    flipped = held_otherwise(search.simulator)
+    if flipped is not None:
+        other = fitter.fit(Model(flipped, fit.model.chosen), fit.theta)
+        if other.merit - fit.merit < tie:
+            found.append(other.theta)
+    return found

@@ -1,0 +1,232 @@
+"""What parameters of the nominal simulator do to an answer if they are off.
+
+No parameter is known exactly, so an effect is certain only if it is needed, and beats its rivals,
+also where every parameter may differ by its tolerance.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.confirmation.certainty import CLEARLY, tie, where_it_matters
+from residual.gap.confirmation.claim import Claim
+from residual.gap.confirmation.widening import widened
+from residual.gap.fitting.bounded import bounded_step
+from residual.gap.fitting.contract import UNCONVERGED, Fit
+from residual.gap.fitting.intervals import deviations
+from residual.gap.fitting.screening import trials
+from residual.gap.fitting.validation import validate
+from residual.gap.model.candidates import Candidate, candidates
+from residual.gap.model.model import Model
+from residual.gap.search import known
+from residual.gap.search.exchange import add_without_each, exchanged
+from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.significance import size
+from sims.effects.library import library
+from sims.effects.parameter import ParameterChange
+
+Array = NDArray[np.float64]
+
+#: Rivals that are given another chance, parameters free.
+RIVALS = 4
+#: Squared residual that linear parameters promise a rival, over that of the chosen set, from which
+#: on it is not fitted with them: on a robot's logs the promise was right within a factor of 1.5.
+HOPELESS = 10.0
+#: Part of an effect's work that free parameters do without it, from which on it may be theirs.
+WORK = 0.2
+#: Parameters that are allowed for, those that matter most.
+MOST = 12
+
+
+def allow_for_parameters(
+    search: Search, key: Key, claims: Sequence[Claim], adequate: bool, tolerance: float,
+    until: float = np.inf,
+) -> list[Claim]:  # fmt: skip
+    """The claims with parameters allowed for.
+
+    Args:
+        search: With the chosen set, and its members exchanged for rivals.
+        key: The chosen set.
+        claims: Of its members.
+        adequate: Whether only noise is left, so that chance decides.
+        tolerance: How well parameters are known, as a share of each.
+        until: When to ask no further, on the clock of ``time.process_time``: what was not asked
+            is not certain.
+    """
+    parameters = allowed(search, tolerance) if claims else []
+    if not parameters:
+        return list(claims)
+    if time.process_time() > until:
+        return [dataclasses.replace(claim, unasked=True) for claim in claims]
+    add_without_each(search, key)
+    beside = calibrated(search, key, parameters)
+    left = float((beside.fit.projected**2).sum())
+    asked: dict[Key, Calibrated] = {}
+
+    def as_good(claim: Claim, other: Key) -> bool:
+        """Whether another set does as well as the chosen one, parameters free beside both."""
+        if not search.beside and promised(search, other, parameters) > HOPELESS * left:
+            return False
+        its = asked[other] = calibrated(search, other, parameters)
+        if adequate:
+            more = search.numbers(key) - search.numbers(other)
+            price = np.log(size(search)) * more + tie(search)
+            return bool(its.fit.merit <= beside.fit.merit + price)
+        group = where_it_matters(search, key, claim.number)
+        return bool(its.errors[group] <= CLEARLY * beside.errors[group])
+
+    def slight(claim: Claim) -> bool:
+        """Whether free parameters do nothing of an effect's work, which is little as it is."""
+        without = all_but(key, claim.number)
+        if adequate or search.beside or without not in asked:
+            return False
+        group = where_it_matters(search, key, claim.number)
+        own, rest = (search.currency.by_group(search.validated[k].squares) for k in (key, without))
+        free = asked[without].errors[group] - beside.errors[group]
+        return work(rest[group] - own[group], free) < WORK
+
+    told = []
+    for claim in claims:
+        claim = dataclasses.replace(claim, unasked=time.process_time() > until)
+        if claim.sure:
+            as_well = as_good(claim, all_but(key, claim.number))
+            little = as_well and slight(claim)
+            claim = dataclasses.replace(claim, calibration=as_well, slight=little)
+        if claim.sure:
+            rivals = [
+                search.candidates[other].label
+                for other, rival in excluded_rivals(search, key, claim)
+                if as_good(claim, rival)
+            ]
+            claim = dataclasses.replace(claim, rivals=tuple(dict.fromkeys(rivals)))
+        told.append(claim)
+    half = 1.96 * deviations(beside.fit, search.fitter.blocks)
+    final = []
+    for claim in widened(search, key, told, beside.fit, adequate):
+        own = np.flatnonzero(beside.fit.model.owner == key.index(claim.number))
+        sizes = own[search.candidates[claim.number].linear]
+        lost = bool(sizes.size) and not (np.abs(beside.fit.theta) > half)[sizes].any()
+        if lost or within(search, claim, tolerance):
+            claim = dataclasses.replace(claim, calibration=True, slight=False)
+        final.append(claim)
+    return final
+
+
+def work(fixed: float, free: float) -> float:
+    """Part of what an effect takes off the error that parameters take off in its place.
+
+    Args:
+        fixed: What it takes off with parameters as they are.
+        free: The same with parameters free.
+    """
+    return 1 - free / fixed if fixed > 0 else 1.0
+
+
+def promised(search: Search, key: Key, parameters: Sequence[Candidate]) -> float:
+    """Squared residual of a set with free parameters, if everything were linear."""
+    chosen = set(search.labels(key))
+    free = [candidate for candidate in parameters if candidate.label not in chosen]
+    fit, variants = search.tried[key], trials(free)
+    columns = search.fitter.columns(fit, free)[..., [v.columns[0] for v in variants]]
+    columns /= np.array([variant.trial.values[0, 0] for variant in variants])
+    columns -= fit.basis @ (fit.basis.transpose(0, 2, 1) @ columns)
+    rows = np.concatenate([fit.by_knob, columns], axis=2)
+    rows = rows.reshape(-1, rows.shape[2])
+    knobs = [knob for candidate in free for knob in candidate.knobs]
+    low = np.append(fit.model.low - fit.theta, [knob.low for knob in knobs])
+    high = np.append(fit.model.high - fit.theta, [knob.high for knob in knobs])
+    step = bounded_step(rows.T @ rows, rows.T @ fit.projected.ravel(), low, high)
+    return float(((fit.projected.ravel() - rows @ step) ** 2).sum())
+
+
+def within(search: Search, claim: Claim, tolerance: float) -> bool:
+    """Whether a claim is of a parameter, and by what may be no more than its tolerance."""
+    effect = search.candidates[claim.number].effect
+    if not isinstance(effect, ParameterChange):
+        return False
+    size = tolerance * known.size(search, effect.parameter)
+    (change,) = claim.numbers.values()
+    return change.low < size and change.high > -size
+
+
+def excluded_rivals(search: Search, key: Key, claim: Claim) -> list[tuple[int, Key]]:
+    """Effects of other families that were found worse in place of a claimed one, best first.
+
+    Returns:
+        At most ``RIVALS`` of those that take a part of the error off: candidate and its set.
+    """
+    rest = all_but(key, claim.number)
+    group = where_it_matters(search, key, claim.number)
+    family = search.family(claim.number)
+    found = []
+    for other, rival in exchanged(search, key, claim.number):
+        same = family and search.family(other) == family
+        if same or search.candidates[other].label in (*claim.twins, *claim.form):
+            continue
+        error = search.currency.by_group(search.validated[rival].squares)[group]
+        found.append((float(error), other, rival))
+    without = search.currency.by_group(search.validated[rest].squares)[group]
+    return [(other, rival) for error, other, rival in sorted(found)[:RIVALS] if error < without]
+
+
+def allowed(search: Search, tolerance: float) -> list[Candidate]:
+    """Changes of the parameters within their tolerance, of the ones that move forecasts most."""
+    simulator = search.simulator
+    changes = [e for e in library(simulator) if isinstance(e, ParameterChange)]
+    found, reach = [], []
+    for candidate in candidates(simulator, changes, search.fitter.samples):
+        assert isinstance(candidate.effect, ParameterChange)
+        most = tolerance * known.size(search, candidate.effect.parameter)
+        (knob,) = candidate.knobs
+        if most > 0:
+            bounded = dataclasses.replace(
+                knob, low=max(knob.low, -most), high=min(knob.high, most), step=0.3 * most,
+                known=most / np.sqrt(3),
+            )  # fmt: skip
+            found.append(dataclasses.replace(candidate, knobs=(bounded,)))
+            reach.append(most)
+    if len(found) <= MOST:
+        return found
+    columns = search.fitter.columns(search.nominal, found)
+    trials = np.array([candidate.trials[0].values[0, 0] for candidate in found])
+    matters = np.linalg.norm(columns, axis=(0, 1)) * np.array(reach) / np.abs(trials)
+    return [found[i] for i in np.sort(np.argsort(-matters)[:MOST])]
+
+
+@dataclasses.dataclass(frozen=True)
+class Calibrated:
+    """A set beside which all parameters are free within their tolerance.
+
+    Attributes:
+        fit: Its fit, the numbers of the set first.
+        squares: Mean squared errors of cross-validated forecasts of blocks, (B, m).
+        errors: Relative to those of the nominal simulator, by joint, (g,).
+    """
+
+    fit: Fit
+    squares: Array
+    errors: Array
+
+
+def calibrated(search: Search, key: Key, parameters: Sequence[Candidate]) -> Calibrated:
+    """A set fitted with all parameters free within their tolerance."""
+    if search.beside:
+        squares = search.validated[key].squares
+        return Calibrated(search.tried[key], squares, search.currency.by_group(squares))
+    chosen = [search.candidates[i] for i in key]
+    names = {candidate.label for candidate in chosen}
+    free = [candidate for candidate in parameters if candidate.label not in names]
+    start = np.append(search.own(key), np.zeros(len(free)))
+    model, own = Model(search.simulator, [*chosen, *free]), search.tried[key]
+    fit = search.fitter.fit(model, start, own)
+    if fit.merit > UNCONVERGED * own.merit:
+        # It holds what ``own`` holds, so it did not converge, and would excuse every rival.
+        again = search.fitter.resumed(model, start, own)
+        fit = again if again.merit < fit.merit else fit
+    squares = validate(search.fitter, fit).squares
+    return Calibrated(fit, squares, search.currency.by_group(squares))

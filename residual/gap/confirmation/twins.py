@@ -1,0 +1,124 @@
+"""What exact twins of named effects would be, and what the others would be beside them.
+
+Effects that make the same motion in any data each have their own size for it, and what is named
+beside them may have another, too: friction counts per unit of inertia, so that it is larger beside
+a heavier rotor than beside an arm that is longer.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.confirmation.claim import Claim
+from residual.gap.data.samples import Samples
+from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.plausible import absurd
+from residual.gap.model.candidates import Candidate, candidates
+from residual.gap.model.model import Model
+from residual.gap.result import Meant
+from residual.gap.search.sets import Key, Search
+from sims.effects.base import Effect
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+#: Twins of each effect that are fitted in its place.
+MOST = 4
+#: Rise of the loss up to which a twin makes the same motion: beyond, its bounds are in the way.
+REACHED = 1.02
+#: Part of an interval by which a number differs.
+DIFFERS = 0.25
+
+
+def exact_twins(
+    simulator: HostSimulator, samples: Samples, groups: Mapping[str, Sequence[str]],
+    offered: Mapping[str, Effect],
+) -> dict[str, list[Candidate]]:  # fmt: skip
+    """Candidates that move exactly as an effect does, by its label.
+
+    Args:
+        simulator: The nominal simulator.
+        samples: The measured table.
+        groups: Labels of exact twins, by label.
+        offered: Effects by label.
+    """
+    found = {}
+    for label in groups:
+        others = [name for name in groups[label] if name != label and name in offered]
+        found[label] = candidates(simulator, [offered[name] for name in others[:MOST]], samples)
+    return found
+
+
+def with_twins(search: Search, key: Key, claims: Sequence[Claim]) -> tuple[Claim, ...]:
+    """The claims with the numbers of their twins, and intervals that hold whichever is meant.
+
+    Of what strikes the ground they stay as they are, since a fit takes long there.
+
+    Args:
+        search: With the chosen set.
+        key: The chosen set.
+        claims: Of its members.
+    """
+    told = {claim.number: claim for claim in claims}
+    twins = [
+        (number, twin) for number in told for twin in search.twins_of(number)
+        if not search.simulator.has_contacts
+    ]  # fmt: skip
+    for number, twin in twins:
+        fit = _in_place(search, key, number, twin)
+        if fit.merit > REACHED * search.tried[key].merit + search.fitter.tie(search.nominal):
+            continue
+        if absurd(fit.model, fit.theta, search.fitter.samples)[1]:
+            continue
+        values = {place: fit.theta[fit.model.owner == place] for place in range(len(key))}
+        mine = values.pop(key.index(number))
+        meant = Meant(twin.label, _units(twin, mine))
+        told[number] = dataclasses.replace(told[number], meant=(*told[number].meant, meant))
+        for place, found in values.items():
+            other = key[place]
+            told[other] = _beside(told[other], search.candidates[other], found, twin.label)
+    return tuple(told.values())
+
+
+def _in_place(search: Search, key: Key, number: int, twin: Candidate) -> Fit:
+    """The set fitted with a twin in place of one of its members."""
+    fit, place = search.tried[key], key.index(number)
+    chosen = [twin if i == number else search.candidates[i] for i in key]
+    model = Model(search.simulator, [*chosen, *search.beside])
+    theta = np.zeros(len(model))
+    theta[model.owner != place] = fit.theta[fit.model.owner != place]
+    theta[model.owner == place] = 0.01 * twin.trials[0].values[0]
+    return search.fitter.fit(model, theta, fit)
+
+
+def _units(candidate: Candidate, values: Array) -> dict[str, tuple[float, str]]:
+    return {
+        knob.field: (float(value), knob.unit)
+        for knob, value in zip(candidate.knobs, values, strict=True)
+    }
+
+
+def _beside(claim: Claim, candidate: Candidate, values: Array, twin: str) -> Claim:
+    """A claim with the numbers that it has beside a twin of another, where they differ."""
+    numbers, differs = dict(claim.numbers), False
+    for field, (value, _) in _units(candidate, values).items():
+        number = numbers[field]
+        if abs(value - number.value) <= DIFFERS * (number.high - number.low):
+            continue
+        differs, shift = True, value - number.value
+        exact = number.if_exact or (number.low, number.high)
+        knob = next(knob for knob in candidate.knobs if knob.field == field)
+        numbers[field] = dataclasses.replace(
+            number,
+            low=max(min(number.low, exact[0] + shift), knob.low),
+            high=min(max(number.high, exact[1] + shift), knob.high),
+            if_exact=exact,
+        )
+    if not differs:
+        return claim
+    meant = Meant(twin, _units(candidate, values))
+    return dataclasses.replace(claim, numbers=numbers, beside=(*claim.beside, meant))

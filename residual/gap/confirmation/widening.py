@@ -1,0 +1,167 @@
+"""Intervals of an answer's numbers, with all that they rest on allowed to be off."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.confirmation.certainty import HOPELESS, ratio, where_it_matters
+from residual.gap.confirmation.claim import Claim
+from residual.gap.fitting.bounded import bounded_step
+from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.intervals import deviations
+from residual.gap.result import Number
+from residual.gap.search.exchange import exchanged
+from residual.gap.search.sets import Key, Search, all_but
+
+Array = NDArray[np.float64]
+
+#: Errors of a forecast count up to so many times the usual one of the nominal simulator.
+BEYOND = 3.0
+
+
+def widened(
+    search: Search, key: Key, claims: Sequence[Claim], beside: Fit, adequate: bool
+) -> list[Claim]:
+    """The claims with intervals that hold with and without companions that are not certain.
+
+    They hold, too, for the numbers that forecast best. Of a model that is right, those are the
+    numbers of the fit; of one that leaves a remainder, each weighs that in its own way.
+
+    Args:
+        search: With the chosen set.
+        key: The chosen set.
+        claims: Of its members.
+        beside: The set fitted with all parameters free within their tolerance.
+        adequate: Whether only noise is left. Data that leave a remainder are not believed what
+            they say of parameters, so all may be off by their tolerance then.
+    """
+    sure = {claim.number for claim in claims if claim.sure or vital(search, key, claim)}
+    if adequate:
+        middle, half = beside.theta, 1.96 * deviations(beside, search.fitter.blocks)
+        # What parameters may stand in for stays: they are free in the fit beside.
+        sure |= {c.number for c in claims if dataclasses.replace(c, calibration=False).sure}
+    else:
+        middle, own = search.own(key), 1.96 * deviations(search.tried[key], search.fitter.blocks)
+        half = np.hypot(own[: len(middle)], by_parameters(beside, len(middle)))
+    freed = np.stack([middle - half, middle + half], axis=1)
+    forecast_best = functools.cache(lambda smaller: best_forecasts(search, smaller))
+    told = []
+    for claim in claims:
+        smaller, theta = search.merged(
+            key, (), drop=tuple(i for i in key if i not in sure | {claim.number})
+        )
+        search.add({smaller: theta})
+        best = forecast_best(smaller) if search.sound(smaller) else None
+        claim = _widened(search, key, claim, freed, smaller, best)
+        told.append(_beside_rivals(search, key, claim, claims))
+    return told
+
+
+def _beside_rivals(search: Search, key: Key, claim: Claim, claims: Sequence[Claim]) -> Claim:
+    """A claim with intervals that hold, too, with rivals in place of its companions."""
+    numbers, own = dict(claim.numbers), search.tried[key]
+    half = 1.96 * deviations(own, search.fitter.blocks)[own.model.owner == key.index(claim.number)]
+    for companion in claims:
+        if companion.number == claim.number:
+            continue
+        instead = {*companion.form, *companion.alike, *companion.rivals}
+        for other, rival in exchanged(search, key, companion.number):
+            if search.candidates[other].label not in instead:
+                continue
+            fit = search.tried[rival]
+            there = np.flatnonzero(fit.model.owner == rival.index(claim.number))
+            for j, reach in zip(there, half, strict=True):
+                knob, value = fit.model.knobs[j], float(fit.theta[j])
+                n = numbers[knob.field]
+                numbers[knob.field] = dataclasses.replace(
+                    n,
+                    low=max(min(n.low, value - reach), knob.low),
+                    high=min(max(n.high, value + reach), knob.high),
+                )
+    return dataclasses.replace(claim, numbers=numbers)
+
+
+def vital(search: Search, key: Key, claim: Claim) -> bool:
+    """Whether nothing comes near without an effect, so that it or a rival of it is there."""
+    rest = all_but(key, claim.number)
+    if rest not in search.validated or claim.bounded or claim.calibration:
+        return False
+    group = where_it_matters(search, key, claim.number)
+    return ratio(search, rest, key, group) > HOPELESS
+
+
+def _widened(
+    search: Search, key: Key, claim: Claim, freed: Array, smaller: Key, best: Array | None
+) -> Claim:
+    """One claim, see ``widened``.
+
+    Args:
+        search, key, claim: As there.
+        freed: Intervals of the set's numbers with all parameters free, (p, 2).
+        smaller: The set without companions that are not certain.
+        best: Numbers with which that forecasts best, if it is sound.
+    """
+    fit, alone = search.tried[key], search.tried[smaller]
+    own = np.flatnonzero(fit.model.owner == key.index(claim.number))
+    there = np.flatnonzero(alone.model.owner == smaller.index(claim.number))
+    half = 1.96 * deviations(alone, search.fitter.blocks)
+    numbers: dict[str, Number] = {}
+    for j, k in zip(own, there, strict=True):
+        knob = fit.model.knobs[j]
+        number = claim.numbers[knob.field]
+        low, high = min(number.low, freed[j, 0]), max(number.high, freed[j, 1])
+        if best is not None:
+            reach = max(float(half[k]), 0.5 * float(np.ptp(freed[j])))
+            least, most = sorted((alone.theta[k], best[k]))
+            low, high = min(low, least - reach), max(high, most + reach)
+        numbers[knob.field] = dataclasses.replace(
+            number,
+            low=max(float(low), knob.low),
+            high=min(float(high), knob.high),
+            if_exact=(number.low, number.high),
+        )
+    return dataclasses.replace(claim, numbers=numbers)
+
+
+def by_parameters(fit: Fit, count: int) -> Array:
+    """How far the first numbers of a fit lie off if its last ones do by their tolerance, (count,).
+
+    Errors of the parameters are taken to be independent.
+    """
+    rows = np.sqrt(fit.weights)[:, None, None] * fit.by_knob
+    own, others = rows[..., :count], rows[..., count:]
+    scale = np.sqrt(np.maximum((own**2).sum(axis=(0, 1)), 1e-300))
+    own = own / scale
+    matrix = np.einsum("wri,wrj->ij", own, own)
+    right = np.einsum("wri,wrj->ij", own, others)
+    most = np.array([max(knob.high, -knob.low) for knob in fit.model.knobs[count:]])
+    shifts = np.linalg.pinv(matrix, rcond=1e-12) @ right * most / scale[:, None]
+    return np.sqrt((shifts**2).sum(axis=1))
+
+
+def best_forecasts(search: Search, key: Key) -> Array:
+    """Numbers with which a set's forecasts are best in least squares, (p,), a step from its fit."""
+    fitter, fit = search.fitter, search.tried[key]
+    samples, windows = fitter.samples, fitter.blocks.windows
+    seen = samples.seen[windows.index][..., samples.measured]
+    usual = np.sqrt(np.nanmean(search.before.foretold.squares, axis=0))
+    usual = np.where(usual > 0, usual, np.inf)  # of a channel that is hardly ever measured
+    everywhere = np.zeros(len(windows), np.int64)
+
+    def errors(theta: Array) -> Array:
+        shown = fitter.foretell(fit.model, theta[None], everywhere, fit).shown
+        wrong = np.where(windows.inside[..., None], (seen - shown) / usual, 0.0)
+        return np.nan_to_num(np.clip(wrong, -BEYOND, BEYOND)).ravel()
+
+    theta, step = fit.theta, np.maximum(0.02 * np.abs(fit.theta), 0.1 * fit.model.step)
+    step = np.where(theta + step > fit.model.high, -step, step)
+    here = errors(theta)
+    slopes = [(errors(theta + np.eye(len(theta))[j] * h) - here) / h for j, h in enumerate(step)]
+    slope = np.stack(slopes, axis=1)
+    low, high = fit.model.low - theta, fit.model.high - theta
+    return theta + bounded_step(slope.T @ slope, -slope.T @ here, low, high)

@@ -1,0 +1,1 @@
+"""What was recorded, before any physics: samples, faults, windows, blocks over folds."""

@@ -1,0 +1,62 @@
+"""Whether a simulator can be run on recorded states at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.data.inspection import refusal
+from residual.logs.checks import Finding
+from residual.trajectories import Trajectory
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+
+def nominal(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """A simulator that breaks down on recorded states."""
+    for run in trajectories:
+        states = _filled(simulator, run)
+        if states is None:
+            continue
+        rows = np.unique(np.linspace(0, len(run) - 1, 500).astype(int))
+        whole = np.isfinite(states[rows]).all(axis=1)
+        rows = rows[whole]
+        if not len(rows):
+            continue
+        actions = run.actions[rows]
+        with np.errstate(all="ignore"):
+            after = simulator.step(simulator.augment(states[rows], actions), actions)
+        bad = np.flatnonzero(~np.isfinite(after).all(axis=1))
+        if bad.size:
+            row = int(rows[bad[0]])
+            channel = simulator.state_channels[int(np.flatnonzero(~np.isfinite(after[bad[0]]))[0])]
+            says = (
+                f"{simulator.name} returns {after[bad[0]][~np.isfinite(after[bad[0]])][0]} for "
+                f"{channel.name} from the state recorded at {run.times[row]:.6g} s "
+                f"({_listed(simulator, states[row])}): mend the simulator, or cut these rows"
+            )
+            return [refusal("nominal", run.name, says)]
+    return []
+
+
+def _listed(simulator: HostSimulator, state: Array) -> str:
+    return ", ".join(
+        f"{c.name} {value:.4g}" for c, value in zip(simulator.physical_channels, state, strict=True)
+    )
+
+
+def _filled(simulator: HostSimulator, run: Trajectory) -> Array | None:
+    """Physical states of a run, rates that were not measured from their positions."""
+    channels = simulator.physical_channels
+    names = [channel.name for channel in channels]
+    states = np.array(run.states[:, : len(channels)])
+    for column, channel in enumerate(channels):
+        if np.isfinite(states[:, column]).any():
+            continue
+        if channel.rate_of not in names:
+            return None
+        states[:, column] = np.gradient(states[:, names.index(channel.rate_of)], run.times)
+    return states

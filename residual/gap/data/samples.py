@@ -1,0 +1,160 @@
+"""All recorded samples of a set of trajectories in one flat table."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.data.merging import merged
+from residual.trajectories import Trajectory
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Recorded:
+    """Inputs as recorded, of one run.
+
+    Attributes:
+        actions: Action held from each sample to the next, shape (n, n_a).
+        durations: Seconds to the next sample, shape (n,).
+        rows: Which of the samples are rows of the table.
+    """
+
+    actions: Array
+    durations: Array
+    rows: NDArray[np.int64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Samples:
+    """Samples of all runs, one row each, runs one after the other.
+
+    A log that is sampled much faster than the system moves is thinned: of every ``stride`` samples
+    one is a row, the first of those with the most readings, and an interval spans the recorded
+    ones up to the next row. Inputs are kept as recorded.
+
+    Attributes:
+        seen: Measured state channels, shape (n, n_s); NaN where not measured.
+        actions: Action at each row, shape (n, n_a); a run's last row repeats the one before.
+        durations: Seconds to the next row, shape (n,); a run's last row repeats the one before.
+        times: Seconds since the start of the log, shape (n,).
+        runs: First and one-past-last row of every run.
+        names: Name of every run.
+        substeps: Sub-steps to integrate between two rows.
+        stride: Recorded samples for a row.
+        recorded: Inputs of every run as recorded.
+    """
+
+    seen: Array
+    actions: Array
+    durations: Array
+    times: Array
+    runs: tuple[tuple[int, int], ...]
+    names: tuple[str, ...]
+    substeps: int
+    stride: int
+    recorded: tuple[Recorded, ...]
+
+    @classmethod
+    def join(cls, trajectories: Sequence[Trajectory], substeps: int, stride: int = 1) -> Samples:
+        """All trajectories below each other, whatever their order is.
+
+        Raises:
+            ValueError: There is no trajectory with a step.
+        """
+        # The order of files must not matter, so runs are put in an order of their own.
+        usable = sorted((t for t in trajectories if len(t) >= stride), key=_content)
+        if not usable:
+            raise ValueError("no trajectory to look at: give at least one with a step")
+        parts, ends, kept = [], [0], []
+        for run in usable:
+            rows = _rows(run.states, stride)
+            kept.append(rows)
+            actions = np.vstack([run.actions, run.actions[-1:]])[rows]
+            steps = np.diff(run.times[rows])
+            parts.append((run.states[rows], actions, np.append(steps, steps[-1]), run.times[rows]))
+            ends.append(ends[-1] + len(rows))
+        seen, actions, durations, times = (np.concatenate(c) for c in zip(*parts, strict=True))
+        return cls(
+            seen=seen.astype(float),
+            actions=actions.astype(float),
+            durations=durations,
+            times=times,
+            runs=tuple(itertools.pairwise(ends)),
+            names=tuple(t.name for t in usable),
+            substeps=substeps,
+            stride=stride,
+            recorded=tuple(
+                Recorded(
+                    np.vstack([t.actions, t.actions[-1:]]),
+                    np.append(t.durations, t.durations[-1]),
+                    rows,
+                )
+                for t, rows in zip(usable, kept, strict=True)
+            ),
+        )
+
+    def __len__(self) -> int:
+        return len(self.seen)
+
+    @property
+    def measured(self) -> NDArray[np.int64]:
+        """Columns of the channels that were measured at all."""
+        return np.flatnonzero(np.isfinite(self.seen).any(axis=0))
+
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        """Index of the run of every row, shape (n,)."""
+        return np.repeat(np.arange(len(self.runs)), [stop - start for start, stop in self.runs])
+
+    @property
+    def step(self) -> float:
+        """Usual seconds between two rows."""
+        return float(np.median(self.durations))
+
+    def in_intervals(self, run: int, driven: Array) -> Array:
+        """Inputs of recorded intervals put together to those of a run's rows.
+
+        Args:
+            run: Number of the run.
+            driven: Mean and rise in every sub-step of the recorded intervals,
+                (V, T, substeps, n_a, 2).
+
+        Returns:
+            (V, rows, ``self.substeps``, n_a, 2).
+        """
+        if self.stride == 1:
+            return driven
+        variants, _, fine, inputs, _ = driven.shape
+        recorded = self.recorded[run]
+        first, end = recorded.rows[:-1, None], recorded.rows[1:, None]
+        # Where readings are rare, intervals differ; the shorter ones end with some of no length.
+        times = int((end - first).max(initial=1))
+        width = self.stride * 2 ** max(0, math.ceil(math.log2(times / self.stride)))
+        at = first + np.arange(width)
+        durations = np.where(at < end, recorded.durations[np.minimum(at, end - 1)], 0.0)
+        whole = driven[:, np.minimum(at, end - 1)]
+        whole = whole.reshape(variants, len(first), width * fine, inputs, 2)
+        last = np.repeat(driven[:, -1:, -1:], width * fine, axis=2)
+        each = np.vstack([durations, np.ones((1, width))])
+        return merged(np.concatenate([whole, last], axis=1), each, self.substeps)
+
+
+def _rows(states: Array, stride: int) -> NDArray[np.int64]:
+    """Of every ``stride`` samples the first of those with the most readings."""
+    told = np.isfinite(states).sum(axis=1)
+    begins = range(0, len(states), stride)
+    return np.array([begin + int(told[begin : begin + stride].argmax()) for begin in begins])
+
+
+def _content(run: Trajectory) -> bytes:
+    """Puts runs in an order that depends on what was measured alone."""
+    parts = (run.states, run.actions, run.durations)
+    return hashlib.sha256(b"".join(np.ascontiguousarray(p).tobytes() for p in parts)).digest()

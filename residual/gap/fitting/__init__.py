@@ -1,0 +1,1 @@
+"""Numbers of effects from windows, and what forecasts by them err."""

@@ -1,0 +1,71 @@
+"""From logs of a system that strikes the ground to a fitter."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from residual.gap.data.blocks import blocks, drive
+from residual.gap.data.samples import Samples
+from residual.gap.data.windows import Windows
+from residual.gap.fitting.contract import Fit, Fitter
+from residual.gap.fitting.impacts.fitter import LOST, ImpactFitter
+from residual.gap.fitting.impacts.noise import quieten, spread, with_noise
+from residual.gap.fitting.impacts.windows import lay_out, pieces, scales, steps_for
+from residual.gap.fitting.noise import Noise
+from residual.gap.model import paths
+from residual.gap.model.candidates import Candidate
+from residual.gap.model.model import Model
+from residual.trajectories import Trajectory
+from sims.host import HostSimulator
+
+#: Windows that effects are named on: each costs a simulation for every state and every effect.
+NAMED_ON = 40
+
+
+def impact_fitter(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory], horizon: float
+) -> tuple[ImpactFitter, Noise]:
+    """A fitter, weighed by the noise around the nominal simulator."""
+    longest = max(float(np.quantile(t.durations, 0.95)) for t in trajectories)
+    substeps = max(1, int(np.ceil(simulator.substeps * longest / simulator.dt - 1e-6)))
+    samples = Samples.join(trajectories, substeps)
+    model, none = Model(simulator), np.zeros(0)
+    nodes = paths.measured(model, samples, none)
+    rates = np.array([i for i, c in enumerate(simulator.physical_channels) if c.kind == "rate"])
+    cut = pieces(samples, steps_for(samples, horizon))
+    grouped = blocks(samples, Windows.cut(cut), drive(samples, nodes, rates), NAMED_ON)
+    scale = scales(simulator)
+    data = lay_out(simulator, samples, grouped.windows.pieces)
+    data, _ = quieten(model, none, data, scale)
+    ahead = max(1, round(horizon / samples.step))
+    free = np.full(len(data.sigma), np.inf)
+    fitter = ImpactFitter(data, grouped, ahead, scale, free)
+    nominal = fitter.fit(model, none)
+    every = np.zeros(len(data), np.int64)
+    squares = fitter.foretell(model, none[None], every, nominal).squares
+    limit = LOST * np.nanquantile(squares, 0.75, axis=0)
+    return dataclasses.replace(fitter, limit=limit), Noise(*spread(data, nominal.inner.fitted))
+
+
+def weigh_impacts(now: Fitter, fit: Fit) -> tuple[Fitter, Noise]:
+    """The windows with the noise around a fit."""
+    assert isinstance(now, ImpactFitter)
+    sigma, error = spread(now.data, fit.inner.fitted)
+    data = with_noise(now.data, sigma, now.scale)
+    return dataclasses.replace(now, data=data), Noise(sigma, error)
+
+
+def simple(pool: Sequence[Candidate]) -> list[Candidate]:
+    """One trial for each candidate, and no torque that repeats with the angle (cogging).
+
+    Every trial costs a simulation of all windows, and cogging alone has a dozen for each joint.
+    """
+    found = []
+    for candidate in pool:
+        if candidate.name != "cogging":
+            middle = candidate.trials[len(candidate.trials) // 2]
+            found.append(dataclasses.replace(candidate, trials=(middle,)))
+    return found

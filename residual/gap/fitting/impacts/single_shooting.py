@@ -1,0 +1,267 @@
+"""Short windows by single shooting: from one start state, simulated to the window's end.
+
+Impacts make a window's residual kinked in its start state, and each window in its own way, so
+every window is fitted by itself, with its own step length. Unlike in lifted shooting no state
+but the first can lie in the ground.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.data.samples import Samples
+from residual.gap.data.windows import Windows
+from residual.gap.model.model import Model
+from residual.gap.model.workers import each, integrate_rows
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+#: Rows of one piece of work for a process.
+PIECE = 200
+
+
+@dataclasses.dataclass(frozen=True)
+class WindowData:
+    """Windows of equal length with what was measured in them.
+
+    Attributes:
+        samples: The measured table.
+        windows: W windows of L samples.
+        sigma: Noise of every measured channel, (m,).
+        guess: First guess of every window's physical start state, (W, n_p).
+        doubt: How far off the guess of an unmeasured state may be, (n_p,); infinite for a
+            measured one.
+        moves: By how much each state is moved to see its influence, (n_p,).
+    """
+
+    samples: Samples
+    windows: Windows
+    sigma: Array
+    guess: Array
+    doubt: Array
+    moves: Array
+
+    def __len__(self) -> int:
+        return len(self.windows)
+
+    @property
+    def seen(self) -> Array:
+        """Measured channels in every window, (W, L, m); NaN where not measured."""
+        return self.samples.seen[self.windows.index][..., self.samples.measured]
+
+    @property
+    def freedom(self) -> Array:
+        """Measured values less free states of every window, (W,)."""
+        values = np.isfinite(self.seen).sum(axis=(1, 2))
+        return np.maximum(values - np.isinf(self.doubt).sum(), 1).astype(float)
+
+    def take(self, which: NDArray[np.int64]) -> WindowData:
+        """Some of the windows."""
+        windows = self.windows
+        part = Windows(windows.index[which], windows.inside[which], windows.run[which])
+        return dataclasses.replace(self, windows=part, guess=self.guess[which])
+
+    def until(self, size: int) -> WindowData:
+        """The first so many samples of every window."""
+        windows = self.windows
+        part = Windows(windows.index[:, :size], windows.inside[:, :size], windows.run)
+        return dataclasses.replace(self, windows=part)
+
+
+@dataclasses.dataclass(frozen=True)
+class StartFit:
+    """Windows fitted by their best start states.
+
+    Attributes:
+        starts: Physical start states, (W, n_p).
+        shown: What the sensors show along the way, (W, L, m).
+        residual: Whitened residual with the doubts about the guess below it, (W, R).
+        by_start: Derivative of what is shown (and of the doubts), whitened, (W, R, n_p).
+    """
+
+    starts: Array
+    shown: Array
+    residual: Array
+    by_start: Array
+
+    @property
+    def costs(self) -> Array:
+        """Squared residual of every window, (W,)."""
+        return np.minimum((self.residual**2).sum(axis=1), 1e30)
+
+    def where(self, won: NDArray[np.bool_], other: StartFit) -> StartFit:
+        """Another fit for some of the windows, (W,)."""
+        pairs = [(getattr(self, f.name), getattr(other, f.name)) for f in dataclasses.fields(self)]
+        return StartFit(*(np.where(won.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in pairs))
+
+
+@dataclasses.dataclass(frozen=True)
+class Job:
+    """Start states (V, W, n_i), inputs (W, H, substeps, n_a, 2) and durations (W, H)."""
+
+    host: HostSimulator
+    starts: Array
+    inputs: Array
+    durations: Array
+
+
+def _run(job: Job) -> Array:
+    """States along every window, (V, W, H + 1, n_i)."""
+    variants, count, width = job.starts.shape
+    path = np.empty((variants, count, job.inputs.shape[1] + 1, width))
+    path[:, :, 0] = job.starts
+    for k in range(job.inputs.shape[1]):
+        path[:, :, k + 1] = integrate_rows(
+            job.host,
+            path[:, :, k].reshape(-1, width),
+            np.concatenate([job.inputs[:, k]] * variants),
+            np.tile(job.durations[:, k], variants),
+        ).reshape(variants, count, width)
+    return path
+
+
+def run(jobs: Sequence[Job]) -> list[Array]:
+    """States along every window of every job, shared among processes inside ``workers``."""
+    pieces: list[Job] = []
+    owners: list[int] = []
+    for number, job in enumerate(jobs):
+        variants, count, _ = job.starts.shape
+        size = max(1, PIECE // variants)
+        for a in range(0, count, size):
+            part = slice(a, a + size)
+            pieces.append(Job(job.host, job.starts[:, part], job.inputs[part], job.durations[part]))
+            owners.append(number)
+    done = each(_run, pieces)
+    return [
+        np.concatenate([path for path, own in zip(done, owners, strict=True) if own == number], 1)
+        for number in range(len(jobs))
+    ]
+
+
+def job(model: Model, theta: Array, data: WindowData, starts: Array) -> Job:
+    """The work of shooting all windows from physical start states (V, W, n_p)."""
+    samples, index = data.samples, data.windows.index
+    host = model.bind(theta)
+    inputs = model.inputs(samples, theta[None])[0]
+    own = len(host.integrated_channels)
+    if own > model.physical:
+        first = index[:, 0]
+        before = samples.actions[np.maximum(first - 1, 0)]
+        starts = np.stack([host.augment(s, before)[:, :own] for s in starts])
+    return Job(host, starts, inputs[index[:, :-1]], samples.durations[index[:, :-1]])
+
+
+def shown(job: Job, path: Array, measured: NDArray[np.int64]) -> Array:
+    """What the sensors show of paths (V, W, L, n_i), (V, W, L, m)."""
+    flat = path.reshape(-1, path.shape[-1])
+    return job.host.sense(flat).reshape(path.shape)[..., measured]
+
+
+def simulate(model: Model, theta: Array, data: WindowData, starts: Array) -> Array:
+    """What the sensors show along windows from start states (V, W, n_p), (V, W, L, m)."""
+    one = job(model, theta, data, starts)
+    return shown(one, run([one])[0], data.samples.measured)
+
+
+def residual(data: WindowData, starts: Array, shown: Array) -> Array:
+    """Whitened residual, zero where nothing was measured, and the doubts below it, (W, R)."""
+    gap = (data.seen - shown) / data.sigma
+    gap = np.clip(np.nan_to_num(gap, nan=0.0), -1e7, 1e7).reshape(len(data), -1)
+    return np.concatenate([gap, (data.guess - starts) / data.doubt], axis=1)
+
+
+def whitened(data: WindowData, change: Array) -> Array:
+    """Change of what is shown (W, L, m) in units of the residual; no doubt changes, (W, R)."""
+    valid = np.isfinite(data.seen)
+    flat = np.where(valid, change / data.sigma, 0.0).reshape(len(data), -1)
+    flat = np.clip(flat, -1e7, 1e7)
+    return np.concatenate([flat, np.zeros((len(data), len(data.doubt)))], axis=1)
+
+
+def by_start(model: Model, theta: Array, data: WindowData, starts: Array, base: Array) -> Array:
+    """Derivative of the whitened output by the start states, (W, R, n_p)."""
+    channels = model.simulator.physical_channels
+    moved = [i for i, channel in enumerate(channels) if not channel.invariant]
+    steps = data.moves
+    variants = starts[None] + np.zeros((len(moved), 1, 1))
+    for row, i in enumerate(moved):
+        variants[row, :, i] += steps[i]
+    outputs = simulate(model, theta, data, variants)
+    found = np.zeros((len(data), base[0].size + len(steps), len(steps)))
+    for row, i in enumerate(moved):
+        found[:, :, i] = whitened(data, (outputs[row] - base) / steps[i])
+    measured = data.samples.measured
+    for i, channel in enumerate(channels):
+        if channel.invariant:
+            # The motion is the same from there, only that much further.
+            found[:, :, i] = whitened(data, np.where(measured == i, 1.0, 0.0) + 0.0 * base)
+        found[:, base[0].size + i, i] = 1.0 / data.doubt[i]
+    return found
+
+
+def fit_starts(
+    model: Model, theta: Array, data: WindowData, starts: Array, turns: int, tries: int = 5,
+    slope: Array | None = None,
+) -> StartFit:  # fmt: skip
+    """Least squares for the start state of every window (Levenberg and Marquardt).
+
+    Between two full derivatives, steps of Broyden's method go on with a corrected one: they cost
+    a simulation each instead of one for every state.
+
+    Args:
+        turns: Rounds of steps, with a full derivative after each.
+        tries: Steps in a round.
+        slope: Derivative by the start states from nearby, to start with.
+    """
+    base = simulate(model, theta, data, starts[None])[0]
+    if slope is None:
+        slope = by_start(model, theta, data, starts, base)
+    found = StartFit(starts, base, residual(data, starts, base), slope)
+    for _ in range(turns):
+        found = descend(model, theta, data, found, tries)
+        slope = by_start(model, theta, data, found.starts, found.shown)
+        found = dataclasses.replace(found, by_start=slope)
+    return found
+
+
+def descend(model: Model, theta: Array, data: WindowData, found: StartFit, tries: int) -> StartFit:
+    """Some steps of every window by the derivative it has, corrected as they go."""
+    starts, base, now = found.starts.copy(), found.shown.copy(), found.residual.copy()
+    local, damping = found.by_start, np.full(len(data), 1e-3)
+    busy = np.ones(len(data), bool)
+    for _ in range(tries):
+        rows = np.flatnonzero(busy)
+        if not len(rows):
+            break
+        part = data.take(rows)
+        step = _step(local[rows], now[rows], damping[rows])
+        there = starts[rows] + step
+        output = simulate(model, theta, part, there[None])[0]
+        trial = residual(part, there, output)
+        old, new = (now[rows] ** 2).sum(1), (trial**2).sum(1)
+        # Broyden's correction of the derivative along the step that was made.
+        surprise = now[rows] - trial - (local[rows] @ step[..., None])[..., 0]
+        size = np.maximum((step**2 / data.moves**2).sum(1), 1e-12)
+        local = local.copy()
+        local[rows] += surprise[:, :, None] * (step / data.moves**2 / size[:, None])[:, None]
+        good = new < old
+        damping[rows] = np.where(good, 0.3 * damping[rows], 10 * damping[rows])
+        won = rows[good]
+        starts[won], now[won], base[won] = there[good], trial[good], output[good]
+        busy[rows] = ~good | (old - new > 0.02 * old + 0.1)
+    return StartFit(starts, base, now, found.by_start)
+
+
+def _step(slope: Array, now: Array, damping: Array) -> Array:
+    """Damped Gauss-Newton steps, (W, n_p)."""
+    normal = slope.transpose(0, 2, 1) @ slope
+    size = np.sqrt(np.maximum(np.einsum("wii->wi", normal), 1e-12))
+    scaled = normal / (size[:, :, None] * size[:, None, :])
+    scaled = scaled + (damping[:, None, None] + 1e-9) * np.eye(slope.shape[2])
+    right = (slope.transpose(0, 2, 1) @ now[..., None])[..., 0] / size
+    return np.linalg.solve(scaled, right[..., None])[..., 0] / size

@@ -1,0 +1,128 @@
+"""Numbers too large to be believed: effects that switch the system off instead of explaining it.
+
+Where the nominal simulator is far off, whatever stops the motion takes most of the error away: a
+gain of a hundredth, a dead zone wider than the input, an inertia a thousand times too large.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.data.samples import Samples
+from residual.gap.fitting.contract import Fit, Fitter
+from residual.gap.fitting.intervals import at_bound, deviations
+from residual.gap.model.model import Model
+from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
+from sims.effects.aliases import probes, shortly_after
+from sims.effects.base import Effect
+from sims.effects.parameter import ParameterChange
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+#: Largest factor between a parameter and its nominal value, either way.
+FACTOR = 10.0
+#: Part of the motion that hangs on a parameter, below which that hardly matters as it is.
+MINOR = 0.1
+#: Least part of the input's variation that its way to the actuator leaves.
+THROUGH = 0.1
+
+
+def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
+    """Which of a set of effects cannot be right, and why; an empty string if each can.
+
+    Args:
+        model: Simulator with the effects.
+        theta: Their numbers, (p,).
+        samples: The measured table.
+
+    Returns:
+        Its position among the model's effects, their number if it is none of them, and why.
+    """
+    host, given = model.bind(theta), model.simulator.with_effects(())
+    for number, effect in enumerate(host.effects[len(model.simulator.effects) :]):
+        if not isinstance(effect, ParameterChange):
+            continue
+        nominal = float(np.mean(host.parameters[effect.parameter].value))
+        if nominal == 0:
+            continue
+        ratio = (nominal + float(effect.change)) / nominal
+        small = ratio > FACTOR and _minor(given, effect.parameter, ratio)
+        if not 1 / FACTOR <= ratio <= FACTOR and not small:
+            return number, f"{effect.parameter} would be {ratio:.3g} times its nominal value"
+    once = _shows_once(host, samples, len(model.simulator.effects))
+    if once is not None:
+        return once, "the input reaches where it acts only once, so that nothing confirms it"
+    before = Model(given).inputs(samples, np.zeros((1, 0)))[0]
+    after = model.inputs(samples, theta[None])[0]
+    for j, channel in enumerate(host.action_channels):
+        usual = float(before[..., j, 0].std())
+        left = float(after[..., j, 0].std())
+        if usual > 0 and not THROUGH <= left / usual <= 1 / THROUGH:
+            acting = [_acts_on(one.effect, channel.name) for one in model.chosen]
+            number = acting.index(True) if any(acting) else len(acting)
+            return number, f"{channel.name} would have {left / usual:.2g} of its strength"
+    return len(model.chosen), ""
+
+
+def nearly(fit: Fit, number: int, fitter: Fitter) -> bool:
+    """Whether numbers that can be believed are as likely as the absurd ones of a fit.
+
+    What is known badly may be nine times its nominal value as well as eleven.
+
+    Args:
+        fit: With absurd numbers.
+        number: Whose they are, by position among the model's effects.
+        fitter: Of the fit.
+    """
+    half = 1.96 * deviations(fit, fitter.blocks)
+    reach = np.where(fit.model.owner == number, half, 0.0)
+    nearer = fit.theta - np.clip(fit.theta, -reach, reach)
+    return not absurd(fit.model, nearer, fitter.samples)[1]
+
+
+def surprises(fit: Fit) -> int:
+    """Effects of a fitted set that are larger than their kind usually is, or end at a bound.
+
+    What a bound has stopped is no optimum: the data would have it elsewhere.
+    """
+    ended = {int(fit.model.owner[j]) for j in range(len(fit.theta)) if at_bound(fit, j)}
+    own = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
+    return sum(effect.surprising or i in ended for i, effect in enumerate(own))
+
+
+def _acts_on(effect: Effect, actuator: str) -> bool:
+    return isinstance(effect, ActuatorEffect) and actuator in effect.actuators
+
+
+def _shows_once(host: HostSimulator, samples: Samples, own: int) -> int | None:
+    """Which effect of an actuator shows in a single stretch of the data, if any.
+
+    What happens beyond the end of all other data can be fitted, but not forecast.
+    """
+    inputs = [channel.name for channel in host.action_channels]
+    for number, effect in enumerate(host.effects[own:]):
+        if not isinstance(effect, StaticActuatorEffect):
+            continue
+        columns = [inputs.index(name) for name in effect.actuators]
+        shown = [effect.shows(run.actions[:, c]) for run in samples.recorded for c in columns]
+        stretches = sum(int(s[0]) + int((s[1:] & ~s[:-1]).sum()) for s in shown)
+        if stretches == 1 and not all(s.all() for s in shown):
+            return number
+    return None
+
+
+def _minor(simulator: HostSimulator, parameter: str, ratio: float) -> bool:
+    """Whether a parameter hardly matters, and does not take over if it is so much larger.
+
+    A rotor that weighs a fiftieth of the arm may well weigh twenty times as much.
+    """
+    states, inputs = probes(simulator, np.random.default_rng(0))
+    value = float(np.mean(simulator.parameters[parameter].value))
+    hosts = [simulator.with_parameters(**{parameter: scale * value}) for scale in (1.0, 1.001)]
+    moves = [shortly_after(host, states, inputs) - states for host in hosts]
+    whole = np.linalg.norm(moves[0], axis=0)
+    part = np.linalg.norm(moves[1] - moves[0], axis=0) / 0.001
+    matters = float(np.max(part[whole > 0] / whole[whole > 0], initial=0.0))
+    return matters < MINOR and matters * ratio < 1.0

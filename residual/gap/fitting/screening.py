@@ -1,0 +1,208 @@
+"""Screening: how each candidate effect would move the predicted windows, and what it would gain.
+
+A candidate is tried at small values; from the change that it makes to every window, whatever free
+start states and effects already chosen can imitate is projected out.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.intervals import at_bound
+from residual.gap.model.candidates import Candidate, Trial
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Variant:
+    """One candidate at trial values.
+
+    Attributes:
+        candidate: Its number in the list of candidates.
+        trial: Values of its knobs that make the columns.
+        columns: Which columns of the signature matrix belong to it.
+        linear: Which knobs scale with the coefficient; the others keep their trial value.
+    """
+
+    candidate: int
+    trial: Trial
+    columns: tuple[int, ...]
+    linear: NDArray[np.bool_]
+
+    def start(self, coefficients: Array) -> Array:
+        """Start value of the knobs from linear coefficients of the variant's columns."""
+        start = self.trial.values[0].copy()
+        # A secant far from one times itself says little about the true size.
+        trusted = np.clip(coefficients, -3, 3) if len(coefficients) == 1 else coefficients
+        start[self.linear] = trusted @ self.trial.values[:, self.linear]
+        return start
+
+
+@dataclasses.dataclass(frozen=True)
+class Signatures:
+    """Signature columns around a fit.
+
+    Attributes:
+        variants: One or more for each candidate.
+        matrix: Columns, start states and chosen effects projected out, (rows, c).
+        residual: The residual, projected likewise, (rows,).
+    """
+
+    variants: tuple[Variant, ...]
+    matrix: Array
+    residual: Array
+
+    @property
+    def strengths(self) -> Array:
+        """Squared norm of every column."""
+        return np.einsum("rc,rc->c", self.matrix, self.matrix)
+
+
+def flatten(values: Array, weights: Array) -> Array:
+    """(W, R, c) or (W, R) with the root of the window weights -> (W R, c) or (W R,)."""
+    shaped = values * np.sqrt(weights).reshape(-1, *([1] * (values.ndim - 1)))
+    return shaped.reshape(values.shape[0] * values.shape[1], *values.shape[2:])
+
+
+def project_out(basis: Array, columns: Array) -> Array:
+    """``columns`` less what the columns of ``basis`` can imitate."""
+    if basis.shape[1] == 0:
+        return columns
+    size = np.sqrt(np.maximum((basis**2).sum(axis=0), 1e-300))
+    q, _ = np.linalg.qr(basis / size)
+    return columns - q @ (q.T @ columns)
+
+
+def signatures(fit: Fit, variants: Sequence[Variant], columns: Array) -> Signatures:
+    """Signatures from what each variant adds to the whitened output of every window.
+
+    A number that has come to its bound can imitate nothing more, so that what moves like it is
+    seen: drag that is 40 % off beside a parameter that may be 3 % off.
+
+    Args:
+        fit: The fitted model around which they were computed.
+        variants: Whose columns they are.
+        columns: shape (W, R, c).
+    """
+    columns = columns - fit.basis @ (fit.basis.transpose(0, 2, 1) @ columns)
+    free = [j for j in range(len(fit.theta)) if not at_bound(fit, j)]
+    chosen = flatten(fit.by_knob[..., free], fit.weights)
+    residual = flatten(fit.projected, fit.weights)
+    return Signatures(
+        tuple(variants),
+        project_out(chosen, flatten(columns, fit.weights)),
+        project_out(chosen, residual[:, None])[:, 0],
+    )
+
+
+def trials(candidates: Sequence[Candidate]) -> list[Variant]:
+    """Variants of candidates at all their trial values, columns numbered in that order."""
+    found, total = [], 0
+    for number, candidate in enumerate(candidates):
+        for trial in candidate.trials:
+            places = tuple(range(total, total + len(trial.values)))
+            found.append(Variant(number, trial, places, candidate.linear))
+            total += len(places)
+    return found
+
+
+@dataclasses.dataclass(frozen=True)
+class Gain:
+    """What adding one or two variants would take off the cost, in the linear picture.
+
+    Attributes:
+        variants: Numbers of the variants.
+        value: Fall of the cost.
+        values: Start value of every knob of each variant's candidate.
+    """
+
+    variants: tuple[int, ...]
+    value: float
+    values: tuple[Array, ...]
+
+
+def gains(
+    found: Signatures, residual: Array | None = None, matrix: Array | None = None
+) -> list[Gain]:
+    """Linear gain of every variant alone, best first."""
+    residual = found.residual if residual is None else residual
+    matrix = found.matrix if matrix is None else matrix
+    out = []
+    for number, variant in enumerate(found.variants):
+        value, coefficients = constrained(
+            matrix[:, variant.columns], residual, variant.trial.one_sided
+        )
+        out.append(Gain((number,), value, (variant.start(coefficients),)))
+    return sorted(out, key=lambda g: -g.value)
+
+
+def constrained(
+    columns: Array, residual: Array, one_sided: NDArray[np.bool_]
+) -> tuple[float, Array]:
+    """Least squares with some coefficients not negative; fall of the cost and coefficients."""
+    gram, right = columns.T @ columns, columns.T @ residual
+    return constrained_gram(gram, right, one_sided)
+
+
+def constrained_gram(
+    gram: Array, right: Array, one_sided: NDArray[np.bool_]
+) -> tuple[float, Array]:
+    """The same from the normal equations."""
+    k = len(right)
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    alive = np.diag(gram) > 1e-12
+    best = np.zeros(k)
+    for _ in range(k + 1):
+        best[:] = 0.0
+        if not alive.any():
+            return 0.0, best
+        scaled = gram[np.ix_(alive, alive)] / np.outer(size[alive], size[alive])
+        scaled = scaled + 1e-9 * np.eye(int(alive.sum()))
+        best[alive] = np.linalg.solve(scaled, right[alive] / size[alive]) / size[alive]
+        wrong = alive & one_sided & (best < 0)
+        if not wrong.any():
+            break
+        alive = alive & ~wrong
+    return max(float(2 * best @ right - best @ gram @ best), 0.0), best
+
+
+def pair_gains(
+    found: Signatures,
+    top: int = 40,
+    residual: Array | None = None,
+    matrix: Array | None = None,
+    without: Sequence[int] = (),
+) -> list[Gain]:
+    """Linear gain of every pair of variants of different candidates, best first.
+
+    Args:
+        found: Signatures.
+        top: How many pairs are returned.
+        residual, matrix: By default those with the chosen effects projected out.
+        without: Candidates that take no part.
+    """
+    residual = found.residual if residual is None else residual
+    matrix = found.matrix if matrix is None else matrix
+    gram = matrix.T @ matrix
+    right = matrix.T @ residual
+    out = []
+    for i, first in enumerate(found.variants):
+        if first.candidate in without:
+            continue
+        for j in range(i + 1, len(found.variants)):
+            second = found.variants[j]
+            if second.candidate == first.candidate or second.candidate in without:
+                continue
+            columns = list(first.columns + second.columns)
+            sides = np.append(first.trial.one_sided, second.trial.one_sided)
+            value, c = constrained_gram(gram[np.ix_(columns, columns)], right[columns], sides)
+            k = len(first.columns)
+            starts = (first.start(c[:k]), second.start(c[k:]))
+            out.append(Gain((i, j), value, starts))
+    return sorted(out, key=lambda g: -g.value)[:top]

@@ -1,0 +1,1 @@
+"""A simulator with candidate effects, as a function of numbers."""

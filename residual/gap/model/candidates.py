@@ -1,0 +1,257 @@
+"""Candidate effects: which of their numbers are fitted, in what bounds, from which start values."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.data.samples import Samples
+from sims.effects.actuator import ActuatorEffect
+from sims.effects.base import Effect, Quantity
+from sims.effects.joint import JointEffect
+from sims.effects.library import typical
+from sims.effects.sensor import SensorEffect
+from sims.host import HostSimulator
+from sims.simulator import Channel
+
+Array = NDArray[np.float64]
+
+#: Part of an input's bound that a log has to reach to tell of full commands.
+NEAR_FULL = 0.5
+
+
+@dataclasses.dataclass(frozen=True)
+class Knob:
+    """One fitted number of an effect.
+
+    Attributes:
+        field: Its name in the effect.
+        unit: SI unit.
+        low, high: Bounds.
+        step: A small change.
+        strength: Whether the effect is absent where it is zero.
+        known: Standard deviation with which it is known to be zero beforehand.
+        above: Name of another number of the effect, below which this one does nothing more.
+    """
+
+    field: str
+    unit: str
+    low: float
+    high: float
+    step: float
+    strength: bool
+    known: float = np.inf
+    above: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """Trial values of a candidate's knobs, one row for each signature column.
+
+    Attributes:
+        values: shape (k, number of knobs).
+        one_sided: Whether each column's coefficient may not be negative, (k,).
+    """
+
+    values: Array
+    one_sided: NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """An effect that may be missing.
+
+    Attributes:
+        effect: The effect at zero strength, numbers that are not fitted at their value.
+        knobs: The fitted numbers.
+        trials: What its signatures are computed at.
+        rough: True if its signature depends on its size (dead zone, delay ...), so that several
+            trials are worth a refit.
+        bold: Numbers from which it is fitted alone whatever the screen says, or None.
+    """
+
+    effect: Effect
+    knobs: tuple[Knob, ...]
+    trials: tuple[Trial, ...]
+    rough: bool
+    bold: Array | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+    @property
+    def label(self) -> str:
+        """Name and place."""
+        return str(self.effect)
+
+    @property
+    def fixed_level(self) -> bool:
+        """True if the effect vanishes at infinity (saturation), so that trials do not scale."""
+        return not any(k.strength for k in self.knobs)
+
+    @property
+    def linear(self) -> NDArray[np.bool_]:
+        """Which knobs scale with the coefficient of a signature column."""
+        return np.array([knob.strength for knob in self.knobs])
+
+    def bind(self, values: Sequence[float | Array]) -> Effect:
+        """The effect with these numbers: scalars, or arrays with one entry per row."""
+        names = [knob.field for knob in self.knobs]
+        return self.effect.with_values(**dict(zip(names, values, strict=True)))
+
+
+def candidates(
+    simulator: HostSimulator, effects: Iterable[Effect], samples: Samples
+) -> list[Candidate]:
+    """All candidates: effects on channels that were measured, whole numbers spelt out.
+
+    An effect with a whole-numbered shape (the order of cogging) becomes one candidate for each
+    of its start values.
+    """
+    measured = {simulator.state_channels[i].name for i in samples.measured}
+    inputs = [channel.name for channel in simulator.action_channels]
+    columns = {channel.name: c for c, channel in enumerate(simulator.physical_channels)}
+    found = []
+    for effect in effects:
+        if isinstance(effect, SensorEffect):
+            if effect.where not in measured:
+                continue
+            effect = effect.suited_to(*_range(samples, columns[effect.where]))
+        reach = 0.0
+        if isinstance(effect, ActuatorEffect):
+            acting = [inputs.index(name) for name in effect.actuators]
+            reach = float(np.abs(samples.actions[:, acting]).max())
+            full = _full(simulator.action_channels[acting[0]], reach)
+            effect = effect.suited_to(-full, full)
+        if _follows_unseen(effect, simulator, measured):
+            continue
+        known = _within_reach(effect, effect.quantities(simulator), simulator, samples)
+        whole = {n: q for n, q in known.items() if q.integer and q.role == "shape"}
+        for values in itertools.product(*(q.starts for q in whole.values())):
+            fixed = effect.with_values(**dict(zip(whole, values, strict=True)))
+            found.append(_candidate(fixed, known, reach))
+    return found
+
+
+def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]) -> bool:
+    """Whether a force depends on a position that nobody measured.
+
+    The start state of every window is free, so that such a force has a free size in each of them,
+    and would explain anything.
+    """
+    joint = next((j for j in simulator.joints if j.name == effect.where), None)
+    if not isinstance(effect, JointEffect) or joint is None or joint.position in measured:
+        return False
+    there = typical(effect, simulator)
+    assert isinstance(there, JointEffect)
+    size = effect.measures(simulator)["position"][1] if joint.rate else 1.0
+    places = size * np.array([-0.7, 0.0, 0.4, 1.0])
+    return bool(np.ptp(there.force(places, np.zeros(4))) > 0)
+
+
+def _full(channel: Channel, reach: float) -> float:
+    """Full command of an input, where its strength is known: its bound, if the log comes near."""
+    bound = max(abs(channel.low), abs(channel.high))
+    return bound if reach >= NEAR_FULL * bound else reach
+
+
+def _range(samples: Samples, column: int) -> tuple[float, float]:
+    """Least and greatest measured value of a channel."""
+    seen = samples.seen[:, column]
+    return float(np.nanmin(seen)), float(np.nanmax(seen))
+
+
+def _within_reach(
+    effect: Effect, known: dict[str, Quantity], simulator: HostSimulator, samples: Samples
+) -> dict[str, Quantity]:
+    """Numbers of an effect for the positions that were measured, and for how long.
+
+    No command is later than the longest record lasts.
+
+    An angle that counts turns goes far beyond its channel's scale, where a cubic spring of usual
+    size would be a wall, and trial steps of that size would tell nothing. A place, such as where a
+    spring rests, is looked for near the channel's zero and no farther beyond what was measured
+    than that is wide: a spring that rests farther away is a constant load with another name.
+    """
+    if effect.enters == "actuator":
+        longest = max(float(run.durations.sum()) for run in samples.recorded)
+        return {
+            name: dataclasses.replace(q, high=min(q.high, longest)) if q.unit == "s" else q
+            for name, q in known.items()
+        }
+    joint = next((j for j in simulator.joints if j.name == effect.where), None)
+    if effect.enters != "joint" or joint is None:
+        return known
+    names = [channel.name for channel in simulator.physical_channels]
+    column = names.index(joint.position)
+    if column not in samples.measured:
+        return known
+    low, high = _range(samples, column)
+    scale = simulator.physical_channels[column].scale
+    reach = max(1.0, max(abs(low), abs(high)) / scale)
+    beyond = max(high - low, scale)
+    found = {}
+    for field in dataclasses.fields(effect):
+        quantity = known.get(field.name)
+        if quantity is None:
+            continue
+        if quantity.integer and field.metadata["dimension"] == {"turn": 1}:
+            # Of less than a whole period no law is to be seen: it could pass for any force.
+            whole = tuple(times for times in quantity.starts if times * (high - low) >= 2 * np.pi)
+            quantity = dataclasses.replace(quantity, starts=whole)
+        if quantity.role == "shape" and field.metadata["dimension"] == {"position": 1}:
+            quantity = dataclasses.replace(
+                quantity,
+                low=max(quantity.low, min(low, 0.0) - beyond),
+                high=min(quantity.high, max(high, 0.0) + beyond),
+            )
+        power = field.metadata["dimension"].get("position", 0)
+        factor = reach**power if power < 0 else 1.0
+        starts = tuple(factor * start for start in quantity.starts)
+        found[field.name] = dataclasses.replace(
+            quantity, scale=factor * quantity.scale, starts=starts
+        )
+    return found
+
+
+def _candidate(effect: Effect, known: dict[str, Quantity], reach: float) -> Candidate:
+    free = {name: quantity for name, quantity in known.items() if quantity.fitted}
+    knobs = tuple(
+        Knob(
+            n, q.unit, q.low, q.high, 0.1 * q.scale,
+            q.role == "strength" and np.isfinite(q.nominal), above=q.above,
+        )
+        for n, q in free.items()
+    )  # fmt: skip
+    strengths = [i for i, knob in enumerate(knobs) if knob.strength]
+    shapes = [i for i, knob in enumerate(knobs) if not knob.strength]
+    quantities = list(free.values())
+    starts = [quantities[i].starts or (quantities[i].scale,) for i in shapes]
+    if not strengths and reach > 0:
+        # The level of a saturation is searched where the recorded input reaches; beyond, it does
+        # nothing, and no slope leads back.
+        starts = [tuple(s / quantities[i].scale * reach for s in starts[0]) for i in shapes]
+        knobs = tuple(dataclasses.replace(knob, high=min(knob.high, reach)) for knob in knobs)
+    trials = []
+    for shape in itertools.product(*starts):
+        sizes = [list(quantities[i].starts) or [0.1 * quantities[i].scale] for i in strengths] or [
+            [0.0]
+        ]
+        if len(strengths) > 1:
+            sizes = [[size[0]] for size in sizes]
+        for chosen in sizes[0] if len(strengths) <= 1 else [None]:
+            rows = np.zeros((max(len(strengths), 1), len(knobs)))
+            rows[:, shapes] = shape
+            for row, i in enumerate(strengths):
+                rows[row, i] = chosen if chosen is not None else sizes[row][0]
+            sided = [knobs[i].low == 0 for i in strengths] or [True]
+            trials.append(Trial(rows, np.array(sided)))
+    full = [quantity.bold for quantity in quantities if quantity.bold is not None]
+    bold = np.array(full) if len(full) == len(knobs) else None
+    return Candidate(effect, knobs, tuple(trials), len(trials) > 1, bold)

@@ -1,0 +1,85 @@
+"""The path of the states straight from what was measured, where every fit starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.data.samples import Samples
+from residual.gap.model.model import Model
+from sims.simulator import Channel
+
+Array = NDArray[np.float64]
+
+#: Rows that are reckoned one after the other; longer runs are cut, and the cuts gone over again.
+LONGEST = 400
+
+
+def unseen(channels: Sequence[Channel], measured: Iterable[int]) -> NDArray[np.bool_]:
+    """States of which the log says nothing: not measured, nor rates of what was, (n_p,)."""
+    seen = {channels[i].name for i in measured}
+    return np.array([not {c.name, c.rate_of} & seen for c in channels], bool)
+
+
+def measured(model: Model, samples: Samples, theta: Array) -> Array:
+    """Nodes straight from the measurement; an unmeasured rate by central differences.
+
+    What cannot be told so, such as the level of a tank without a sensor, is where the model goes
+    from zero while the measured states are as measured.
+    """
+    channels = model.simulator.physical_channels
+    names = [c.name for c in channels]
+    nodes = np.array(samples.seen[:, : len(channels)])
+    for start, stop in samples.runs:
+        rows = slice(start, stop)
+        for i, channel in enumerate(channels):
+            column = nodes[rows, i]
+            good = np.isfinite(column)
+            if not good.any() and channel.kind == "rate" and channel.rate_of in names:
+                position = nodes[rows, names.index(channel.rate_of)]
+                column[:] = np.gradient(position, samples.times[rows])
+            elif not good.any():
+                column[:] = 0.0
+            elif not good.all():
+                at = samples.times[rows]
+                column[~good] = np.interp(at[~good], at[good], column[good])
+    if model.has_sensor:
+        nodes = model.bind(theta).unsense(nodes)
+    nodes = model.widen(samples, nodes, theta)
+    hidden = np.flatnonzero(unseen(channels, samples.measured))
+    return _reckoned(model, samples, nodes, theta, hidden) if hidden.size else nodes
+
+
+def _reckoned(
+    model: Model, samples: Samples, nodes: Array, theta: Array, hidden: NDArray[np.int64]
+) -> Array:
+    """Nodes with the hidden columns as the model moves them, row after row."""
+    nodes = nodes.copy()
+    cuts = [(a, min(a + LONGEST, stop)) for start, stop in samples.runs
+            for a in range(start, stop, LONGEST)]  # fmt: skip
+    first, end = np.array(cuts).T
+    heads = np.isin(np.arange(len(nodes)), [start for start, _ in samples.runs])
+    for _ in range(2 if len(cuts) > len(samples.runs) else 1):
+        for k in range(int((end - first).max())):
+            rows = (first + k)[first + k < end]
+            rows = rows[rows + 1 < len(nodes)]
+            after = model.advance(samples, nodes[rows][None], theta[None], rows)[0][:, hidden]
+            good = np.isfinite(after).all(axis=1) & ~heads[rows + 1]
+            nodes[np.ix_(rows[good] + 1, hidden)] = after[good]
+    return nodes
+
+
+def variation(samples: Samples, nodes: Array, length: int = 25) -> Array:
+    """Root mean square variation of each state within ``length`` samples, to scale states.
+
+    Not the usual one, which is next to nothing of a system that rests for most of a record.
+    """
+    spreads = []
+    for start, stop in samples.runs:
+        for a in range(start, max(stop - length, start + 1), length):
+            spreads.append(nodes[a : min(a + length, stop)].std(axis=0))
+    spread = np.sqrt(np.square(spreads).mean(axis=0))
+    typical = nodes.std(axis=0)
+    return np.maximum(spread, np.maximum(1e-3 * typical, 1e-9))

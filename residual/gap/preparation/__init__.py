@@ -1,0 +1,1 @@
+"""What is settled before the search: horizon, numerics, what the log may count otherwise."""

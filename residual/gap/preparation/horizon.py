@@ -1,0 +1,99 @@
+"""How far forecasts go if the user does not say: far enough to see, short enough to repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.fitting.smooth import LEAD
+from residual.trajectories import Trajectory
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+#: Spread of an angle that turns and turns.
+TURNING = np.pi / np.sqrt(3)
+#: Part of the usual period of the motion.
+PART = 1 / 3
+#: Windows that the records should at least be good for.
+WINDOWS = 8
+#: Least samples of a window, and of a forecast of a system that strikes the ground.
+SAMPLES, STRIDE = 8, 10
+
+
+def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> float:
+    """A third of the usual period of the motion, or less if the records are short, in s.
+
+    Two thirds of a system that strikes the ground: its forecasts begin where a shorter window
+    ends, and over less a small force moves nothing.
+
+    The period is that of a sine with the same spread and the same spread of its rate, the middle
+    one over channels. At least the records have to hold ``WINDOWS`` windows of ``SAMPLES`` samples.
+
+    Args:
+        simulator: Gives the channels and the control period.
+        trajectories: Measured runs.
+    """
+    step = float(np.median(np.concatenate([t.durations for t in trajectories])))
+    periods = []
+    for column, channel in enumerate(simulator.physical_channels):
+        if channel.kind == "rate" and any(
+            np.isfinite(t.states[:, i]).any()
+            for t in trajectories
+            for i, other in enumerate(simulator.physical_channels)
+            if other.name == channel.rate_of
+        ):
+            continue
+        period = _period(trajectories, column, channel.angle)
+        if np.isfinite(period):
+            periods.append(period)
+    part = 2 * PART if simulator.has_contacts else PART
+    wanted = part * float(np.median(periods)) if periods else 20 * simulator.dt
+    most = longest_horizon(trajectories)
+    least = STRIDE if simulator.has_contacts else (1 - LEAD) * SAMPLES
+    return float(max(min(wanted, most), least * step))
+
+
+def longest_horizon(trajectories: Sequence[Trajectory]) -> float:
+    """The longest of which the records still hold enough windows, in s."""
+    lengths = [float(t.times[-1] - t.times[0]) for t in trajectories]
+    return (1 - LEAD) * min(sum(lengths) / WINDOWS, max(lengths))
+
+
+def _period(trajectories: Sequence[Trajectory], column: int, angle: bool) -> float:
+    """Of a sine that moves as far and as fast as a channel, NaN if it stands still."""
+    records = []
+    for run in trajectories:
+        known = np.isfinite(run.states[:, column])
+        if known.sum() >= 8:
+            records.append((run.states[known, column], float(np.median(np.diff(run.times[known])))))
+    if not records:
+        return float("nan")
+    most = TURNING if angle else np.inf
+    sizes = np.array([len(values) for values, _ in records], float)
+    stds = np.minimum([values.std() for values, _ in records], most)
+    spread = float(np.sqrt((sizes * stds**2).sum() / sizes.sum()))
+    speeds = [_speed(values, step, spread) for values, step in records]
+    speed = float(np.sqrt((sizes * np.square(speeds)).sum() / sizes.sum()))
+    if speed <= 0 or spread <= 0:
+        return float("nan")
+    return 2 * np.pi * spread / speed
+
+
+def _speed(values: Array, step: float, spread: float) -> float:
+    """Root mean square rate of a channel: from differences over which it moves a quarter of its
+    spread, less what noise adds to differences of any length."""
+    lag = 1
+    while 4 * lag < len(values) and _change(values, lag) < (0.25 * spread) ** 2:
+        lag *= 2
+    once, twice = _change(values, lag), _change(values, min(2 * lag, len(values) - 1))
+    # With noise s: (v L dt)^2 + 2 s^2 and (2 v L dt)^2 + 2 s^2.
+    square = (twice - once) / 3 if twice > once else once
+    return float(np.sqrt(square)) / (lag * step)
+
+
+def _change(values: Array, lag: int) -> float:
+    """Mean squared difference over so many samples."""
+    return float(np.mean((values[lag:] - values[:-lag]) ** 2))

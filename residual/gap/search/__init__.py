@@ -1,0 +1,1 @@
+"""Sets of effects: grown, forecast, chosen."""

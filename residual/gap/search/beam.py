@@ -1,0 +1,229 @@
+"""A beam search: sets of effects grown by one until one more no longer pays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.fitting.screening import Gain, Signatures, gains, pair_gains
+from residual.gap.search.exchange import spelt_out
+from residual.gap.search.sets import Key, Proposals, Search
+from residual.gap.search.significance import score
+
+Array = NDArray[np.float64]
+
+#: Part of a law's gain from which on its special case is tried in its place.
+HARDLY = 0.9
+
+
+def run(
+    search: Search, seeds: Proposals | None = None, quiet: Callable[[Key], bool] = lambda _: False
+) -> Key:
+    """Grow sets until one more effect no longer pays; returns the one that forecasts best.
+
+    Args:
+        search: What is tried goes there.
+        seeds: Sets to begin with.
+        quiet: Whether a set leaves noise alone.
+    """
+    effort = search.effort
+    frontier: list[Key] = [()]
+    grown: set[Key] = set()
+    reached = 1.0
+    if seeds:
+        frontier = _best(search, search.add(seeds)) or frontier
+        reached = search.error(frontier[0])
+        frontier = _alone(search, quiet) or frontier
+    for level in range(1, effort.most + 1):
+        fresh: list[Key] = []
+        for key in frontier:
+            more = grow(search, key)
+            fresh += more + together(search, key, more)
+        grown.update(frontier)
+        if not fresh or search.late:
+            break
+        frontier = _alone(search, quiet)
+        if grown & set(frontier):
+            break
+        if frontier:
+            continue
+        frontier = _best(search, fresh)
+        now = search.error(frontier[0])
+        if (level > 1 or seeds) and not _pays(search, frontier[0], reached):
+            break
+        reached = min(reached, now)
+    return search.best()
+
+
+def extend(search: Search, key: Key) -> None:
+    """Grow one set for as long as one more effect pays."""
+    while not search.late:
+        fresh = min(grow(search, key), key=search.error, default=key)
+        if not improves(search, fresh, search.error(key)):
+            return
+        key = fresh
+
+
+def improves(search: Search, key: Key, reached: float) -> bool:
+    """Whether a set's error is so much less than what was reached that the search goes on."""
+    return search.error(key) < (1 - search.effort.stale) * reached
+
+
+def _alone(search: Search, quiet: Callable[[Key], bool]) -> list[Key]:
+    """The likeliest set, if it leaves noise alone: no other is worth growing then."""
+    likeliest = min(search.usable(), key=lambda key: score(search, key))
+    return [likeliest] if quiet(likeliest) else []
+
+
+def _best(search: Search, keys: list[Key]) -> list[Key]:
+    """The sets that forecast best, with and without room for more, and those that fit best."""
+    good = sorted((key for key in keys if search.sound(key)), key=search.error)
+    room = [key for key in good if search.numbers(key) < search.most_numbers]
+    by_merit = sorted(room, key=lambda k: search.tried[k].merit)[: search.effort.beam]
+    return list(dict.fromkeys([*good[:1], *by_merit, *room[:1]]))
+
+
+def _pays(search: Search, key: Key, reached: float) -> bool:
+    """Whether a set is clearly better than what was reached, in all or in one joint."""
+    if improves(search, key, reached):
+        return True
+    before = min((k for k in search.usable() if len(k) < len(key)), key=search.error)
+    own = search.currency.by_group(search.validated[key].squares)
+    its = search.currency.by_group(search.validated[before].squares)
+    return bool((own < (1 - 2 * search.effort.stale) * its).any())
+
+
+def grow(search: Search, key: Key) -> list[Key]:
+    """Fit sets one effect larger than a fitted one, the best of the linear screen for each
+    joint; those that turn out absurd are replaced by the next."""
+    around = search.signatures(key)
+    places = search.currency.groups
+    total = search.effort.grown if key else search.effort.singles
+    wanted = max(2, -(-total // len(places)))
+    # Of the simulator's own parameters there are few, so they come before time may be over.
+    found = [] if key else boldly(search, parameters=True)
+    for group in places:
+        good = 0
+        for gain in plainer(search, around, _by_gain(search, around, group), 3 * wanted):
+            if search.late:
+                break
+            number = around.variants[gain.variants[0]].candidate
+            fresh, theta = search.merged(key, [(number, gain.values[0])])
+            if number in key or gain.value <= 0 or not search.fits_in(fresh):
+                continue
+            if fresh not in found and spelt_out(search, number, [i for k in found for i in k]):
+                continue
+            made = [] if fresh in found else sound(search, fresh, theta)
+            good += fresh in found or bool(made)
+            found += made
+            if good >= wanted:
+                break
+    if not key:
+        # The joints of what walks and hops move, so that the screen sees what rubs there.
+        if not search.simulator.has_contacts:
+            found += boldly(search, parameters=False)
+            found += driven(search)
+        for pair in [] if search.late else pair_gains(around, search.effort.pairs):
+            numbers = [around.variants[v].candidate for v in pair.variants]
+            fresh, theta = search.merged(key, zip(numbers, pair.values, strict=True))
+            found += sound(search, fresh, theta)
+    return list(dict.fromkeys(found))
+
+
+def sound(search: Search, key: Key, theta: Array) -> list[Key]:
+    """The set, fitted if it was not, or those that stand for it; none if nothing may be right."""
+    made = search.add({key: theta})
+    return [k for k in dict.fromkeys([key, *made]) if search.sound(k)]
+
+
+def boldly(search: Search, parameters: bool) -> list[Key]:
+    """Fit effects of which small trials tell little alone, such as friction that holds a joint.
+
+    Args:
+        search: What is tried goes there.
+        parameters: Whether changes of parameters, or all other effects.
+    """
+    found: list[Key] = []
+    for number, candidate in enumerate(search.candidates[: search.screened]):
+        fresh = (number,)
+        if candidate.bold is None or search.late or not search.fits_in(fresh):
+            continue
+        if (candidate.effect.enters == "parameter") != parameters:
+            continue
+        found += sound(search, fresh, candidate.bold)
+    return found
+
+
+def driven(search: Search) -> list[Key]:
+    """Fit every effect that holds still beside the gain of its input, or of the best other one.
+
+    When motion begins depends on both, on friction and on the drive that overcomes it; where both
+    are wrong, friction alone ends at numbers from which the linear picture is of no use.
+    """
+    screened = search.candidates[: search.screened]
+    gains = [number for number, candidate in enumerate(screened) if candidate.effect.drives]
+    if not gains:
+        return []
+    best = min(gains, key=lambda n: search.error((n,)) if (n,) in search.tried else np.inf)
+    singles = [key for key in search.tried if len(key) == 1 and key[0] < search.screened]
+    found: list[Key] = []
+    for key in [k for k in singles if screened[k[0]].effect.holds_still]:
+        place = search.place(key[0])
+        gain = next((n for n in gains if search.place(n) == place), best)
+        small = 0.01 * screened[gain].trials[0].values[0]
+        start = search.own((gain,)) if (gain,) in search.tried else small
+        fresh, theta = search.merged(key, [(gain, start)])
+        if not search.late and search.fits_in(fresh):
+            found += sound(search, fresh, theta)
+    return found
+
+
+def together(search: Search, key: Key, grown: list[Key]) -> list[Key]:
+    """The set with the best addition for every joint at once, if several joints gain."""
+    if len(search.currency.groups) < 2:
+        return []
+    base = search.currency.by_group(search.validated[key].squares)
+    additions: dict[int, Array] = {}
+    for group in range(len(base)):
+        best, reached = None, (1 - 2 * search.effort.stale) * base[group]
+        for fresh in grown:
+            # A set that stands for an absurd one may lack a member, replaced by its twin.
+            if len(fresh) != len(key) + 1 or not set(key) < set(fresh):
+                continue
+            error = search.currency.by_group(search.validated[fresh].squares)[group]
+            if error < reached:
+                best, reached = fresh, error
+        if best is not None:
+            (number,) = set(best) - set(key)
+            fit = search.tried[best]
+            additions[number] = fit.theta[fit.model.owner == best.index(number)]
+    fresh, theta = search.merged(key, additions.items())
+    if len(additions) < 2 or not search.fits_in(fresh):
+        return []
+    return sound(search, fresh, theta)
+
+
+def plainer(search: Search, around: Signatures, ranked: list[Gain], most: int) -> list[Gain]:
+    """The first gains, laws that gain hardly more than a special case of theirs replaced by it.
+
+    In the linear picture a law gains no less than its special cases, however little its further
+    numbers tell; as one of their family it has its turn when what is chosen meets its rivals.
+    """
+    owner = [around.variants[gain.variants[0]].candidate for gain in ranked]
+    found: list[Gain] = []
+    for gain, law in zip(ranked[:most], owner[:most], strict=True):
+        cases = [g for g, own in zip(ranked, owner, strict=True) if search.contains(law, own)]
+        instead = next((g for g in cases if g.value > HARDLY * gain.value), gain)
+        found += [instead] if instead not in found else []
+    return found
+
+
+def _by_gain(search: Search, around: Signatures, group: tuple[int, ...]) -> list[Gain]:
+    """Gains counted on the channels of one joint."""
+    if len(search.currency.groups) < 2:
+        return gains(around)
+    measured = len(search.fitter.samples.measured)
+    rows = np.isin(np.arange(len(around.residual)) % measured, group)
+    return gains(around, around.residual[rows], around.matrix[rows])

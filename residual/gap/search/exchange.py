@@ -1,0 +1,154 @@
+"""Sets with one member missing, or exchanged for what may do its work."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.fitting.screening import gains, pair_gains
+from residual.gap.search.sets import Key, Search, all_but
+
+Array = NDArray[np.float64]
+
+#: Part of the best gain by the linear screen below which no rival is worth a fit.
+HOPELESS = 0.5
+#: Spellings of one effect, as cogging has one for every order, that are tried for one place.
+SPELLINGS = 2
+#: Effects that hold still tried in place of one that does, whatever the linear screen says.
+STILL = 3
+#: Pairs that are tried in place of one effect with as many numbers.
+SPLITS = 2
+
+
+def add_without_each(search: Search, key: Key) -> None:
+    """Fit what is left of a set without each of its members."""
+    for gone in key:
+        smaller, theta = search.merged(key, (), drop=(gone,))
+        search.add({smaller: theta})
+
+
+def add_exchanged(search: Search, key: Key, most: int) -> None:
+    """Fit sets in which one member of a set has been exchanged for what may do its work.
+
+    These are the effects that gain most where the member is missing, and its whole family; in
+    place of what holds still, such as a dead zone, all that does, such as dry friction: of these
+    a linear screen tells little.
+
+    Args:
+        search: What is tried goes there.
+        key: A fitted set.
+        most: Effects that are tried in place of each member, beside its family.
+    """
+    add_without_each(search, key)
+    for gone in key:
+        rest = all_but(key, gone)
+        if rest not in search.tried:
+            continue
+        for number, start in _rivals(search, key, gone, most):
+            fresh, theta = search.merged(key, [(number, start)], drop=(gone,))
+            search.add({fresh: theta})
+        _add_plainer(search, key, gone)
+        if len(search.candidates[gone].knobs) == 2:
+            _add_split(search, rest, gone)
+
+
+def _rivals(search: Search, key: Key, gone: int, most: int) -> list[tuple[int, Array]]:
+    """What may do a member's work, and numbers from which it is fitted."""
+    rest, family = all_but(key, gone), search.family(gone)
+    around = search.signatures(rest)
+    ranked = gains(around)
+    found: dict[int, Array] = {}
+    still: set[int] = set()
+    for gain in ranked:
+        number = around.variants[gain.variants[0]].candidate
+        if number in key or number in found or spelt_out(search, number, list(found)):
+            continue
+        if search.doubles((*rest, number)):
+            continue
+        bold = search.candidates[number].bold
+        near = len(found) < most or (family and search.family(number) == family)
+        if both_hold_still(search, gone, number) and len(still) < STILL:
+            still.add(number)
+        elif not near or gain.value < HOPELESS * ranked[0].value:
+            continue
+        found[number] = gain.values[0] if gain.value > 0 or bold is None else bold
+    return list(found.items())
+
+
+def _add_plainer(search: Search, key: Key, gone: int) -> None:
+    """Fit special cases of a member in its place, from the mean of its strengths.
+
+    Also those that were fitted before: they may have ended elsewhere than the law that holds them.
+    """
+    model = search.tried[key].model
+    own = [j for j in range(len(model)) if model.owner[j] == key.index(gone)]
+    strengths = [search.tried[key].theta[j] for j in own if model.knobs[j].strength]
+    for number, case in enumerate(search.candidates[: search.screened]):
+        if number in key or not search.contains(gone, number) or len(case.knobs) != 1:
+            continue
+        fresh, theta = search.merged(key, [(number, np.mean(strengths, keepdims=True))], (gone,))
+        if fresh in search.tried:
+            search.fit(fresh, theta)
+        search.add({fresh: theta})
+
+
+def _add_split(search: Search, rest: Key, gone: int) -> None:
+    """Fit sets in which two effects of one number each stand for one of two."""
+    around = search.signatures(rest)
+    larger = [n for n, one in enumerate(search.candidates) if len(one.knobs) != 1]
+    for pair in pair_gains(around, SPLITS, without=[*larger, *rest, gone]):
+        numbers = [around.variants[v].candidate for v in pair.variants]
+        fresh, theta = search.merged(rest, zip(numbers, pair.values, strict=True))
+        search.add({fresh: theta} if search.fits_in(fresh) else {})
+
+
+def both_hold_still(search: Search, one: int, other: int) -> bool:
+    """Whether two effects keep from moving what hardly moves."""
+    return all(search.candidates[number].effect.holds_still for number in (one, other))
+
+
+def spelt_out(search: Search, number: int, taken: Sequence[int]) -> bool:
+    """Whether enough spellings of a candidate's effect are taken, so that others get a turn."""
+    label = search.candidates[number].label
+    return sum(search.candidates[other].label == label for other in set(taken)) >= SPELLINGS
+
+
+def exchanged(search: Search, key: Key, number: int, nearly: bool = False) -> list[tuple[int, Key]]:
+    """What was fitted in place of a member, and the set with it.
+
+    Laws of which the member is a special case are left out: they are it, with more freedom.
+
+    Args:
+        search: With what was fitted.
+        key: The set.
+        number: Its member.
+        nearly: Whether sets count, too, whose numbers are absurd, but known so badly that they
+            need not be.
+    """
+    rest = set(key) - {number}
+    found = []
+    doubtful = [k for k in search.nearly if k not in search.unfit] if nearly else []
+    for rival in [*search.usable(), *doubtful]:
+        if len(rival) == len(key) and rest < set(rival) and number not in rival:
+            (other,) = set(rival) - rest
+            if not search.contains(other, number):
+                found.append((other, rival))
+    return found
+
+
+def split(search: Search, key: Key, number: int) -> list[tuple[Key, list[int]]]:
+    """Sets with two effects in place of one that has as many numbers, and those two.
+
+    A spring with a free rest, for example, is a longer pendulum with an offset of its sensor.
+    """
+    rest = set(key) - {number}
+    return [
+        (rival, sorted(set(rival) - rest))
+        for rival in search.usable()
+        if len(rival) == len(key) + 1
+        and rest < set(rival)
+        and number not in rival
+        and search.numbers(rival) <= search.numbers(key)
+    ]

@@ -1,0 +1,203 @@
+"""From a fitter to the effects that explain what it holds: search, weigh anew, choose."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.fitting.contract import Fit, Fitter, Left
+from residual.gap.fitting.forecasts import noise_floor
+from residual.gap.fitting.noise import Noise
+from residual.gap.model.candidates import Candidate
+from residual.gap.preparation.effort import Effort
+from residual.gap.search.beam import extend, improves, run
+from residual.gap.search.choice import Choice, choose, reasons
+from residual.gap.search.exchange import add_exchanged
+from residual.gap.search.sets import Key, Proposals, Search, Twins
+from residual.gap.search.significance import score, significant
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+#: Residual over noise below which a remainder is a footnote.
+FOOTNOTE = 1.1
+#: Forecast error over that by noise below which residuals are believed.
+WELL = 1.5
+#: Times that channels are weighed anew by what the best set leaves of them.
+ROUNDS = 3
+#: Change of a weight that is worth another search.
+WORTH = 1.3
+#: Effects tried in place of each chosen one, and rounds of that.
+RIVALS, EXCHANGES = 10, 3
+#: Effects tried in place of each at the least.
+LEAST = 2
+#: Sets that a new search begins with, and their error over that of the best.
+SEEDS, HOPEFUL = 12, 3.0
+
+
+#: From the fitter that made a fit, and the fit: the fitter whose channels are weighed by what that
+#: leaves of them, and the noise around it.
+Weighing = Callable[[Fitter, Fit], tuple[Fitter, Noise]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Explanation:
+    """What was chosen, and on what grounds.
+
+    Attributes:
+        search: All that was tried, in the final weights.
+        choice: The chosen set, reasons for the others, what is minor.
+        left: What it leaves.
+        nominal_left: What the nominal simulator leaves.
+        floor: Noise around the chosen set.
+        needed: Fall of the cost that earns a name where only noise is left; infinite elsewhere.
+    """
+
+    search: Search
+    choice: Choice
+    left: Left
+    nominal_left: Left
+    floor: Noise
+    needed: float
+
+    @property
+    def key(self) -> Key:
+        """The chosen set."""
+        return self.choice.key
+
+    @property
+    def adequate(self) -> bool:
+        """Whether chance decided."""
+        return bool(np.isfinite(self.needed))
+
+
+def explain(
+    simulator: HostSimulator,
+    pool: Sequence[Candidate],
+    fitter: Fitter,
+    floor: Noise,
+    weigh: Weighing,
+    effort: Effort,
+    tell: Callable[[str], None],
+    until: float,
+    beside: Sequence[Candidate] = (),
+    earlier: Search | None = None,
+    twins: Twins | None = None,
+) -> Explanation:
+    """Search, weigh the channels by what is left, search again, until nothing changes.
+
+    Args:
+        simulator: The nominal simulator.
+        pool: What may be missing.
+        fitter: Channels weighed by what the nominal simulator leaves.
+        floor: Noise around it.
+        weigh: Weighs the channels anew.
+        effort: How hard to search.
+        tell: Progress.
+        until: When to stop searching, on the clock of ``time.process_time``.
+        beside: Free beside every set, see ``Search``.
+        earlier: A search without these; its best sets are tried, too, so that none of them loses
+            for not being asked.
+        twins: Exact twins of what may be missing, by label.
+    """
+    seeds: Proposals = {}
+    key: Key = ()
+    for _ in range(ROUNDS):
+        search = Search(simulator, pool, fitter, effort, tell, until, beside, twins, floor.sigma)
+        if len(search.currency.groups) > 1 and not simulator.has_contacts:
+            alone = noise_floor(fitter, search.nominal, floor.sigma)
+            search.currency = search.currency.only_where_wrong(alone)
+        if earlier is not None and not seeds:
+            search.add(carried(earlier, search))
+        run(search, seeds, functools.partial(_quiet, search, floor))
+        key = choose(search).key
+        fresh, floor = weigh(fitter, search.tried[key])
+        ratio = fresh.sigma / fitter.sigma
+        alike = (ratio > 1 / WORTH).all() and (ratio < WORTH).all()
+        finer = fresh.samples.substeps > fitter.samples.substeps
+        if search.late or (alike and not finer):
+            break
+        seeds = {k: search.own(k) for k in {*near_best(search), key} if k}
+        fitter = fresh
+    return settle(search, floor)
+
+
+def near_best(search: Search) -> list[Key]:
+    """The sets worth trying again, best first: those that forecast best, and that fit best."""
+    best = sorted(search.usable(), key=search.error)[:SEEDS]
+    good = [key for key in best if search.error(key) <= HOPEFUL * search.error(best[0])]
+    fit = sorted(search.usable(), key=lambda key: search.tried[key].merit)[: search.effort.beam]
+    return list(dict.fromkeys([*good, *fit]))
+
+
+def carried(earlier: Search, search: Search) -> Proposals:
+    """The best sets of an earlier search, as sets of another one's candidates."""
+    places = {candidate.effect: i for i, candidate in enumerate(search.candidates)}
+    found: Proposals = {}
+    for key in near_best(earlier):
+        effects = [earlier.candidates[i].effect for i in key]
+        if not key or not all(effect in places for effect in effects):
+            continue
+        numbers = [places[effect] for effect in effects]
+        model, theta = earlier.tried[key].model, earlier.own(key)
+        own = {n: theta[model.owner[: len(theta)] == at] for at, n in enumerate(numbers)}
+        fresh = tuple(sorted(own))
+        found[fresh] = np.concatenate([own[n] for n in fresh])
+    return found
+
+
+def settle(search: Search, floor: Noise) -> Explanation:
+    """The final choice, after everything chosen has met its rivals."""
+    fitter = search.fitter
+    nominal_left = fitter.left(search.nominal, floor)
+    needed = np.inf
+
+    def enough(key: Key) -> bool:
+        return fitter.left(search.tried[key], floor).ratio < FOOTNOTE and forecasts_well(
+            search, floor, key
+        )
+
+    choice = choose(search, enough)
+    for _ in range(EXCHANGES):
+        likeliest = min(search.usable(), key=lambda k: score(search, k))
+        best = {(), choice.key, search.best(), likeliest}
+        quiet = [k for k in best if _quiet(search, floor, k)]
+        if quiet:
+            needed = fitter.needed(search.signatures(()), search.tried[()])
+            key = significant(search, needed)
+            choice = Choice(key, reasons(search, key))
+        else:
+            needed = np.inf
+            choice = choose(search, enough)
+            key = choice.key
+        before = len(search.tried)
+        most = LEAST if search.late else max(LEAST, RIVALS // max(len(key), 1))
+        reached = search.error(search.best())
+        add_exchanged(search, key, most)
+        if not quiet and improves(search, search.best(), reached):
+            extend(search, search.best())
+        if len(search.tried) == before or search.late:
+            break
+        if not quiet and choose(search, enough).key == key:
+            break
+    left = fitter.left(search.tried[choice.key], floor)
+    return Explanation(search, choice, left, nominal_left, floor, needed)
+
+
+def forecasts_well(search: Search, floor: Noise, key: Key) -> bool:
+    """Whether forecasts err by little more than noise makes of them.
+
+    Residuals are a mean over all samples, so that a long rest hides what a short motion leaves.
+    """
+    alone = noise_floor(search.fitter, search.tried[key], floor.sigma)
+    squares = search.validated[key].squares
+    times = np.nanmean(squares, axis=0) / np.maximum(np.nanmean(alone, axis=0), 1e-300)
+    return bool((times < WELL**2).all())
+
+
+def _quiet(search: Search, floor: Noise, key: Key) -> bool:
+    return search.fitter.left(search.tried[key], floor).adequate

@@ -1,0 +1,291 @@
+"""Sets of effects that were fitted, and how well they forecast.
+
+Every set is fitted from the numbers of the set it grew from. A larger set that ends worse than one
+that it contains has not converged; it is fitted again from there, and never counts as evidence if
+that does not help.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.fitting.contract import UNCONVERGED, Fit, Fitter
+from residual.gap.fitting.plausible import absurd, nearly, surprises
+from residual.gap.fitting.screening import Signatures, signatures, trials
+from residual.gap.fitting.validation import Validated, validate
+from residual.gap.model.candidates import Candidate
+from residual.gap.model.model import Model
+from residual.gap.model.nested import absent, from_nested
+from residual.gap.preparation.effort import Effort
+from residual.gap.search.currency import Currency, groups
+from residual.gap.search.global_search import GlobalSearch
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+Key = tuple[int, ...]
+Proposals = dict[Key, Array]
+Twins = Mapping[str, Sequence[Candidate]]
+
+#: Cosine of what two effects do, start states allowed for, beyond which it is one motion.
+SAME_MOTION = 0.995
+
+
+def all_but(key: Key, number: int) -> Key:
+    """A set without one of its members."""
+    return tuple(i for i in key if i != number)
+
+
+class Search:
+    """Rival sets of effects fitted to the windows of one fitter.
+
+    Attributes:
+        candidates: What may be missing, by number; those from ``screened`` on are twins only.
+        twins: Exact twins of candidates by label, that are tried where those would be absurd.
+        beside: Candidates that are free beside every set, the empty one included, and that no set
+            is charged for: parameters within their tolerance.
+        nominal: The simulator as it was given; ``before``: its forecasts.
+        tried: Every fitted set: sorted candidate numbers -> fit; ``unfit``: not converged.
+        refused: Sets that cannot be right whatever they take off, and why.
+        nearly: Those of them that could be, as far as their numbers are known.
+        halved: Those that were fitted at half the step, too, see ``numerics.at_half_step``.
+        validated: Cross-validated forecasts of the sets; ``currency``: relative errors.
+    """
+
+    def __init__(
+        self,
+        simulator: HostSimulator,
+        candidates: Sequence[Candidate],
+        fitter: Fitter,
+        effort: Effort | None = None,
+        tell: Callable[[str], None] = lambda _: None,
+        until: float = np.inf,
+        beside: Sequence[Candidate] = (),
+        twins: Twins | None = None,
+        noise: Array | None = None,
+    ) -> None:
+        self.simulator, self.fitter = simulator, fitter
+        self.twins = twins or {}
+        self.screened = len(candidates)
+        others = {twin.effect: twin for found in self.twins.values() for twin in found}
+        known = {candidate.effect for candidate in candidates}
+        self.candidates = [*candidates, *(t for e, t in others.items() if e not in known)]
+        self.effort, self.tell, self.until = effort or Effort(), tell, until
+        self.beside = tuple(beside)
+        self.nominal = fitter.fit(Model(simulator), np.zeros(0))
+        self.before = validate(fitter, self.nominal)
+        free = sum(len(candidate.knobs) for candidate in beside)
+        base = fitter.fit(self.model(()), np.zeros(free), self.nominal) if free else self.nominal
+        self.tried: dict[Key, Fit] = {(): base}
+        self.unfit: set[Key] = set()
+        self.refused: dict[Key, str] = {}
+        self.nearly: set[Key] = set()
+        self.halved: dict[Key, Fit] = {}
+        self._globally = GlobalSearch(noise, until)
+        self._from_longer_leads: dict[Key, Array] = {}
+        self._signatures: dict[Key, Signatures] = {}
+        channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
+        self.validated: dict[Key, Validated] = {(): validate(fitter, base) if free else self.before}
+        self.currency = Currency(self.before.squares, groups(channels))
+
+    # -- what is known of a set -----------------------------------------------------------
+
+    def model(self, key: Key) -> Model:
+        """The simulator with some candidates."""
+        return Model(self.simulator, [*(self.candidates[i] for i in key), *self.beside])
+
+    def own(self, key: Key) -> Array:
+        """Fitted numbers of a set, without those that are free beside every one."""
+        return self.tried[key].theta[: self.numbers(key)]
+
+    def labels(self, key: Key) -> tuple[str, ...]:
+        """Names and places of a set."""
+        return tuple(self.candidates[i].label for i in key)
+
+    def error(self, key: Key) -> float:
+        """Cross-validated relative error."""
+        return self.currency.error(self.validated[key].squares)
+
+    def numbers(self, key: Key) -> int:
+        """Free numbers of a set."""
+        return sum(len(self.candidates[i].knobs) for i in key)
+
+    def fits_in(self, key: Key) -> bool:
+        """Whether a set has few enough numbers for the windows there are, and each effect once.
+
+        A law beside its own special case is one law too many, and so is a delay of two inputs
+        beside that of one of them.
+        """
+        few = len(key) <= self.effort.most and self.numbers(key) <= self.most_numbers
+        return few and not self.doubles(key)
+
+    def doubles(self, key: Key) -> bool:
+        """Whether a set holds an effect twice."""
+        effects = [self.candidates[i].effect for i in key]
+        return any(one.covers(other) for one in effects for other in effects)
+
+    @property
+    def most_numbers(self) -> int:
+        """How many numbers the windows are good for."""
+        return max(3, len(self.fitter.blocks.windows) // 2)
+
+    def surprises(self, key: Key) -> int:
+        """Effects of a set that are larger than their kind usually is, or end at a bound."""
+        return surprises(self.tried[key])
+
+    def usable(self) -> list[Key]:
+        """Sets that converged and may be right."""
+        return [k for k in self.validated if k not in self.unfit and k not in self.refused]
+
+    def best(self) -> Key:
+        """The set that forecasts best."""
+        return min(self.usable(), key=self.error)
+
+    def sound(self, key: Key) -> bool:
+        """Whether a fitted set converged and may be right."""
+        return key not in self.unfit and key not in self.refused
+
+    @property
+    def late(self) -> bool:
+        """Whether the time for searching is over."""
+        return time.process_time() > self.until
+
+    def signatures(self, key: Key) -> Signatures:
+        """What every candidate would add to a fitted set."""
+        if key not in self._signatures:
+            fit = self.tried[key]
+            screened = self.candidates[: self.screened]
+            columns = self.fitter.columns(fit, screened)
+            self._signatures[key] = signatures(fit, trials(screened), columns)
+        return self._signatures[key]
+
+    def from_longer_leads(self, key: Key) -> Array:
+        """Mean squared errors of blocks, forecasts begun from twice as much data, (B, m)."""
+        if key not in self._from_longer_leads:
+            fitter = self.fitter.from_longer_leads()
+            self._from_longer_leads[key] = validate(fitter, self.tried[key]).squares
+        return self._from_longer_leads[key]
+
+    def merged(
+        self, key: Key, additions: Iterable[tuple[int, Array]], drop: Key = ()
+    ) -> tuple[Key, Array]:
+        """Sorted key and start vector of a set with some candidates added and some dropped."""
+        fit = self.tried[key]
+        kept = [(place, number) for place, number in enumerate(key) if number not in drop]
+        values = {number: fit.theta[fit.model.owner == place] for place, number in kept}
+        values.update(dict(additions))
+        fresh = tuple(sorted(values))
+        return fresh, np.concatenate([values[i] for i in fresh]) if fresh else np.zeros(0)
+
+    # -- fitting --------------------------------------------------------------------------
+
+    def add(self, proposals: Proposals) -> list[Key]:
+        """Fit and validate sets that were not tried yet; returns them, and with them those in
+        which a twin stands for what would be absurd."""
+        before = len(self.tried)
+        for key, theta in proposals.items():
+            if key in self.tried:
+                continue
+            name = " + ".join(self.labels(key))
+            self.tell(f"  trying {name}")
+            self.fit(key, theta)
+            self.tell(f"  {name}: {100 * self.error(key):.3g} % of the error")
+        return list(self.tried)[before:]
+
+    def fit(self, key: Key, theta: Array) -> None:
+        """Fit a set from start values, and from its nested sets if it ends worse than one.
+
+        If it was fitted before, the better fit stays.
+
+        Args:
+            key: The set.
+            theta: Start values of its own numbers.
+        """
+        nested = [k for k in self.tried if len(k) < len(key) and set(k) < set(key)]
+        near = min(nested, key=lambda k: self.tried[k].merit, default=())
+        theta = np.append(theta, self.tried[near].theta[self.numbers(near) :])
+        found = self.fitter.fit(self.model(key), theta, self.tried[near])
+        if nested:
+            floor = self.tried[near].merit
+            # What strikes the ground is fitted from nothing as long as nothing is there.
+            if found.merit > floor and (near or not self.simulator.has_contacts):
+                inner = self.tried[near]
+                start = from_nested(self.model(key), key, theta, inner.model, near, inner.theta)
+                again = self.fitter.fit(self.model(key), start, self.tried[near])
+                found = again if again.merit < found.merit else found
+            found = self._globally.better(self.fitter, found, self.numbers(key), theta)
+        if key in self.tried and found.merit >= self.tried[key].merit:
+            return
+        self._forget(key)
+        if nested and found.merit > UNCONVERGED * self.tried[near].merit:
+            self.unfit.add(key)
+        self.tried[key] = found
+        self.validated[key] = validate(self.fitter, found)
+        number, reason = absurd(found.model, found.theta, self.fitter.samples)
+        if reason:
+            self.refused[key] = reason
+            if nearly(found, number, self.fitter):
+                self.nearly.add(key)
+            if number < len(key):
+                self._with_twins(key, key[number])
+        for gone in absent(found.model, key, found.theta):
+            smaller, start = self.merged(key, (), drop=(gone,))
+            if smaller:  # the same motion with fewer numbers
+                self.fit(smaller, start)
+
+    def _forget(self, key: Key) -> None:
+        """Forget what was worked out from an earlier fit of a set."""
+        self.unfit.discard(key)
+        self.refused.pop(key, None)
+        self.nearly.discard(key)
+        self.halved.pop(key, None)
+        self._from_longer_leads.pop(key, None)
+        self._signatures.pop(key, None)
+
+    def _with_twins(self, key: Key, gone: int) -> None:
+        """Fit a set with each exact twin of a member in its place."""
+        known = [candidate.effect for candidate in self.candidates]
+        for twin in self.twins_of(gone):
+            start = 0.01 * twin.trials[0].values[0]
+            fresh, theta = self.merged(key, [(known.index(twin.effect), start)], drop=(gone,))
+            self.add({fresh: theta})
+
+    def twins_of(self, number: int) -> list[Candidate]:
+        """Candidates that move exactly as one does."""
+        return list(self.twins.get(self.candidates[number].label, ()))
+
+    def _stands_for(self, number: int) -> int:
+        """The screened candidate that moves exactly as a twin does; itself if it is one."""
+        effect = self.candidates[number].effect
+        alike = (
+            i for i in range(self.screened) if effect in [twin.effect for twin in self.twins_of(i)]
+        )
+        return number if number < self.screened else next(alike, number)
+
+    def contains(self, one: int, other: int) -> bool:
+        """Whether an effect is a special case of another at the same place."""
+        return self.candidates[one].effect.contains(self.candidates[other].effect)
+
+    def family(self, number: int) -> str:
+        """What effects that differ in form more than in kind have in common, and where."""
+        effect = self.candidates[number].effect
+        family = effect.family_in(self.simulator)
+        return f"{family}@{self.place(number)}" if family else ""
+
+    def same_motion(self, rest: Key, one: int, other: int) -> bool:
+        """Whether two effects make the same motion in these data beside some others."""
+        around = self.signatures(rest)
+        columns = {v.candidate: v.columns for v in around.variants}
+        pair = [columns.get(self._stands_for(number), ()) for number in (one, other)]
+        if any(len(places) != 1 for places in pair):
+            return False
+        a, b = (around.matrix[:, places[0]] for places in pair)
+        lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
+        return lengths > 0 and abs(float(a @ b)) > SAME_MOTION * lengths
+
+    def place(self, number: int) -> str:
+        """The joint, actuator, channel or parameter of a candidate."""
+        return self.candidates[number].effect.where

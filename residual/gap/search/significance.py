@@ -1,0 +1,87 @@
+"""Names for data that a set of effects explains down to the noise.
+
+Only there does significance name anything. While a remainder is left, every trifle is significant,
+and ``residual.gap.search.choice`` decides by shares of the error instead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from residual.gap.search.exchange import add_without_each
+from residual.gap.search.known import departures
+from residual.gap.search.sets import Key, Search, all_but
+
+#: Difference of costs that says nothing.
+NO_DIFFERENCE = 1.0
+#: Forecast error with an effect over that without, below which it forecasts better.
+BETTER = 0.95
+
+
+def size(search: Search) -> int:
+    """Number of residuals."""
+    samples, windows = search.fitter.samples, search.fitter.blocks.windows
+    rows = windows.index[windows.inside]
+    return int(np.isfinite(samples.seen[rows][:, samples.measured]).sum())
+
+
+def score(search: Search, key: Key) -> float:
+    """Cost and a price for each number (the Bayesian information criterion); lower is better."""
+    return search.tried[key].merit + np.log(size(search)) * search.numbers(key)
+
+
+def significant(search: Search, needed: float) -> Key:
+    """The set of least score, of which every effect lowers the cost by what chance does not.
+
+    Costs of what strikes the ground hang on luck in finding start states, so there the best
+    forecasts decide among such sets that fit as well.
+
+    Args:
+        search: Fitted sets, residuals in units of the noise.
+        needed: See ``threshold``.
+    """
+    key = pruned(search, min(search.usable(), key=lambda k: score(search, k)), needed)
+    if not key:
+        return key
+    if not search.simulator.has_contacts:
+        return least_otherwise(search, key)
+    most = score(search, key) + search.fitter.tie(search.tried[()])
+    alike = [k for k in search.usable() if score(search, k) <= most]
+    other = min((k for k in alike if search.numbers(k) <= search.numbers(key)), key=search.error)
+    return other if pruned(search, other, needed) == other else key
+
+
+def least_otherwise(search: Search, key: Key) -> Key:
+    """Of sets that no data tell from one, as where effects move alike in an exact proportion, the
+    one with the least to be otherwise than was known."""
+    merit, numbers = search.tried[key].merit, search.numbers(key)
+    alike = [
+        k
+        for k in search.usable()
+        if search.numbers(k) == numbers and search.tried[k].merit <= merit + NO_DIFFERENCE
+    ]
+    return min([key, *alike], key=lambda k: departures(search, k))
+
+
+def pruned(search: Search, key: Key, needed: float) -> Key:
+    """What is left of a set when all has gone that chance could do."""
+    while key:
+        add_without_each(search, key)
+        smaller = [all_but(key, gone) for gone in key]
+        falls = {
+            k: search.tried[k].merit - search.tried[key].merit
+            - np.log(size(search)) * (search.numbers(key) - search.numbers(k) - 1)
+            for k in smaller if k in search.tried
+        }  # fmt: skip
+        if search.simulator.has_contacts:
+            # Luck foretells nothing.
+            falls = {
+                k: fall if search.error(key) < BETTER * search.error(k) else -np.inf
+                for k, fall in falls.items()
+            }
+        weakest = min(falls, key=lambda k: falls[k])
+        if falls[weakest] > needed:
+            break
+        key = min([weakest, *(k for k in search.usable() if len(k) < len(key))],
+                  key=lambda k: score(search, k))  # fmt: skip
+    return key

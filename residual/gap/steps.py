@@ -1,0 +1,271 @@
+"""The steps of the pipeline that find.py takes in a row: look, settle, search, confirm."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from residual.gap.answer.answer import Answer, confirm
+from residual.gap.answer.free_parameters import better, worth_freeing
+from residual.gap.answer.lone import Stretch, explains_the_rest, lone_stretch
+from residual.gap.confirmation.aliases import aliases, representatives
+from residual.gap.confirmation.certainty import CLEARLY
+from residual.gap.confirmation.numerics import fits_better, forecast_error
+from residual.gap.confirmation.twins import exact_twins, with_twins
+from residual.gap.data.examine import examine
+from residual.gap.data.excerpt import excerpt
+from residual.gap.fitting.smooth import LEAD
+from residual.gap.model.candidates import Candidate, candidates
+from residual.gap.preparation.horizon import usual_horizon
+from residual.gap.preparation.numerics import held_otherwise, how_held, stride_for
+from residual.gap.preparation.prepare import Prepared, prepare
+from residual.gap.preparation.suited import beyond_noise, horizon_of_windows, needs_closer_rows
+from residual.gap.search.explain import Explanation, explain
+from residual.gap.search.sets import Search
+from residual.trajectories import Trajectory
+from sims.effects.base import Effect
+from sims.host import HostSimulator
+from sims.loading import LIBRARY, chosen_effects
+
+#: Part of the time budget after which nothing new is tried.
+SEARCHING = 0.7
+
+
+class Clock:
+    """Processor time that is left, and seconds by step."""
+
+    def __init__(self, minutes: float) -> None:
+        begin = time.process_time()
+        self.search_until = begin + 60 * minutes * SEARCHING
+        self.over = begin + 60 * minutes
+        self.confirm_until = begin + 120 * minutes
+        self.laps: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, step: str) -> None:
+        """End of a step."""
+        now = time.perf_counter()
+        self.laps[step] = now - self._last
+        self._last = now
+
+
+@dataclasses.dataclass(frozen=True)
+class Log:
+    """What was recorded, looked at.
+
+    Attributes:
+        simulator: The nominal one, for the motion that the log shows.
+        recorded: All runs, without what is faulty in them.
+        runs: Of those the stretches that are searched.
+        horizon: Length of forecasts in s.
+        findings: What was found about the data, in words.
+        left_out: What of the data is not searched, in words.
+    """
+
+    simulator: HostSimulator
+    recorded: Sequence[Trajectory]
+    runs: Sequence[Trajectory]
+    horizon: float
+    findings: list[str]
+    left_out: list[str]
+
+    def at(self, horizon: float) -> Log:
+        """The same for forecasts of another length, which want other rows."""
+        runs, left_out = excerpt(self.recorded, stride_for(self.recorded, horizon))
+        return dataclasses.replace(self, runs=runs, horizon=horizon, left_out=left_out)
+
+
+def look(
+    simulator: HostSimulator,
+    trajectories: Sequence[Trajectory],
+    held: Sequence[Trajectory],
+    horizon: float | None,
+    tell: Callable[[str], None],
+) -> Log:
+    """Find faults of the data, and how far forecasts go if the user does not say."""
+    examined = examine(simulator, trajectories)
+    simulator = simulator.for_motion([run.states for run in [*examined.trajectories, *held]])
+    findings = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
+    horizon = horizon or usual_horizon(simulator, examined.trajectories)
+    every = examined.trajectories
+    log = Log(simulator, every, every, horizon, findings, []).at(horizon)
+    for says in [*findings, *log.left_out]:
+        tell(says)
+    return log
+
+
+def settle(
+    simulator: HostSimulator, log: Log, by_user: bool, tell: Callable[[str], None]
+) -> tuple[Log, Prepared]:
+    """Windows, weights and numerics, from the nominal simulator alone.
+
+    Args:
+        simulator: The nominal one, with its inputs held as they shall be.
+        log: What was recorded.
+        by_user: Whether the user chose the horizon, so that it stays.
+        tell: Progress.
+    """
+    tell("fitting the nominal simulator")
+    prepared = prepare(simulator, log.runs, log.horizon)
+    if not by_user and not simulator.has_contacts:
+        if needs_closer_rows(log.runs, prepared):
+            log = log.at(horizon_of_windows(prepared))
+            tell(f"windows end early, where motion is unstable: rows for {log.horizon:.3g} s")
+            prepared = prepare(simulator, log.runs, log.horizon)
+        prepared = beyond_noise(simulator, log.runs, prepared)
+        log = dataclasses.replace(log, horizon=prepared.horizon)
+    return log, prepared
+
+
+@dataclasses.dataclass(frozen=True)
+class Offered:
+    """Effects that may be missing.
+
+    Attributes:
+        by_label: All of them.
+        kept: One of each group that no motion tells apart.
+        groups: Those groups by label.
+        sets: Sets of which one is exactly made of the others.
+    """
+
+    by_label: Mapping[str, Effect]
+    kept: Sequence[Effect]
+    groups: dict[str, tuple[str, ...]]
+    sets: Sequence[tuple[str, ...]]
+
+    @classmethod
+    def of(
+        cls,
+        log: Log,
+        effects: Iterable[Effect | str | Mapping[str, Any]] | None,
+        measured_input: bool,
+    ) -> Offered:
+        """Those that a user asks for, or the library, less what a measured input cannot show."""
+        offered = chosen_effects(log.simulator, [LIBRARY] if effects is None else list(effects))
+        if measured_input:
+            offered = tuple(effect for effect in offered if not effect.upstream_of_sensor)
+        groups, sets = aliases(log.simulator, offered, log.runs)
+        kept = representatives(log.simulator, offered, groups)
+        return cls({str(effect): effect for effect in offered}, kept, groups, sets)
+
+
+@dataclasses.dataclass(frozen=True)
+class Inquiry:
+    """Search and confirmation of offered effects, on a clock.
+
+    Attributes:
+        offered: What may be missing.
+        clock: The time that is left.
+        tell: Progress.
+    """
+
+    offered: Offered
+    clock: Clock
+    tell: Callable[[str], None]
+
+    def explained(
+        self,
+        simulator: HostSimulator,
+        ready: Prepared,
+        beside: Sequence[Candidate] = (),
+        earlier: Search | None = None,
+    ) -> Explanation:
+        """The effects that explain a log, see ``explain``."""
+        free = {candidate.label for candidate in beside}
+        pool = ready.pool(candidates(simulator, self.offered.kept, ready.fitter.samples))
+        pool = [candidate for candidate in pool if candidate.label not in free]
+        others = {label: e for label, e in self.offered.by_label.items() if label not in free}
+        twins = exact_twins(simulator, ready.fitter.samples, self.offered.groups, others)
+        lead = 0.0 if simulator.has_contacts else ready.horizon * LEAD / (1 - LEAD)
+        begun = f" begun from {lead:.3g} s before" if lead else ""
+        ahead = f"forecasts over {ready.horizon:.3g} s{begun}"
+        blocks = len(ready.fitter.blocks)
+        self.tell(f"{blocks} blocks of data, {ahead}, {len(pool)} candidate effects")
+        self.tell("screening them")
+        return explain(
+            simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, self.tell,
+            self.clock.search_until, beside, earlier, twins,
+        )  # fmt: skip
+
+    def other_hold(
+        self, log: Log, prepared: Prepared, found: Explanation
+    ) -> tuple[Prepared, Explanation, list[str]]:
+        """Once more with inputs held the other way, if what was found fits better so.
+
+        Returns:
+            What was prepared and found, with the hold that forecasts clearly better, and what is
+            to be said of it.
+        """
+        other = held_otherwise(found.search.simulator)
+        if other is None or not fits_better(found.search, found.key, other):
+            return prepared, found, []
+        self.tell("inputs held the other way fit better: once more so")
+        ready = prepare(other, log.runs, log.horizon)
+        again = self.explained(other, ready)
+        errors = [forecast_error(one.search, one.key) for one in (again, found)]
+        if CLEARLY**2 * errors[0] < errors[1]:
+            says = (
+                f"inputs were taken to {how_held(other)}: the data fit better so; set hold to say "
+                "otherwise"
+            )
+            return ready, again, [says]
+        if not again.search.late:
+            return prepared, found, []
+        says = (
+            f"the data fit better with inputs taken to {how_held(other)}, but there was no time to "
+            "search so: set hold to say which it is, or give more --minutes"
+        )
+        return prepared, found, [says]
+
+    def confirmed(
+        self, log: Log, prepared: Prepared, found: Explanation, matters: bool, tolerance: float
+    ) -> tuple[Prepared, Answer, list[str]]:
+        """How sure what was found is, also with parameters free within their tolerance.
+
+        Args:
+            log: What was recorded.
+            prepared: With the windows that were searched.
+            found: What was chosen.
+            matters: False if the gap does not, so that nothing is named.
+            tolerance: How well the simulator's parameters are known, as a share of each.
+
+        Returns:
+            The windows that the answer is of, the answer, and what is to be said of it.
+        """
+        groups, until = self.offered.groups, self.clock.confirm_until
+        answer = confirm(found, groups, matters, tolerance, until)
+        says = []
+        stretch = lone_stretch(answer) if matters else None
+        if stretch is not None:
+            elsewhere = self.elsewhere(stretch, log, found, tolerance)
+            says.append(stretch.says(left_out=elsewhere is not None))
+            prepared, answer = elsewhere or (prepared, answer)
+        beside = worth_freeing(answer, tolerance) if matters else []
+        if beside and time.process_time() > self.clock.over:
+            says.append(
+                "parameters within their tolerance may hide what is missing, or explain some of "
+                "what is left: there was no time to look, give more --minutes"
+            )
+        elif beside:
+            self.tell("once more with parameters free within their tolerance")
+            search = answer.found.search
+            again = self.explained(search.simulator, prepared, beside, search)
+            second = confirm(again, groups, matters, tolerance, until)
+            answer = second if better(second, answer) else answer
+        claims = with_twins(answer.found.search, answer.key, answer.claims)
+        return prepared, dataclasses.replace(answer, claims=claims), says
+
+    def elsewhere(
+        self, stretch: Stretch, log: Log, found: Explanation, tolerance: float
+    ) -> tuple[Prepared, Answer] | None:
+        """Windows and answer without a stretch of the log, if something is named so, in time."""
+        if time.process_time() > self.clock.search_until:
+            return None
+        self.tell("once more without a stretch that nothing explains")
+        simulator = found.search.simulator
+        ready = prepare(simulator, stretch.cut_from(log.runs), log.horizon)
+        again = self.explained(simulator, ready)
+        answer = confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
+        return (ready, answer) if explains_the_rest(answer) else None

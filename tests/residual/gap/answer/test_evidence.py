@@ -1,0 +1,55 @@
+"""What is left of a set when a member that cannot be named has gone."""
+
+from types import SimpleNamespace
+
+from toy import Toy
+
+from residual.gap.answer import answer
+from residual.gap.answer.evidence import evidence
+
+
+def test_what_cannot_be_right_without_the_others_goes_too(monkeypatch):
+    """A gain that switches its input off where nothing else of the set makes up for that."""
+
+    def claims(search, key, *_):
+        return [SimpleNamespace(number=number, needed=True) for number in key]
+
+    monkeypatch.setattr(answer, "claims", claims)
+    monkeypatch.setattr(answer, "nameable", lambda search, claim, *_: claim.number != 2)
+    monkeypatch.setattr(answer, "allow_for_parameters", lambda search, key, made, *_: made)
+    monkeypatch.setattr(answer, "other_numerics", lambda *_: [])
+    monkeypatch.setattr(answer, "in_plain_form", lambda *_: None)
+    monkeypatch.setattr(answer, "may_vanish", lambda *_: False)
+    monkeypatch.setattr(answer, "add_exchanged", lambda *_: None)
+    fit = SimpleNamespace(merit=1.0)
+    search = SimpleNamespace(
+        tried=dict.fromkeys([(), (0,), (0, 1), (0, 1, 2)], fit),
+        refused={(0, 1): "outdoor would have 0.05 of its strength"},
+        candidates=[SimpleNamespace(label=name) for name in ("load", "gain", "loss")],
+        fitter=SimpleNamespace(blocks=range(8), tie=lambda nominal: 0.0),
+        merged=lambda key, _, drop: (tuple(k for k in key if k not in drop), None),
+        add=lambda fits: None,
+    )
+    found = SimpleNamespace(search=search, key=(0, 1, 2), adequate=False)
+    left = answer.confirm(found, {})
+    assert left.key == (0,)
+    assert left.leads == ("gain", "loss")
+
+
+def test_what_takes_most_of_the_gap_is_not_minor():
+    """It was one of many that a chosen effect could not be told from, and went with that."""
+    toy = Toy({(1,): 0.95, (3,): 0.9, (4,): 0.3})
+    found = SimpleNamespace(search=toy, choice=SimpleNamespace(minor=(1, 4)))
+    toy.sound = lambda key: True
+    assert list(answer.minor(SimpleNamespace(found=found, key=()))) == [1]
+
+
+def test_reasons_are_those_of_the_set_that_is_left():
+    toy = Toy({(0,): 0.6, (0, 3): 0.4, (0, 1): 0.57, (0, 1, 4): 0.5})
+    toy.labels = lambda key: tuple("abcde"[n] for n in key)
+    found = SimpleNamespace(search=toy, key=(0, 3), choice=SimpleNamespace(reasons={}))
+    told = {one.effects: one.reason for one in evidence(found, (0,), ("d",))}
+    assert told["a", "d"] == "holds effects that these data do not establish"
+    assert told["a", "b"] == "takes only 5 % off what remains"
+    assert told["a", "b", "e"] == "takes only 17 % off what remains with 2 effects more"
+    assert told["a",] == ""

@@ -1,0 +1,150 @@
+"""What is said about the data before any physics, and which logs are refused."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from swing import changed, kinds, noisy
+
+from residual.gap import find_gap
+from residual.gap.data.examine import examine, findings
+from residual.gap.data.kinematics import kinematics
+from residual.trajectories import Trajectory
+from sims.leo import Leo
+from sims.pendulum_equation import PendulumEquation
+from studies.hidden.data import Truth, make_logs
+
+
+def swings(factor):
+    times = np.linspace(0, 5, 501)
+    angle = np.pi + 0.3 * np.sin(4 * times)
+    states = np.stack([angle, 1.2 * np.cos(4 * times) * factor], axis=1)
+    return [Trajectory("run", times, states, np.zeros((500, 1)))]
+
+
+def test_a_rate_on_another_scale_is_put_right_and_told():
+    runs, found = kinematics(PendulumEquation(), swings(1 / 1.05))
+    assert len(found) == 1
+    assert "1.05" in found[0].says
+    np.testing.assert_allclose(runs[0].states, swings(1.0)[0].states, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize("excitation", ["strong", "weak", "policy"])
+def test_coarse_sampling_is_no_reason_to_blame_the_sensor(excitation):
+    logs = make_logs(Truth(), 3, excitation, "A", 5)
+    runs, found = kinematics(PendulumEquation(), logs)
+    assert found == []
+    assert runs == logs
+
+
+def test_noise_in_the_rate_is_not_taken_for_a_smaller_scale():
+    # A wide dead zone leaves little motion, so most of the measured rate is noise.
+    logs = make_logs(Truth(dead_zone=0.58), 4, "weak", "A", 15)
+    assert kinematics(PendulumEquation(), logs) == (logs, [])
+
+
+def test_times_in_ms_are_refused():
+    (run,) = swings(1.0)
+    examine(PendulumEquation(), [run])
+    slow = dataclasses.replace(run, times=1000 * run.times)
+    with pytest.raises(ValueError, match=r"run: a sample every 10 s, .*unit: ms"):
+        examine(PendulumEquation(), [slow])
+
+
+def test_a_walk_without_one_encoder_is_refused():
+    states = np.full((20, 18), np.nan)
+    states[:, :9] = np.linspace(0, 0.1, 20)[:, None]
+    walk = Trajectory("walk", 0.03 * np.arange(20), states, np.zeros((19, 6)))
+    assert not any(one.kind == "unmeasured" for one in findings(Leo(), [walk]))
+    states[:, 5] = np.nan
+    with pytest.raises(ValueError, match=r"walk: .*'left_knee' was not logged"):
+        examine(Leo(), [walk])
+
+
+def test_no_log_is_refused():
+    with pytest.raises(ValueError, match="there are no trajectories"):
+        find_gap(PendulumEquation(), [])
+
+
+def test_a_clean_log_has_no_findings():
+    for seed in range(5):
+        assert kinds(noisy(seed)) == set()
+
+
+@pytest.mark.parametrize("truth", [Truth(), Truth(coulomb_friction=1e-3), Truth(dead_zone=1.0)])
+@pytest.mark.parametrize("excitation", ["strong", "weak", "policy"])
+def test_logs_of_known_truth_have_no_findings(truth, excitation):
+    for noise in ("A", "C"):
+        assert findings(PendulumEquation(), make_logs(truth, 1, excitation, noise, 2, 100)) == []
+
+
+def test_an_input_beyond_its_bounds_is_told_and_one_in_mV_refused():
+    run = noisy()
+    volts = np.array(run.actions)
+    volts[100:104] = 3.6
+    beyond = dataclasses.replace(run, actions=volts)
+    (found,) = findings(PendulumEquation(), [beyond])
+    assert (found.kind, found.severity, len(found.rows)) == ("bounds", "warning", 4)
+    np.testing.assert_array_equal(
+        examine(PendulumEquation(), [beyond]).trajectories[0].actions, volts
+    )
+    with pytest.raises(ValueError, match=r"voltage: reaches .* V, beyond .*mV"):
+        examine(PendulumEquation(), [dataclasses.replace(run, actions=1000 * run.actions)])
+
+
+def test_a_channel_that_never_changes_is_taken_as_not_measured():
+    bad = changed(noisy(), 1, slice(None), 0.0)
+    done = examine(PendulumEquation(), [bad])
+    assert [(one.kind, one.where) for one in done.findings] == [("still", "rate")]
+    assert np.isnan(done.trajectories[0].states[:, 1]).all()
+
+
+def test_a_log_in_which_nothing_moves_is_refused():
+    bad = changed(changed(noisy(), 1, slice(None), 0.0), 0, slice(None), 3.0)
+    with pytest.raises(ValueError, match="ever changes"):
+        examine(PendulumEquation(), [bad])
+
+
+def test_a_second_between_samples_is_told():
+    slow = dataclasses.replace(noisy(), times=1.0 * np.arange(400))
+    (found,) = [one for one in findings(PendulumEquation(), [slow]) if one.kind == "sampling"]
+    assert found.severity == "warning"
+    assert "20 control periods" in found.says
+
+
+@given(step=st.floats(0.01, 0.2))
+@settings(max_examples=20, deadline=None)
+def test_rounded_columns_are_told_with_their_step(step):
+    run = noisy(dt=0.01)
+    bad = changed(run, 0, slice(None), step * np.round(run.states[:, 0] / step))
+    (found,) = [one for one in findings(PendulumEquation(), [bad]) if one.kind == "rounded"]
+    assert found.numbers["step"] == pytest.approx(step, rel=1e-6)
+
+
+@pytest.mark.parametrize("rule", ["before", "after", "mean"])
+def test_a_sum_of_the_rate_is_no_measurement_of_the_angle(rule):
+    run = noisy()
+    rate, steps = run.states[:, 1], np.diff(run.times)
+    used = {"before": rate[:-1], "after": rate[1:], "mean": 0.5 * (rate[1:] + rate[:-1])}[rule]
+    summed = np.pi + np.concatenate([[0.0], np.cumsum(steps * used)])
+    assert ("integral", "angle") in kinds(changed(run, 0, slice(None), summed))
+
+    class Declared(PendulumEquation):
+        state_channels = tuple(
+            dataclasses.replace(c, integrates="rate") if c.name == "angle" else c
+            for c in PendulumEquation.state_channels
+        )
+
+    declared = changed(run, 0, slice(None), summed)
+    assert ("integral", "angle") not in kinds(declared, Declared())
+
+
+def test_a_simulator_that_breaks_down_on_a_recorded_state_is_refused_with_its_time():
+    class Broken(PendulumEquation):
+        def acceleration(self, q, v, u, force, p):
+            return super().acceleration(q, v, u, force, p) / np.where(q > 4.0, 0.0, 1.0)
+
+    with pytest.raises(ValueError, match=r"run: .* returns (nan|-?inf) for .* at [\d.]+ s"):
+        examine(Broken(), [noisy()])

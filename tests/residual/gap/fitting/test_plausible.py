@@ -1,0 +1,100 @@
+"""Numbers that switch a system off are refused, whatever error they take away."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from residual.gap.data.samples import Samples
+from residual.gap.fitting import plausible
+from residual.gap.fitting.plausible import absurd, nearly, surprises
+from residual.gap.model.candidates import candidates
+from residual.gap.model.model import Model
+from residual.trajectories import Trajectory
+from sims.effects import (
+    ActuatorGain,
+    DeadZone,
+    LinearSpring,
+    ParameterChange,
+    Saturation,
+    ViscousFriction,
+)
+from sims.pendulum_equation import PendulumEquation
+
+
+def built(effect, **values):
+    """A model with one effect, its numbers, and what was measured."""
+    rng = np.random.default_rng(0)
+    volts = np.repeat(rng.uniform(-2, 2, (40, 1)), 5, axis=0)
+    states = np.array([np.pi, 0.0]) + rng.standard_normal((201, 2))
+    samples = Samples.join([Trajectory("run", 0.05 * np.arange(201.0), states, volts)], 4)
+    model = Model(PendulumEquation(), candidates(PendulumEquation(), [effect], samples))
+    return model, np.array([values[knob.field] for knob in model.knobs]), samples
+
+
+def said(effect, **values):
+    return absurd(*built(effect, **values))[1]
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "words"),
+    [
+        (ActuatorGain("voltage"), {"gain": -0.99}, "voltage would have 0.01 of its strength"),
+        (ActuatorGain("voltage"), {"gain": 30.0}, "voltage would have 31 of its strength"),
+        (DeadZone("voltage"), {"width": 1.95}, "of its strength"),
+        (Saturation("voltage"), {"level": 0.05}, "of its strength"),
+        (ParameterChange("mass"), {"change": 0.6}, "mass would be 11.9 times its nominal value"),
+        (ParameterChange("inertia"), {"change": -1.8e-4}, "inertia would be 0.0576 times"),
+    ],
+)
+def test_what_switches_the_system_off_is_refused(effect, values, words):
+    assert words in said(effect, **values)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        (ActuatorGain("voltage"), {"gain": -0.7}),
+        (DeadZone("voltage"), {"width": 0.8}),
+        (ParameterChange("mass"), {"change": 0.1}),
+        (ViscousFriction("pivot"), {"coefficient": 1.0}),
+    ],
+)
+def test_what_may_be_is_left_to_the_data(effect, values):
+    assert said(effect, **values) == ""
+
+
+@pytest.mark.parametrize(("deviation", "may_be"), [(0.1, True), (0.01, False)])
+def test_an_absurd_number_that_is_badly_known_may_be_a_believable_one(
+    monkeypatch, deviation, may_be
+):
+    model, theta, samples = built(ParameterChange("mass"), change=0.6)
+    monkeypatch.setattr(plausible, "deviations", lambda fit, blocks: np.array([deviation]))
+    fitter = SimpleNamespace(blocks=None, samples=samples)
+    assert nearly(SimpleNamespace(model=model, theta=theta), 0, fitter) is may_be
+
+
+def test_a_limit_that_the_input_reaches_once_is_refused():
+    rng = np.random.default_rng(0)
+    times = 0.05 * np.arange(201.0)
+    states = np.array([np.pi, 0.0]) + rng.standard_normal((201, 2))
+    for bumps, refused in ((1, True), (2, False)):
+        volts = rng.uniform(-1, 1, (200, 1))
+        for k in range(bumps):
+            volts[30 + 80 * k : 60 + 80 * k] = 3.0
+        samples = Samples.join([Trajectory("run", times, states, volts)], 4)
+        model = Model(
+            PendulumEquation(), candidates(PendulumEquation(), [Saturation("voltage")], samples)
+        )
+        number, why = absurd(model, np.array([2.0]), samples)
+        assert ("only once" in why) is refused
+        assert number == (0 if refused else 1)
+
+
+def test_what_ends_at_a_bound_surprises():
+    """It is no optimum: the bound has stopped it."""
+    model, theta, _ = built(LinearSpring("pivot"), stiffness=0.1, rest=0.2)
+    rest = [knob.field for knob in model.knobs].index("rest")
+    assert surprises(SimpleNamespace(model=model, theta=theta)) == 0
+    theta[rest] = model.knobs[rest].low
+    assert surprises(SimpleNamespace(model=model, theta=theta)) == 1

@@ -1,0 +1,131 @@
+"""Logs that count signs, zeros and units otherwise than the simulator."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from residual.gap.preparation.conventions import otherwise
+from residual.gap.preparation.prepare import prepare
+from residual.trajectories import Trajectory
+from sims.effects import ActuatorGain, CoulombFriction, LinearSpring
+from sims.equations import EquationOfMotion, FirstOrderSystem
+from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel, Parameter
+
+LARGE = [
+    (), (CoulombFriction("pivot", 0.01),), (LinearSpring("pivot", 0.01, np.pi),),
+    (ActuatorGain("voltage", 1.0),), (ActuatorGain("voltage", -0.8),),
+]  # fmt: skip
+
+
+def log(effects=(), seed=0, dt=0.02):
+    """A pendulum swinging about its lowest point, driven either way."""
+    rng = np.random.default_rng(seed)
+    simulator = PendulumEquation(dt=dt)
+    volts = np.repeat(rng.uniform(-2.0, 2.0, (1, 40, 1)), 20, axis=1)
+    states = simulator.with_effects(list(effects)).rollout(np.array([[np.pi + 0.3, 0.0]]), volts)[0]
+    states += np.array([0.003, 0.03]) * rng.standard_normal(states.shape)
+    return Trajectory("run", dt * np.arange(len(states)), states, volts[0])
+
+
+def changes(run):
+    simulator = PendulumEquation(dt=0.02)
+    found = otherwise(simulator, prepare(simulator, [run], 0.5).fitter)
+    return () if found is None else found.changes
+
+
+@pytest.mark.parametrize("effects", LARGE)
+def test_a_large_gap_is_no_matter_of_convention(effects):
+    assert not changes(log(effects))
+
+
+@pytest.mark.parametrize("effects", [(), (CoulombFriction("pivot", 0.003),)])
+def test_a_reversed_input_is_told(effects):
+    run = log(effects)
+    told = changes(dataclasses.replace(run, actions=-run.actions))
+    assert "`scale: -1` for voltage" in told
+
+
+@pytest.mark.parametrize(("offset", "wanted"), [
+    (np.pi, "3.14159"), (-np.pi / 2, "1.5708"), (np.pi / 2, "-1.5708"),
+])  # fmt: skip
+def test_an_angle_counted_from_elsewhere_is_told(offset, wanted):
+    run = log()
+    (says,) = changes(dataclasses.replace(run, states=run.states + np.array([offset, 0.0])))
+    assert f"`offset: {wanted}` for angle" in says
+
+
+def test_a_joint_that_counts_the_other_way_round_is_told():
+    """Only the gravity of a sideways zero tells it from a reversed input."""
+    run = log()
+    turned = dataclasses.replace(run, states=np.array([-1.0, -1.0]) * run.states)
+    assert "`scale: -1` for angle and rate" in changes(turned)
+
+
+@pytest.mark.parametrize(("factors", "volts", "wanted"), [
+    ((180 / np.pi, 180 / np.pi), 1.0, "`unit: deg` for angle and `unit: deg/s` for rate"),
+    ((1.0, 1.0), 1000.0, "`unit: mV` for voltage"),
+])  # fmt: skip
+def test_another_unit_is_told(factors, volts, wanted):
+    run = log((CoulombFriction("pivot", 0.003),))
+    (says,) = changes(
+        dataclasses.replace(run, states=np.array(factors) * run.states, actions=volts * run.actions)
+    )
+    assert wanted in says
+
+
+class Room(FirstOrderSystem):
+    """A room warmed by a heater, losing heat to the cold outside."""
+
+    dt = 10.0
+    state_channels = (Channel("room", "K", "other", scale=10.0),)
+    action_channels = (Channel("heater", "W", "input", scale=1000.0, low=0.0, high=3000.0),)
+    parameters: ClassVar = {
+        "capacity": Parameter(5e4, "J/K", "heat that warms the room by 1 K"),
+        "loss": Parameter(40.0, "W/K", "loss to the outside"),
+        "outside": Parameter(270.0, "K", "temperature outside"),
+    }
+
+    def derivative(self, x, u, p):
+        return (u - p.loss * (x - p.outside)) / p.capacity
+
+
+def test_degrees_celsius_are_no_kelvin():
+    rng = np.random.default_rng(0)
+    watts = np.repeat(rng.uniform(0.0, 3000.0, (1, 20, 1)), 30, axis=1)
+    simulator = Room()
+    warm = simulator.rollout(np.array([[293.0]]), watts)[0]
+    warm += 0.1 * rng.standard_normal(warm.shape)
+    for zero, wanted in ((0.0, None), (273.15, ("`unit: degC` for room",))):
+        run = Trajectory("room", 10.0 * np.arange(len(warm)), warm - zero, watts[0])
+        found = otherwise(simulator, prepare(simulator, [run], 300.0).fitter)
+        assert (found and found.changes) == wanted
+
+
+class Lift(EquationOfMotion):
+    """A height by an accelerometer."""
+
+    dt = 0.1
+    state_channels = (
+        Channel("height", "m", "position", scale=100.0),
+        Channel("climb", "m/s", "rate", rate_of="height", scale=10.0),
+    )
+    action_channels = (Channel("accelerometer", "m/s2", "input", scale=1.0),)
+
+    def acceleration(self, q, v, u, force, p):
+        return u + force
+
+
+def test_a_unit_that_only_makes_an_input_vanish_is_none():
+    """An accelerometer's bias throws forecasts far off, and to go straight on is better."""
+    rng = np.random.default_rng(0)
+    felt = np.repeat(0.05 * rng.standard_normal((1, 40, 1)), 20, axis=1)
+    simulator = Lift()
+    states = simulator.rollout(np.array([[1000.0, 10.0]]), felt)[0]
+    states += np.array([0.5, np.nan]) * rng.standard_normal(states.shape)
+    run = Trajectory("lift", 0.1 * np.arange(len(states)), states, felt[0] + 1.5)
+    assert not otherwise(simulator, prepare(simulator, [run], 10.0).fitter)

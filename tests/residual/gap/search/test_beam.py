@@ -1,0 +1,52 @@
+"""What a search tries first, and what it grows."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from residual.gap.fitting.screening import Gain
+from residual.gap.search.beam import _best, plainer, together
+
+LAW, CASE, OTHER = 0, 1, 2
+
+
+@pytest.mark.parametrize(("gained", "first"), [(0.95, CASE), (0.8, LAW)])
+def test_a_special_case_that_gains_as_much_is_tried_in_place_of_its_law(gained, first):
+    around = SimpleNamespace(variants=[SimpleNamespace(candidate=n) for n in (LAW, CASE, OTHER)])
+    search = SimpleNamespace(contains=lambda one, other: (one, other) == (LAW, CASE))
+    ranked = [Gain((n,), value, (np.zeros(1),)) for n, value in ((0, 1.0), (1, gained), (2, 0.5))]
+    tried = plainer(search, around, ranked, 2)
+    assert [around.variants[gain.variants[0]].candidate for gain in tried] == (
+        [CASE] if first == CASE else [LAW, CASE]
+    )
+
+
+def test_sets_with_room_for_more_keep_their_place():
+    errors = {(0,): 0.5, (1, 2): 0.2, (2, 3): 0.3, (3,): 0.4}
+    search = SimpleNamespace(
+        sound=lambda key: True, error=errors.get, numbers=lambda key: 2 * len(key), most_numbers=4,
+        tried={key: SimpleNamespace(merit=error) for key, error in errors.items()},
+        effort=SimpleNamespace(beam=2),
+    )  # fmt: skip
+    assert _best(search, list(errors)) == [(1, 2), (3,), (0,)]
+
+
+def test_a_set_that_stands_for_an_absurd_one_adds_nothing_for_its_joint():
+    key, stand_in, sound = (0, 1), (0, 2, 3), (0, 1, 4)
+    errors = {key: (1.0, 1.0), stand_in: (0.1, 1.0), sound: (1.0, 0.1)}
+    merged = []
+    search = SimpleNamespace(
+        currency=SimpleNamespace(groups=((0,), (1,)), by_group=np.array),
+        validated={k: SimpleNamespace(squares=error) for k, error in errors.items()},
+        tried={
+            sound: SimpleNamespace(
+                theta=np.array([1.0, 2.0, 3.0]), model=SimpleNamespace(owner=np.array([0, 1, 2]))
+            )
+        },
+        effort=SimpleNamespace(stale=0.05),
+        merged=lambda key, additions: (merged.append(list(additions)) or sound, np.zeros(3)),
+        fits_in=lambda key: True,
+    )
+    assert together(search, key, [stand_in, sound]) == []
+    assert [number for number, _ in merged[0]] == [4]

@@ -1,0 +1,147 @@
+"""Enough is enough: the smallest set that forecasts about as well as any."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from toy import Toy
+
+from residual.gap.search.choice import choose
+from residual.gap.search.significance import least_otherwise
+from sims.pendulum_equation import PendulumEquation
+
+
+@pytest.mark.parametrize(("second", "key"), [(0.41, (0,)), (0.39, (0, 1))])
+def test_an_effect_has_to_take_a_fifth_off_what_remains(second, key):
+    found = choose(Toy({(0,): 0.5, (0, 1): second}))
+    assert found.key == key
+
+
+@pytest.mark.parametrize(("first", "key"), [(0.65, (0, 1)), (0.72, (0,))])
+def test_or_three_tenths_at_one_joint_of_several(first, key):
+    # Over three joints that is a tenth: too little on the whole.
+    toy = Toy({(0,): 0.6, (0, 1): (0.6 * first, 0.6, 0.6)}, joints=3)
+    assert choose(toy).key == key
+
+
+def test_what_takes_less_is_minor_and_says_what_it_took():
+    found = choose(Toy({(0,): 0.5, (0, 1): 0.43}))
+    assert found.key == (0,)
+    assert found.minor == (1,)
+    assert found.reasons[0, 1] == "takes only 14 % off what remains"
+
+
+def test_a_trifle_beside_the_nominal_error_is_no_effect_however_much_of_the_rest_it_is():
+    assert choose(Toy({(0,): 0.008, (0, 1): 0.004})).key == (0,)
+
+
+def test_nothing_is_chosen_where_nothing_helps_beyond_chance():
+    assert choose(Toy({(0,): 0.99, (1,): 1.02}, scatter=0.2)).key == ()
+
+
+def test_fewest_numbers_win_among_equals():
+    toy = Toy({(0, 1): 0.200, (3,): 0.205, (0,): 0.6, (1,): 0.6})
+    assert choose(toy).key == (3,)
+
+
+def test_ties_go_to_the_better_fit():
+    toy = Toy({(0,): 0.200, (3,): 0.201}, merits={(0,): 50.0, (3,): 20.0})
+    assert choose(toy).key == (3,)
+    worse = Toy({(0,): 0.2, (3,): 0.4}, merits={(0,): 50.0, (3,): 20.0})
+    assert choose(worse).key == (0,)
+
+
+def test_steps_that_give_up_less_than_a_fifth_each_do_not_add_up():
+    # A law of two numbers with a mass; a fifth worse, two effects of one number; a single one.
+    errors = {(0, 2): 0.607, (1, 3): 0.757, (4,): 0.818}
+    toy = Toy(errors)
+    toy.numbers = lambda key: len(key) + (2 in key)
+    assert choose(toy).key == (1, 3)
+    toy = Toy({key: error for key, error in errors.items() if key != (0, 2)})
+    assert choose(toy).key == ()
+
+
+def test_of_what_no_data_tell_apart_the_least_is_otherwise_than_was_known():
+    # One effect, and a mass that is 2 % off; or that mass off by a third, and another effect.
+    sets = {(0, 3): 0.2, (1, 3): 0.2, (0, 1): 0.2}
+    merits = {(0, 3): 20.01, (1, 3): 20.0, (0, 1): 30.0}
+    known = PendulumEquation().parameters["mass"].value
+    assert choose(Toy(sets, merits, mass=0.02 * known)).key == (0, 3)
+    assert choose(Toy(sets, merits, mass=0.33 * known)).key == (1, 3)
+
+
+def test_what_would_be_surprisingly_large_comes_after_what_does_as_well():
+    merits = {(0,): 50.0, (3,): 20.0}
+    assert choose(Toy({(0,): 0.200, (3,): 0.201}, merits, surprising={3})).key == (0,)
+    assert choose(Toy({(0,): 0.400, (3,): 0.201}, merits, surprising={3})).key == (3,)
+
+
+def test_a_surprise_has_to_be_better_by_more_than_a_tenth():
+    """Each block says the same, so that chance excuses nothing."""
+    assert choose(Toy({(0,): 0.215, (3,): 0.2})).key == (3,)
+    assert choose(Toy({(0,): 0.215, (3,): 0.2}, surprising={3})).key == (0,)
+    assert choose(Toy({(0,): 0.225, (3,): 0.2}, surprising={3})).key == (3,)
+
+
+def test_a_set_that_shrank_is_exchanged_for_one_that_surprises_less():
+    """The pair does best, but either member alone does about as well."""
+    errors = {(3,): 0.1000, (0,): 0.1001, (1, 3): 0.0999}
+    merits = {(3,): 1.0, (0,): 1.01, (1, 3): 0.99}
+    assert choose(Toy(errors, merits, surprising={3})).key == (0,)
+
+
+def test_a_set_that_is_good_enough_asks_for_no_more():
+    toy = Toy({(0,): 0.10, (0, 1): 0.05})
+    assert choose(toy).key == (0, 1)
+    assert choose(toy, lambda key: key == (0,)).key == (0,)
+
+
+def test_fits_that_did_not_converge_or_cannot_be_are_no_evidence():
+    toy = Toy({(0,): 0.5, (1,): 0.1, (3,): 0.05})
+    toy.unfit.add((1,))
+    toy.refused[(3,)] = "mass would be 60 times its nominal value"
+    found = choose(toy)
+    assert found.key == (0,)
+    assert found.reasons[(1,)] == "did not converge"
+    assert found.reasons[(3,)].startswith("mass would be")
+
+
+def test_every_other_set_has_a_reason_with_its_worst_place():
+    found = choose(Toy({(0,): 0.2, (1,): 0.5, (0, 1): 0.195}))
+    assert set(found.reasons) == {(), (1,), (0, 1)}
+    assert found.reasons[(1,)].startswith("2.5 times the error, most at ")
+
+
+@given(st.lists(st.floats(0.02, 1.2), min_size=6, max_size=6), st.integers(0, 3))
+@settings(max_examples=60, deadline=None)
+def test_what_is_chosen_is_never_worse_than_the_nominal(errors, seed):
+    keys = [(0,), (1,), (3,), (0, 1), (0, 3), (0, 1, 3)]
+    toy = Toy(dict(zip(keys, errors, strict=True)), scatter=0.1 * seed)
+    found = choose(toy)
+    assert toy.error(found.key) <= 1.0 + 1e-9
+    assert not set(found.key) & set(found.minor)
+    assert set(found.reasons) == set(toy.tried) - {found.key}
+
+
+def test_what_fits_no_better_than_chance_is_not_needed_however_well_it_forecasts():
+    """What breaks away by a hair forecasts a block well or badly, whatever is known of it."""
+    errors = {(2,): 0.13, (1, 2): 0.003}
+    assert choose(Toy(errors, merits={(): 9e3, (2,): 213.6, (1, 2): 212.0})).key == (2,)
+    assert choose(Toy(errors, merits={(): 9e3, (2,): 213.6, (1, 2): 180.0})).key == (1, 2)
+
+
+@pytest.mark.parametrize(("astray", "key"), [(1, (2,)), (3, (0,))])
+def test_what_leaves_a_third_of_all_data_wins_though_a_block_or_two_go_astray(astray, key):
+    toy = Toy({(0,): 0.02, (2,): 0.005}, merits={(): 9e3, (0,): 300.0, (2,): 20.0}, blocks=8)
+    toy.validated[2,].squares[:astray] = toy.currency.nominal[:astray]
+    assert toy.error((2,)) > 3 * toy.error((0,))
+    assert choose(toy).key == key
+    toy.tried[2,].merit = 40.0
+    assert choose(toy).key == (0,)
+
+
+@pytest.mark.parametrize(("merit", "key"), [(20.5, (0, 3)), (25.0, (1, 3))])
+def test_down_to_the_noise_the_same_counts_among_what_fits_no_worse(merit, key):
+    sets = {(0, 3): 0.2, (1, 3): 0.2, (0, 1): 0.2}
+    known = PendulumEquation().parameters["mass"].value
+    toy = Toy(sets, {(0, 3): merit, (1, 3): 20.0, (0, 1): 90.0}, mass=0.02 * known)
+    assert least_otherwise(toy, (1, 3)) == key
