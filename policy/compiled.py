@@ -6,11 +6,14 @@ from Python, by way of a tensor library, they cost a tenth of the update; compil
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
-import scipy.linalg.blas  # noqa: F401  numba's products call it; once loaded, thread limits hold
+
+# Numba's products call it; once it is loaded, thread limits hold.
+importlib.import_module("scipy.linalg.blas")
 
 F = TypeVar("F", bound=Callable[..., Any])
 

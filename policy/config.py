@@ -27,7 +27,6 @@ class DDPGConfig:
             without it.
         warm_up: Transitions that must be in the replay before updates start; until then the
             current policy acts, with noise.
-        updates_per_step: Updates after each step of the environment.
 
     Raises:
         ValueError: A value lies outside its range; the message says which.
@@ -46,7 +45,6 @@ class DDPGConfig:
     noise_theta: float = 0.15
     reward_scale: float = 0.1
     warm_up: int = 1000
-    updates_per_step: int = 1
 
     def __repr__(self) -> str:
         # What is as by default tells nothing.
@@ -69,7 +67,6 @@ class DDPGConfig:
             ("noise_sigma", 0, math.inf),
             ("batch", 1, math.inf),
             ("warm_up", 0, math.inf),
-            ("updates_per_step", 0, math.inf),
             ("replay", self.batch, math.inf),
         ):
             value = getattr(self, name)

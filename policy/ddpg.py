@@ -174,8 +174,7 @@ class DDPG:
             total += float(reward)
             observation = following
             if len(self.replay) >= max(c.warm_up, 1):
-                for _ in range(c.updates_per_step):
-                    self.update()
+                self.update()
             if terminated or truncated:
                 returns.append(total)
                 total = 0.0
@@ -257,7 +256,7 @@ class DDPG:
     def _restored(cls, arrays: dict[str, Any], metadata: dict[str, Any]) -> DDPG:
         low, high = arrays.pop("low"), arrays.pop("high")
         rows = arrays.pop("replay", None)
-        # Before version 0.2 there were settings of TD3 as well.
+        # Files of earlier versions hold settings that are gone.
         known = {field.name for field in dataclasses.fields(DDPGConfig)}
         settings = {name: value for name, value in metadata["config"].items() if name in known}
         config, n_o = DDPGConfig(**settings), metadata["observation_size"]

@@ -43,7 +43,8 @@ def read_arrays(path: str | Path, form: str) -> tuple[dict[str, Any], dict[str, 
     if metadata.get("format") != form:
         raise OtherForm(
             f"{path} has format {metadata.get('format')!r}, expected {form!r}: agents are read by "
-            "DDPG.load, policies by MlpPolicy.load"
+            "DDPG.load, policies by MlpPolicy.load, those of another algorithm by "
+            "policy.Algorithm('stable_baselines3.SAC').load (on the command line --learner)"
         )
     return arrays, metadata
 

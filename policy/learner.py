@@ -119,13 +119,22 @@ class Algorithm:
         return DDPG.for_env(env, config, seed, scaling)
 
     def load(self, path: Path, env: gymnasium.Env[Any, Any]) -> Learner:
-        """A learner with what another one of this algorithm has saved; errors as ``DDPG.load``."""
+        """A learner with what another one of this algorithm has saved.
+
+        Raises:
+            FileNotFoundError: There is no such file.
+            ValueError: The file is damaged or of another algorithm, or its options were others.
+        """
         if self.path == OURS:
             return DDPG.load(path)
         from policy.stable_baselines import FORMAT
 
         learner = self.make(env, 0)
-        learner.restore(read_arrays(path, FORMAT)[0])
+        arrays, _ = read_arrays(path, FORMAT)
+        try:
+            learner.restore(arrays)
+        except ValueError as error:
+            raise ValueError(f"{path} holds {error}") from error
         return learner
 
     @property
@@ -157,6 +166,8 @@ def imported(path: str, what: str) -> Any:
 
 def load_policy(path: str | Path) -> Policy:
     """A policy from a file of ``DDPG.save`` or ``MlpPolicy.save``, or by its import path.
+
+    Files name no code, so one of another algorithm is read by ``Algorithm.load``.
 
     Raises:
         FileNotFoundError: There is no such file.

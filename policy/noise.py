@@ -42,6 +42,10 @@ class OrnsteinUhlenbeck:
         self.value: NDArray[np.float64] = np.zeros(size)
         self._rng = np.random.default_rng(rng)
 
+    def __repr__(self) -> str:
+        size, sigma, theta = self.value.size, self.sigma, self.theta
+        return f"{type(self).__name__}({size}, sigma={sigma:g}, theta={theta:g})"
+
     def reset(self) -> None:
         """Forget the past: the next value starts from zero."""
         self.value = np.zeros_like(self.value)

@@ -174,7 +174,12 @@ class StableBaselines:
         try:
             self.model.policy.load_state_dict(tensors)
         except RuntimeError as error:
-            raise ValueError(f"networks of another algorithm or size: {error}") from None
+            # Its first line says of which class, each other one what does not fit.
+            first = [line.strip() for line in str(error).splitlines() if line.strip()][1:2]
+            raise ValueError(
+                "networks of another algorithm or size: give the class and the options that they "
+                f"were learnt with ({' '.join(first):.120})"
+            ) from None
         if entropy is not None:
             with torch.no_grad():
                 getattr(self.model, _ENTROPY).copy_(entropy)

@@ -87,7 +87,7 @@ class System:
         shown: State channels drawn over time; by default the first three.
         path: Two state channels, along and up, of a place whose path is drawn.
         target: A return that counts as success, if there is one.
-        best: Computes the best return that is possible, if it can be known.
+        best: The best return that is possible, if it is known.
         elsewhere: Draws states (n, T + 1, n_s) and actions (n, T, n_a) of rollouts of the true
             system from anywhere, to compare with where policies go; by default uniformly, if the
             true system is a simulator.
@@ -111,7 +111,7 @@ class System:
     shown: tuple[str, ...] | None = None
     path: tuple[str, str] | None = None
     target: float | None = None
-    best: Callable[[], float] | None = None
+    best: float | None = None
     elsewhere: Callable[[np.random.Generator], tuple[Array, Array]] | None = None
     published: Mapping[str, str] = dataclasses.field(default_factory=dict)
     cold_noise_sigma: float = 0.20
@@ -243,5 +243,6 @@ class System:
             "shown": list(self.shown or [channel.name for channel in channels[:3]]),
             "path": list(self.path or []),
             "target": self.target,
+            "best": self.best,
             "published": dict(self.published),
         }

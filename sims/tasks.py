@@ -23,6 +23,9 @@ class Task(abc.ABC):
 
     horizon: int
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}(horizon={getattr(self, 'horizon', None)})"
+
     @abc.abstractmethod
     def start(self, rng: np.random.Generator) -> Array:
         """A start state, shape (n_s,)."""

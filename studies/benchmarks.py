@@ -8,6 +8,7 @@ what the other measured.
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -16,90 +17,33 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from simgap_files import atomic_write_json, atomic_write_text, read_json
+from simgap_files import atomic_write_text, read_json
+from studies.reporting.render import render
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
 from studies.running.workers import ONE_THREAD
 from studies.timing.fit_scaling import write_figure
-from studies.timing.tables import SCALING, records, tables
+from studies.timing.tables import SCALING, mujoco_tables, records, tables
 
 ROOT = Path(__file__).resolve().parents[1]
 SUITE = Path("tests", "benchmarks")
 FIGURE = Path("images", "fit_scaling.png")
 MUJOCO = "## MuJoCo models\n"
-# What takes most of the time: large fits, and the second problem size of DDPG.
-QUICK = "not leo and not 15000 and not 100000 and not (3750 and GaussianProcessRegressor)"
-
-NOTES = """\
-- One thread for BLAS and PyTorch, one process. `times` is ours over the peer's in speed: above 1
-  ours is faster. Trust the ratios more than the absolute figures, which follow the machine.
-- DDPG and simulators: processor time, median of 10 rounds, and the peer runs in turns with ours,
-  so that other programs on the machine hit both alike. Fits: processor time, median of 3 rounds
-  (of 1 for GaussianProcessRegressor). Predictions: wall time, median over about one second.
-- DDPG: every step of the environment comes with one update of batch 64; networks 400 and 300
-  wide, float32. Sizes: `pendulum` has 3 observations and 1 action, `leo` 17 and 6. The environment
-  costs next to nothing. "Share of its own matrix products": time of the bare products of an
-  update over the time of the update. "Peak" is this machine's own sgemm of 1024 x 1024, measured
-  in the same rounds.
-- Fits learn the difference of two pendulums, without noise; held-out error is RMS error over RMS
-  difference at 2000 other states, up to a quarter faster than those learnt from.
-  GaussianProcessRegressor has the same kernel and its default optimizer, MLPRegressor the layers
-  of DropoutNet and its defaults otherwise. Linear has no peer: it is a closed form.
-- GaussianProcessRegressor is left out at 15000 points: every step of its optimizer factors and
-  differentiates a matrix of 15000 x 15000 (hours, and more than 10 GB).
-- Cost against size: 24 standard normal inputs, 18 outputs tanh(X A) B with random A (24, 40) and
-  B (40, 18), 1 % noise (`tests/benchmarks/fit_at_scale.py`); held-out error is RMS error over RMS
-  target at 4000 other rows without noise. Each fit has a process of its own and is run once;
-  seconds are wall time on one thread. Peak memory is the whole process's, libraries and data
-  included.
-- Predictions are means, fitted on 3750 points, reached through `DifferenceModel` as the corrected
-  simulator reaches them; features and checks of the input are part of the time, for peers too.
-  The length scales of GaussianProcessRegressor are given here, they do not change the time.
-- find_gap: processor time of one answer with default options but the hold; logs by SciPy, 8 records
-  of 250 rows of the pendulum with rates, 20 s at 500 Hz of an arm with two joints without.
-- Gymnasium's Pendulum-v1 is no like-for-like peer of the simulators: it has no motor and takes
-  one Euler step per control period; it stands for what a step of a plain environment costs.
-  Wrappers are left off. The one-step error is that against an adaptive method of order 8; for
-  `Pendulum + Linear` against the true pendulum that it was fitted to."""
-
-
-ROBOTS = """\
-Measured by `python -m studies.benchmarks --mujoco`.
-
-Control steps per second of processor time, 1024 rows, own masses and dampings in each row or rows
-alike; medians of five rounds that take turns with `mujoco.rollout` of the bare model, of whose
-speed at least half is wanted:
-
-{speeds}
-
-[What they are](mujoco.md). On the same logs (arm2, three records of 7.5 s at 100 Hz, encoders
-0.5 mrad, rates unmeasured; errors over 0.3 s on a fourth from smoothed starts, which alone cost
-1.85 mrad) find_gap with its whole library, and `mujoco.sysid`, to which damping, frictionloss,
-quadratic damping and armature of every joint, mass and center of mass of every body are listed. A
-name of sysid is one whose 95 % interval excludes the nominal value. Processor seconds:
-
-{rivals}
-
-sysid fits the dynamics too and is quick. It does not say which of the significant values to
-believe: its start states are not fitted, and where one value cannot be seen most intervals are
-infinite.
-"""
 
 
 def build_parser() -> Parser:
     """The command line."""
     parser = Parser(prog="python -m studies.benchmarks", description=__doc__)
     parser.add_argument(
-        "--quick", action="store_true",
-        help="leave out what takes longest: many points, scikit-learn's Gaussian process at 3750",
-    )  # fmt: skip
-    parser.add_argument(
         "--mujoco", action="store_true",
         help="MuJoCo models instead: speed beside mujoco.rollout, and find_gap beside MuJoCo's own "
         "system identification (extra mujoco[sysid])",
     )  # fmt: skip
-    parser.add_argument("--read", type=str | None, help="tables of this JSON; measure nothing")
-    parser.add_argument("--json", type=str | None, help="keep what was measured in this file")
+    parser.add_argument(
+        "--read",
+        type=str | None,
+        help="tables of what pytest --benchmark-json wrote; measure nothing",
+    )
     parser.add_argument(
         "--output", type=str | None,
         help="write the Markdown to this file too, and its figure into images/ beside it",
@@ -107,12 +51,11 @@ def build_parser() -> Parser:
     return parser
 
 
-def run_suite(target: Path, quick: bool) -> bool:
+def run_suite(target: Path) -> bool:
     """Run the benchmarks in a process of their own; progress goes to stderr.
 
     Args:
         target: JSON file to write.
-        quick: Leave out what takes longest.
 
     Returns:
         Whether every benchmark passed.
@@ -121,13 +64,9 @@ def run_suite(target: Path, quick: bool) -> bool:
         FileNotFoundError: This is no checkout of the project: the suite is not there.
         ChildProcessError: Nothing was measured.
     """
-    if not (ROOT / SUITE).is_dir():
-        raise FileNotFoundError(
-            f"{ROOT / SUITE} does not exist: run the benchmarks in a checkout of the project"
-        )
+    check_suite()
     command = [sys.executable, "-m", "pytest", str(SUITE), "-o", "addopts=", "--benchmark-only"]
     command += ["--benchmark-json", str(target), "-q", "-rs", "-p", "no:cacheprovider"]
-    command += ["-k", QUICK] if quick else []
     done = subprocess.run(command, cwd=ROOT, env=os.environ | ONE_THREAD, stdout=sys.stderr)
     if not target.is_file() or not target.stat().st_size:
         raise ChildProcessError(
@@ -137,6 +76,14 @@ def run_suite(target: Path, quick: bool) -> bool:
     return done.returncode == 0
 
 
+def check_suite() -> None:
+    """Raise ``FileNotFoundError`` if this is no checkout of the project."""
+    if not (ROOT / SUITE).is_dir():
+        raise FileNotFoundError(
+            f"{ROOT / SUITE} does not exist: run the benchmarks in a checkout of the project"
+        )
+
+
 def document(data: Mapping[str, Any], figure: bool = False) -> str:
     """The page: the command that measured it, the tables, and how to read them.
 
@@ -144,15 +91,12 @@ def document(data: Mapping[str, Any], figure: bool = False) -> str:
         data: The content of a file that ``pytest --benchmark-json`` wrote.
         figure: Show ``FIGURE``, which stands beside the page.
     """
-    found = tables(data)  # an error if the data are none
+    found = tables(data).rstrip()  # an error if the data are none
     if figure:
         picture = f"![Seconds, memory and error of a fit against the number of points]({FIGURE})"
         found = found.replace(f"{SCALING}\n", f"{SCALING}\n\n{picture}\n", 1)
     command = data.get("command", f"pytest {SUITE} -o addopts= --benchmark-only")
-    return (
-        f"# Benchmarks\n\nMeasured by `{command}`; nothing here is written by hand.\n\n"
-        f"{found}\n## How it was measured\n\n{NOTES}\n"
-    )
+    return f"{render('benchmarks.md', command=command, tables=found)}\n"
 
 
 @guarded(resumes=False)
@@ -164,18 +108,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if given.mujoco:
         robots(given.output)
         return
-    data, complete = measure(given.quick) if not given.read else (read_json(given.read), True)
+    data, complete = measure() if not given.read else (read_json(given.read), True)
     try:
         found = records(data)
     except ValueError as problem:
         fail(f"{given.read}: {problem}" if given.read else str(problem))
     picture = Path(given.output).parent / FIGURE if given.output else None
     page = document(data, picture is not None and write_figure(found, picture) is not None)
-    if given.output and Path(given.output).is_file():
-        page = with_robots(page, robots_in(Path(given.output).read_text(encoding="utf-8")))
+    page = joined(page, parts_of(given.output)[1])
     print(page)
-    if given.json:
-        atomic_write_json(given.json, data)
     if given.output:
         atomic_write_text(given.output, page)
     if not complete:
@@ -184,43 +125,53 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def robots(output: str | None) -> None:
-    """Measure MuJoCo models and print the page; see ``studies.robots``."""
-    try:
-        from studies.robots import beside, speed
-
-        found = speed.table(speed.speeds())
-        rivals = beside.table(lambda text: print(text, file=sys.stderr, flush=True))
-    except ImportError as problem:
-        fail(f"{problem}; the comparison needs pip install 'simgap[mujoco]' 'mujoco[sysid]'")
-    page = f"{MUJOCO}\n{ROBOTS.format(speeds=found, rivals=rivals)}"
+    """Measure MuJoCo models and print the page."""
+    page = f"{render('benchmarks_mujoco.md', **mujoco_tables(measure_mujoco()))}\n"
     print(page)
     if output:
-        there = Path(output)
-        whole = there.read_text(encoding="utf-8") if there.is_file() else "# Benchmarks\n"
-        atomic_write_text(output, with_robots(whole, page))
+        atomic_write_text(output, joined(parts_of(output)[0] or "# Benchmarks", page))
 
 
-def robots_in(page: str) -> str:
-    """The section on MuJoCo models of a page; empty if it has none."""
-    _, heading, rest = f"\n{page}".partition(f"\n{MUJOCO}")
-    own, _, _ = rest.partition("\n## ")
-    return f"{MUJOCO}{own.rstrip()}\n" if heading else ""
+def measure_mujoco() -> dict[str, Any]:
+    """What ``tests/benchmarks/mujoco_models.py`` measured: ``speeds`` and ``rivals``.
+
+    Raises:
+        FileNotFoundError: This is no checkout of the project.
+        ChildProcessError: Nothing was measured.
+    """
+    check_suite()
+    command = [sys.executable, "-m", f"{'.'.join(SUITE.parts)}.mujoco_models"]
+    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    if done.returncode:
+        raise ChildProcessError(
+            "nothing was measured, see above; the comparison needs pip install 'simgap[mujoco]' "
+            "'mujoco[sysid]'"
+        )
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
-def with_robots(page: str, section: str) -> str:
-    """A page whose section on MuJoCo models, the last one, is this."""
-    rest = page.replace(robots_in(page), "") if robots_in(page) else page
-    return f"{rest.rstrip()}\n\n{section}" if section else page
+def parts_of(output: str | None) -> tuple[str, str]:
+    """The page that is there, and its last section, on MuJoCo models; empty if there is none."""
+    there = Path(output) if output else None
+    page = there.read_text(encoding="utf-8") if there and there.is_file() else ""
+    rest, heading, section = f"\n{page}".partition(f"\n{MUJOCO}")
+    return rest, heading + section
 
 
-def measure(quick: bool) -> tuple[dict[str, Any], bool]:
+def joined(page: str, section: str) -> str:
+    """A page with the section on MuJoCo models, if there is one, as its last."""
+    return f"{page.strip()}\n\n{section.strip()}".rstrip() + "\n"
+
+
+def measure() -> tuple[dict[str, Any], bool]:
     """Run the suite: what it measured, and whether every benchmark passed; see ``run_suite``."""
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder, "benchmarks.json")
-        complete = run_suite(target, quick)
+        complete = run_suite(target)
         data = read_json(target)
     # What decides the figures; where they are written to does not.
-    data["command"] = "python -m studies.benchmarks" + (" --quick" if quick else "")
+    data["command"] = "python -m studies.benchmarks"
     return data, complete
 
 

@@ -152,7 +152,8 @@ def run(
     rows = sum(len(run.times) for run in data.trajectories)
     count = len(data.trajectories)
     tell(f"{count} {'trajectory' if count == 1 else 'trajectories'}, {rows} samples")
-    for line in found_in_data([*data.findings, *(held.findings if held else ())]):
+    findings = [*data.findings, *(held.findings if held else ())]
+    for line in found_in_data(findings):
         tell(f"data: {line}")
     tell("checking the integration step")
     for line in advice(simulator, data.trajectories):
@@ -171,7 +172,6 @@ def run(
         progress=tell,
     )
     tell("writing the report")
-    findings = [*data.findings, *(held.findings if held else ())]
     write_gap(result, output, config, findings, time.perf_counter() - begin)
     grave = found_in_data([found for found in findings if found.severity == "warning"])
     return dataclasses.replace(result, quality=(*grave, *result.quality))

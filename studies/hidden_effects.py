@@ -32,7 +32,6 @@ from jsonargparse.typing import PositiveInt
 
 from residual.gap import find_gap
 from simgap_files import read_sealed, write_sealed
-from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import make_logs
@@ -45,7 +44,7 @@ from studies.hidden.rivals import one_step, regression, sparse
 from studies.hidden.scores import replaceable, score, score_names
 from studies.hidden.strengths import draw, truth
 from studies.running.command import Parser
-from studies.running.ending import check_output, fail, guarded
+from studies.running.ending import check_output, fail, guarded, run_as_imported
 from studies.running.progress import Progress
 from studies.running.trials import Execution, read_trials, run_trials, tell_failures, trial_folder
 
@@ -70,25 +69,19 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
         with threadpoolctl.threadpool_limits(1):
             return {"config": dict(config), "answers": {"find_gap": run_dirty(config)}}
     rng = np.random.default_rng(config["seed"])
-    strengths: dict[str, float] = {}
+    drawn = (config["size"], config["excitation"], config["noise"], rng)
+    strengths = {name: draw(name, *drawn) for name in config["hidden"] if name not in OUTSIDE}
     outside: dict[str, float] = {}
     for name in config["hidden"]:
-        if name in OUTSIDE:
-            outside.update(OUTSIDE[name])
-            continue
-        strengths[name] = draw(name, config["size"], config["excitation"], config["noise"], rng)
-    hidden_truth = truth(strengths | outside)
+        outside |= OUTSIDE.get(name, {})
     simulator = PendulumEquation()
     with threadpoolctl.threadpool_limits(1), progress.task("set", 2) as tell:
-        logs = make_logs(
-            hidden_truth, config["seed"], config["excitation"], config["noise"], config["runs"],
-            config["steps"],
-        )  # fmt: skip
+        how = (config[key] for key in ("seed", "excitation", "noise", "runs", "steps"))
+        logs = make_logs(truth(strengths | outside), *how)
         tell(1)
-        offered: list[Effect] = list(library(simulator))
-        if config["remove"]:
-            gone = frozenset().union(*(replaceable(name) for name in config["hidden"]))
-            offered = [effect for effect in offered if effect.name not in gone]
+        gone = [replaceable(name) for name in config["hidden"]] if config["remove"] else []
+        removed = frozenset().union(*gone)
+        offered = [effect for effect in library(simulator) if effect.name not in removed]
         answers: dict[str, Any] = {}
         if "find_gap" in config["methods"]:
             begin = time.process_time()
@@ -96,13 +89,12 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
             result = find_gap(simulator, logs, effects=offered, parameter_tolerance=0.0)
             used = {"processor_seconds": time.process_time() - begin}
             answers["find_gap"] = score(result, strengths, bool(outside)) | used
-        names = [*strengths, *outside]
-        if "one_step" in config["methods"]:
-            said = one_step(regression(simulator, offered, logs, differentiate=False))
-            answers["one_step"] = {"named": said} | score_names(said, names)
-        if "pysindy" in config["methods"] and importlib.util.find_spec("pysindy"):
-            said = sparse(regression(simulator, offered, logs, differentiate=True))
-            answers["pysindy"] = {"named": said} | score_names(said, names)
+        for method, ask in {"one_step": one_step, "pysindy": sparse}.items():
+            known = method != "pysindy" or importlib.util.find_spec("pysindy")
+            if method in config["methods"] and known:
+                said = ask(regression(simulator, offered, logs, method == "pysindy"))
+                names = [*strengths, *outside]
+                answers[method] = {"named": said} | score_names(said, names)
         tell(2)
     return {"config": dict(config), "strengths": strengths, "answers": answers}
 
@@ -143,8 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = build_parser()
     given = parser.parse_args(arguments)
     made = parser.instantiate(given)
-    fields = [field.name for field in dataclasses.fields(HiddenStudy)]
-    study = HiddenStudy(**{name: made[name] for name in fields})
+    study = HiddenStudy(**{f.name: made[f.name] for f in dataclasses.fields(HiddenStudy)})
     output = Path(given.output) if given.output else RESULTS
     check_output(output)
     cells = trials_of(study)
@@ -162,7 +153,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    # By its importable name, which worker processes need to find the same classes.
-    from studies import hidden_effects
-
-    hidden_effects.main()
+    run_as_imported("studies.hidden_effects")

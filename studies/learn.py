@@ -26,6 +26,7 @@ from sims.system import System
 from studies.learning.budget import Budget
 from studies.learning.command import command
 from studies.learning.study import Study, Trial
+from studies.running.ending import run_as_imported
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,7 +72,4 @@ main = command(STUDY)
 
 
 if __name__ == "__main__":
-    # By its importable name, which worker processes need to find the same classes.
-    from studies import learn
-
-    learn.main()
+    run_as_imported("studies.learn")

@@ -27,6 +27,7 @@ from studies.learning.budget import Budget
 from studies.learning.command import command
 from studies.learning.study import Study, Trial
 from studies.learning.warm_start import ReplayRule
+from studies.running.ending import run_as_imported
 from studies.systems.leo import SYSTEM
 
 
@@ -61,7 +62,4 @@ main = command(STUDY)
 
 
 if __name__ == "__main__":
-    # By its importable name, which worker processes need to find the same classes.
-    from studies import leo_gap
-
-    leo_gap.main()
+    run_as_imported("studies.leo_gap")

@@ -11,17 +11,20 @@ Or walks of the true Leo under a policy that studies.leo_gap learnt (docs/leo.md
 steps of a fifth of the simulator's; one CSV file per episode, cut at its fall.
 
   python -m studies.make_log --system leo --policy idealised.safetensors --output walks
+  python -m studies.make_log --system leo --policy idealised.safetensors \
+      --learner stable_baselines3.SAC --output walks
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jsonargparse.typing import PositiveInt
 
+from policy.learner import OURS, Algorithm
 from sims.pendulum import IDEALISED_MASS, TRUE_MASS
 from studies.hidden.data import Truth, make_logs
 from studies.hidden.logs import write_log
@@ -42,9 +45,13 @@ def build_parser() -> Parser:
     parser.add_argument(
         "--policy", type=str, help="Leo: a policy that walks, a file or an import path."
     )
+    parser.add_argument(
+        "--learner", default=OURS, help="Leo: the algorithm that learnt it, as leo_gap's --learner."
+    )
+    parser.add_argument("--learner_options", type=dict[str, Any], default={}, help="As leo_gap's.")
     parser.add_argument("--seed", type=int, default=0, help="Of motion and noise.")
     parser.add_function_arguments(write_logs, skip={"folder", "seed"})
-    parser.add_function_arguments(write_walks, "walk", skip={"folder", "policy", "seed"})
+    parser.add_function_arguments(write_walks, "walk", skip={"folder", "policy", "learner", "seed"})
     return parser
 
 
@@ -88,13 +95,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = parser.instantiate(parser.parse_args(arguments))
     folder, system, policy = given.pop("output"), given.pop("system"), given.pop("policy")
     walk, seed = given.pop("walk"), given.pop("seed")
+    learner, options = given.pop("learner"), given.pop("learner_options")
     check_output(folder)
     if system == "pendulum":
         paths = write_logs(folder, **vars(given), seed=seed)
     elif policy is None:
         fail("--system leo needs --policy, an agent that walks (docs/leo.md)")
     else:
-        paths = write_walks(folder, policy, **vars(walk), seed=seed)
+        algorithm = None if learner == OURS else Algorithm(learner, options=options)
+        paths = write_walks(folder, policy, algorithm, **vars(walk), seed=seed)
     print(f"{len(paths)} runs: {paths[0]} to {paths[-1].name}")
 
 

@@ -23,6 +23,7 @@ import dataclasses
 from sims.system import System
 from studies.learning.command import command
 from studies.learning.study import Study, Trial
+from studies.running.ending import run_as_imported
 from studies.systems.pendulum import pendulum
 
 
@@ -48,7 +49,4 @@ main = command(STUDY)
 
 
 if __name__ == "__main__":
-    # By its importable name, which worker processes need to find the same classes.
-    from studies import pendulum_gap
-
-    pendulum_gap.main()
+    run_as_imported("studies.pendulum_gap")

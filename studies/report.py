@@ -34,39 +34,40 @@ def build_parser() -> Parser:
 def study_of(folder: Path) -> str:
     """Name of the study that wrote a folder: ``studies/<name>.py`` can rebuild it.
 
-    ``study.json`` names it, or ``results.json`` by its ``study`` or ``system``; folders that
-    name none are of ``pendulum_gap``.
+    ``study.json`` names it, or of a single trial ``results.json``.
 
     Raises:
         FileNotFoundError: The folder holds no results.
         ValueError: The name is none of a study, or the file is damaged.
     """
-    path = folder / (PLAN if (folder / PLAN).exists() else "results.json")
+    path = _named_in(folder)
     if not path.exists():
         raise FileNotFoundError(
             f"{folder}: expected the output folder of a study, with {PLAN} or results.json in it"
         )
     found: Any = read_sealed(path)
-    if isinstance(found, dict) and isinstance(found.get("trials"), list):
-        found = (found["trials"] or [None])[0]
-    if not isinstance(found, dict):
-        raise ValueError(f"{path} is damaged: expected the results of a trial, a JSON object")
-    name = str(found.get("study", f"{found.get('system', 'pendulum')}_gap"))
+    if not isinstance(found, dict) or "study" not in found:
+        raise ValueError(f"{path} is damaged: expected a JSON object with the name of its study")
+    name = str(found["study"])
     # A name from a file is imported: it may only be that of a study.
     if not re.fullmatch(r"[a-z_]+", name) or not Path(__file__).with_name(f"{name}.py").exists():
         raise ValueError(f"{path}: there is no study {name!r}, expected one of studies/")
     return name
 
 
+def _named_in(folder: Path) -> Path:
+    """The file that names the study of a folder."""
+    return folder / (PLAN if (folder / PLAN).exists() else "results.json")
+
+
 def _told(folder: Path, error: Exception) -> str:
     """What is wrong with the files that a report was to be made from."""
     if str(folder) in str(error):
         return str(error)
-    path = folder / (PLAN if (folder / PLAN).exists() else "results.json")
     wrong = f"a key {error}" if isinstance(error, KeyError) else f"values as written ({error})"
     return (
-        f"{path}, or the results.json of a trial that it names, is damaged or of another version: "
-        f"expected {wrong}; give the command of the study again"
+        f"{_named_in(folder)}, or the results.json of a trial that it names, is damaged or of "
+        f"another version: expected {wrong}; give the command of the study again"
     )
 
 

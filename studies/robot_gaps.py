@@ -17,17 +17,19 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from jsonargparse.typing import NonNegativeInt, PositiveFloat, PositiveInt
+import pandas as pd
+from jsonargparse.typing import PositiveInt
 
-from studies.robots.cases import Case, ask, cases, nominal
+from studies.reporting.markdown import frame_markdown
+from studies.robots.cases import Case, Kind, ask, cases, nominal
 from studies.robots.drives import ROBOTS
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
 
-#: An ``Answer`` in plain values, as its line of JSON holds it.
+#: What ``ask`` returns, as its line of JSON holds it.
 Kept = dict[str, Any]
 
 
@@ -36,14 +38,12 @@ def build_parser() -> Parser:
     parser = Parser(prog="python -m studies.robot_gaps", description=__doc__)
     parser.add_argument("--robot", choices=ROBOTS, default="arm2")
     parser.add_argument(
-        "--kind", type=Literal["none", "single", "pair"], default="single",
+        "--kind", type=Kind, default="single",
         help="nothing, each effect of the library alone, or a friction and a payload",
     )  # fmt: skip
     parser.add_argument("--hidden", type=str, nargs="*", help="hide these in place of a kind")
     parser.add_argument("--seeds", type=PositiveInt, default=1, help="how many seeds")
-    parser.add_argument("--first", type=NonNegativeInt, default=0, help="the first seed")
     parser.add_argument("--sample", type=PositiveInt | None, help="only so many, drawn at random")
-    parser.add_argument("--minutes", type=PositiveFloat, default=2.0, help="budget of each answer")
     parser.add_argument("--output", type=Path, required=True, help="JSON lines of answers")
     return parser
 
@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     given = build_parser().parse_args(arguments)
     check_output(given.output.parent)
-    seeds = range(given.first, given.first + given.seeds)
+    seeds = range(given.seeds)
     if given.hidden:
         offered = [str(effect) for effect in nominal(given.robot).offered_effects()]
         for name in set(given.hidden) - set(offered):
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     else:
         wanted = list(cases(given.robot, given.kind, seeds))
     if given.sample:
-        order = np.random.default_rng(given.first).permutation(len(wanted))[: given.sample]
+        order = np.random.default_rng(0).permutation(len(wanted))[: given.sample]
         wanted = [wanted[i] for i in sorted(order)]
     try:
         known = _read(given.output)
@@ -74,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for number, case in enumerate(wanted, start=1):
         answer = known.get(_key(case))
         if answer is None:
-            answer = json.loads(json.dumps(dataclasses.asdict(ask(case, given.minutes))))
+            answer = json.loads(json.dumps(ask(case)))
             with given.output.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(answer) + "\n")
         answers.append(answer)
@@ -92,24 +92,24 @@ def line(answer: Kept) -> str:
 
 def table(answers: Sequence[Kept]) -> str:
     """Markdown over all answers."""
-    lines = [
-        "| robot | hidden | sets | right | of them by family | confirmed wrong | s, median, most |",
-        "|---|---|---|---|---|---|---|",
-    ]
     groups: dict[tuple[str, int], list[Kept]] = {}
     for row in answers:
         groups.setdefault((row["case"]["robot"], len(row["case"]["hidden"])), []).append(row)
+    found = []
     for (robot, count), own in groups.items():
         seconds = [row["processor"] for row in own]
-        what = ("nothing", "one effect", "two effects")[min(count, 2)]
-        right = sum(row["right"] for row in own)
-        family = sum(bool(row.get("by_family")) for row in own)
-        wrong = sum(bool(row["confirmed_wrong"]) for row in own)
-        lines.append(
-            f"| {robot} | {what} | {len(own)} | {right} | {family} | {wrong} | "
-            f"{np.median(seconds):.0f}, {max(seconds):.0f} |"
+        found.append(
+            {
+                "robot": robot,
+                "hidden": ("nothing", "one effect", "two effects")[min(count, 2)],
+                "sets": len(own),
+                "right": sum(row["right"] for row in own),
+                "of them by family": sum(bool(row.get("by_family")) for row in own),
+                "confirmed wrong": sum(bool(row["confirmed_wrong"]) for row in own),
+                "s, median, most": f"{np.median(seconds):.0f}, {max(seconds):.0f}",
+            }
         )
-    return "\n".join(lines)
+    return frame_markdown(pd.DataFrame(found))
 
 
 def _key(case: Case) -> str:

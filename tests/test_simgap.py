@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import simgap
-from policy import rollout
+from policy import OrnsteinUhlenbeck, rollout
 
 ROOT = Path(__file__).parents[1]
 
@@ -27,7 +27,7 @@ def test_every_public_name_is_there():
     for name in simgap.__all__:
         assert getattr(simgap, name).__name__ == name
     with pytest.raises(AttributeError, match="no attribute 'Nothing'"):
-        simgap.Nothing  # noqa: B018
+        _ = simgap.Nothing
 
 
 def test_the_import_alone_is_light(tmp_path):
@@ -52,6 +52,11 @@ def test_what_a_notebook_shows_is_short():
     env = simgap.SimulatorEnv(pendulum, simgap.SwingUp(horizon=20))
     agent = simgap.DDPG.for_env(env)
     run = rollout(agent.policy, env, 0)
+
+    class Hold(simgap.Task):
+        horizon = 20
+        start = reward = None
+
     trajectory = simgap.Trajectory("run 1", np.arange(4.0), np.zeros((4, 2)), np.zeros((3, 1)))
     system = simgap.System("pendulum", pendulum, simgap.Pendulum.true(), simgap.SwingUp())
     accuracy = simgap.accuracy_along(corrected, run.states[None], run.actions[None])
@@ -60,6 +65,7 @@ def test_what_a_notebook_shows_is_short():
         accuracy, simgap.Algorithm(), simgap.Budget(), simgap.EvaluationProtocol(),
         simgap.Linear(), simgap.SwingUp(), env, simgap.check_simulator(pendulum),
         pendulum.state_channels[0], simgap.GaussianProcess(), simgap.DropoutNet(),
+        simgap.Ensemble(), simgap.NamedEffects(), Hold(), OrnsteinUhlenbeck(1),
     ]  # fmt: skip
     for thing in shown:
         text = repr(thing)

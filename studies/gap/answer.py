@@ -15,6 +15,7 @@ from studies.gap.words import (
     effect_name,
     known_effects,
     listed,
+    minus,
     names_of,
     number_text,
     percent,
@@ -34,6 +35,7 @@ DOUBTS: dict[Doubt, str] = {
     "unsteady": "its size differs between parts of the data",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
+    "may_be_at_bound": "its interval ends at its bound, as if it wanted to be larger",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
     "no_time": "there was no time to ask whether parameters that are a few percent off would do as "
     "well, give more --minutes",
@@ -62,7 +64,11 @@ def headline(verdict: Verdict, result: GapResult) -> str:
     if verdict.kind == "needs_data":
         return capitalized(names_of(verdict.alternatives, "and")) + "."
     if verdict.kind == "calibrated":
-        return f"Parameters moved within their tolerance: {_changes(verdict)}."
+        moved = [
+            minus(f"{effect_name(name)} {change.value:+.3g}{unit_text(change.unit)}")
+            for name, change in verdict.parameters.items()
+        ]
+        return f"Parameters moved within their tolerance: {listed(moved)}."
     name = capitalized(effect_name(verdict.label))
     if verdict.kind == "minor":
         return f"{name}: {percent(verdict.share.value)} of the gap, not added."
@@ -75,27 +81,12 @@ def headline(verdict: Verdict, result: GapResult) -> str:
             f"{name}: {number_text(change, sign=True)}, so {total}"
             f"{unit_text(change.unit)} in place of {six_digits(float(parameter.value))}."
         )
-    numbers = ", ".join(_named(field, number) for field, number in verdict.parameters.items())
+    values = verdict.parameters.items()
+    numbers = ", ".join(f"{_spelt(field)} {number_text(number)}" for field, number in values)
     if verdict.family:
         own = effect_name(verdict.label)
         return f"{capitalized(verdict.family)}, form undecided: as {own}, {numbers}."
     return f"{name}{shape(verdict)}: {numbers}{_times(verdict)}."
-
-
-def _changes(verdict: Verdict) -> str:
-    """By how much parameters were moved."""
-    return listed(
-        [
-            f"{effect_name(name)} {change.value:+.3g}{unit_text(change.unit)}".replace(
-                "-", "\u2212"
-            )
-            for name, change in verdict.parameters.items()
-        ]
-    )
-
-
-def _named(field: str, number: Number) -> str:
-    return f"{_spelt(field)} {number_text(number)}"
 
 
 #: Of what a share is one more: actuators receive, and sensors read.
@@ -147,7 +138,9 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.form:
         found.append(f"of the same family, {names_of(verdict.form)} would do as well")
     if verdict.same_motion:
-        found.append(f"no motion can tell it from {_twins(verdict)}")
+        known = {o.effect: f" ({_values(o)})" for o in verdict.meant}
+        names = [f"{effect_name(name)}{known.get(name, '')}" for name in verdict.same_motion]
+        found.append(f"no motion can tell it from {listed(names, 'or')}")
     for other in verdict.beside:
         twin = next(v for v in result.verdicts if other.effect in v.same_motion)
         meant, named = effect_name(other.effect), effect_name(twin.label)
@@ -157,22 +150,10 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     return found
 
 
-def _twins(verdict: Verdict) -> str:
-    """Its exact twins, with the numbers that are known of them."""
-    known = {other.effect: other for other in verdict.meant}
-    names = [
-        effect_name(label) + (f" ({_values(known[label])})" if label in known else "")
-        for label in verdict.same_motion
-    ]
-    return listed(names, "or")
-
-
 def _values(meant: Meant) -> str:
     """Numbers without an interval, named where there are several."""
     texts = {
-        field: f"{value:{'+' if field == 'change' else ''}.3g}{unit_text(unit)}".replace(
-            "-", "\u2212"
-        )
+        field: minus(f"{value:{'+' if field == 'change' else ''}.3g}{unit_text(unit)}")
         for field, (value, unit) in meant.numbers.items()
     }
     if len(texts) == 1:
@@ -182,10 +163,8 @@ def _values(meant: Meant) -> str:
 
 def much_surer(number: Number) -> bool:
     """Whether a number would be much better known if all else in the simulator were exact."""
-    if number.if_exact is None or number.at_bound:
-        return False
-    low, high = number.if_exact
-    return high - low < MUCH * (number.high - number.low)
+    low, high = number.if_exact or (number.low, number.high)
+    return not number.at_bound and high - low < MUCH * (number.high - number.low)
 
 
 def span(number: Number) -> str:
@@ -193,8 +172,7 @@ def span(number: Number) -> str:
     assert number.if_exact is not None
     low, high = number.if_exact
     half = 0.5 * (high - low)
-    text = f"{rounded(low, half)} to {rounded(high, half)}{unit_text(number.unit)}"
-    return text.replace("-", "\u2212")
+    return minus(f"{rounded(low, half)} to {rounded(high, half)}{unit_text(number.unit)}")
 
 
 def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:

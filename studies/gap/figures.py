@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import textwrap
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from matplotlib.figure import Figure as Drawing
 from residual.gap import GapResult
 from residual.gap.fitting.where import Profile
 from residual.gap.result import Rollout
-from studies.gap.words import FLOOR, gap_rows, quantity_text, typeset
+from studies.gap.words import FLOOR, gap_rows, quantity_text, typeset, with_unit
 from studies.reporting.figures import (
     AMBER,
     BLUE,
@@ -52,16 +53,13 @@ def shrinking(result: GapResult, path: Path | None = None) -> Drawing:
     axis.axvline(gap.noise_floor.value, color=GREEN, linestyle=(0, (4, 3)), label="noise floor")
     axis.set_yticks(range(len(rows)), [textwrap.fill(name, LONGEST_NAME) for name, _ in rows])
     axis.set(ylim=(len(rows) - 0.5, -0.5), xlim=(0, 1.06 * top))
-    axis.set_xlabel(f"error of {gap.channel}" + (f" ({typeset(gap.unit)})" if gap.unit else ""))
+    axis.set_xlabel(with_unit(f"error of {gap.channel}", gap.unit))
     axis.grid(axis="y", visible=False)
     axis.tick_params(axis="y", length=0)
     figure.legend(loc="outside upper left", handlelength=1.8)
-    data = pd.DataFrame(
-        [{"step": name, "value": s.value, "low": s.low, "high": s.high}
-         for name, s in gap_rows(gap)]
-    )  # fmt: skip
+    steps = [{"step": name, **dataclasses.asdict(span)} for name, span in gap_rows(gap)]
     if path:
-        save_figure(figure, path, data)
+        save_figure(figure, path, pd.DataFrame(steps))
     return figure
 
 
@@ -85,8 +83,9 @@ def rollout(result: GapResult, shown: Rollout, path: Path) -> Drawing:
         axis.plot(time, after, color=BLUE, label=own if first else None)
         axis.plot(time, seen, "o", color=INK, markersize=3 if len(time) < 80 else 1.6,
                   label="measured" if first else None)  # fmt: skip
-        between = "\n" if len(name) > 10 else " "  # a panel is as high as some twenty letters
-        axis.set_ylabel(name + (f"{between}({typeset(unit)})" if unit else ""))
+        label = with_unit(name, unit)
+        # A panel is as high as some twenty letters.
+        axis.set_ylabel(label.replace(" (", "\n(") if len(name) > 10 else label)
         # A nominal forecast that runs away must not flatten all else.
         good = seen[np.isfinite(seen)]
         if len(good):
@@ -113,7 +112,7 @@ def profile(found: Profile, path: Path) -> Drawing:
     axis.axhline(0, color=MUTED, linewidth=0.9)
     axis.fill_between(found.centres, found.low, found.high, color=BLUE, alpha=0.2, linewidth=0)
     axis.plot(found.centres, found.mean, "o-", color=BLUE, markersize=4.5)
-    axis.set_xlabel(f"{found.variable}" + (f" ({typeset(found.unit)})" if found.unit else ""))
+    axis.set_xlabel(with_unit(found.variable, found.unit))
     unit = found.target_unit.replace("/s/s", "/s²")
     axis.set_ylabel(f"missing change of\n{found.target} ({typeset(unit)})")
     save_figure(

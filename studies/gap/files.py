@@ -1,4 +1,4 @@
-"""What find_gap leaves in its folder: gap.json, corrected.yaml, and the report beside them."""
+"""What find_gap leaves in its folder: the report, gap.json and corrected.yaml."""
 
 from __future__ import annotations
 
@@ -15,12 +15,85 @@ import yaml
 
 from residual.gap import GapResult
 from residual.logs import Finding
-from simgap_files import atomic_write_text, write_sealed
+from simgap_files import atomic_write_text, flush_to_disk, write_sealed
 from sims.loading import corrected_settings
 from sims.model_files import relative
+from studies.gap.forecasts import bars, rollouts, set_aside, tiles, where
 from studies.gap.lead import lead
-from studies.gap.report import write_report
+from studies.gap.verdicts import apart, banners, blind, evidence
+from studies.gap.words import found_once
+from studies.reporting.sections import Code, Prose, Report, Section, Table
 from studies.running.versions import versions
+
+# Findings beyond these are in gap.json.
+FINDINGS = 12
+
+
+def write_report(
+    result: GapResult, record: Mapping[str, Any], folder: Path, name: str = "report.html"
+) -> Path:
+    """Figures as PNG with their numbers as CSV, and one page, into ``folder``.
+
+    Args:
+        result: What was found.
+        record: What ``gap.json`` holds.
+        folder: Where to.
+        name: Of the page.
+    """
+    figures = folder / "figures"
+    settings = yaml.safe_dump(record["config"], sort_keys=False)
+    sections: list[Section] = [
+        *banners(result, record["config"].get("tolerance")),
+        tiles(result),
+        *rollouts(result, figures),
+        bars(result, figures),
+        *set_aside(result),
+        *where(result, figures),
+        evidence(result),
+        *apart(result),
+        *blind(result),
+        *quality(result, record),
+        Code(settings, summary="The settings of this run", heading="Settings"),
+    ]
+    logs = record["config"]["logs"]
+    names = ", ".join(Path(log).name for log in logs[:3])
+    more = f" and {len(logs) - 3} more" if len(logs) > 3 else ""
+    report = Report(
+        f"Gap report: {result.corrected.name}",
+        f"Where the simulator and {names}{more} disagree, and what is missing.",
+        sections,
+        footer(record),
+    )
+    return report.write(folder / name)
+
+
+def quality(result: GapResult, record: Mapping[str, Any]) -> list[Section]:
+    """Findings about the data, and the noise."""
+    found = (((one["kind"], one["says"]), one["where"]) for one in record["quality"])
+    rows = [[kind, where, says] for (kind, says), where in found_once(found)]
+    noise = ", ".join(
+        f"{name} {sigma:.3g} ± {error:.2g} {dict(result.channels)[name]}".strip()
+        for name, (sigma, error) in result.noise.items()
+    )
+    text = f"Noise found (standard deviation): {noise}."
+    if len(rows) > FINDINGS:
+        text += f" {len(rows) - FINDINGS} more findings are in `gap.json`."
+    if not rows:
+        text += " Nothing else stood out in the logs."
+    sections: list[Section] = [Prose(text, heading="Data quality")]
+    if rows:
+        sections.append(Table(["finding", "where", "what"], rows[:FINDINGS]))
+    return sections
+
+
+def footer(record: Mapping[str, Any]) -> str:
+    """Time and versions, in small print."""
+    seconds = dict(record["seconds"])
+    total = seconds.pop("total")
+    stages = ", ".join(f"{stage} {value:.1f}" for stage, value in seconds.items())
+    versions = ", ".join(f"{name} {version}" for name, version in record["versions"].items())
+    return f"Found in {total:.0f} s ({stages}). {versions[:1].upper()}{versions[1:]}."
+
 
 JSON, CORRECTED, REPORT = "gap.json", "corrected.yaml", "report.html"
 
@@ -103,6 +176,7 @@ def staged(folder: Path) -> Iterator[Path]:
         for source in sorted(path for path in stage.rglob("*") if path.is_file()):
             target = folder / source.relative_to(stage)
             target.parent.mkdir(parents=True, exist_ok=True)
+            flush_to_disk(source)
             os.replace(source, target)
     finally:
         shutil.rmtree(stage, ignore_errors=True)

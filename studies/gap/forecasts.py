@@ -17,11 +17,10 @@ from studies.gap.words import (
     percent,
     quantity_text,
     seconds_text,
-    typeset,
     unit_text,
+    with_unit,
 )
-from studies.reporting import Figure, Gallery, KeyValues, Prose, Section, Table
-from studies.reporting.sections import Cell
+from studies.reporting.sections import Cell, Figure, Gallery, KeyValues, Prose, Section, Table
 
 # Pictures of the same kind beyond these say nothing new.
 ROLLOUTS, PROFILES = 4, 6
@@ -110,12 +109,9 @@ def set_aside(result: GapResult) -> list[Section]:
 def _errors(gap: Gap) -> list[list[Cell]]:
     """Channel, nominal, corrected, noise floor."""
     return [
-        [
-            f"{name} ({typeset(of.unit)})" if of.unit else name,
-            of.before.value, of.after.value, of.noise_floor.value,
-        ]
+        [with_unit(name, of.unit), of.before.value, of.after.value, of.noise_floor.value]
         for name, of in gap.by_channel.items()
-    ]  # fmt: skip
+    ]
 
 
 def where(result: GapResult, folder: Path) -> list[Section]:

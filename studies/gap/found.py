@@ -47,8 +47,7 @@ class FoundGap(gap.GapResult):
 
     def report(self, path: str | Path) -> Path:
         """Write one HTML page (and figures beside it) and return its path."""
-        from studies.gap.files import gap_record
-        from studies.gap.report import write_report
+        from studies.gap.files import gap_record, write_report
 
         path = Path(path)
         logs = list(dict.fromkeys(shown.run for shown in self.rollouts))

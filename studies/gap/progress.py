@@ -30,8 +30,6 @@ class Heartbeat:
         self, budget: float, write: Callable[[str], None] = to_terminal, quiet: float = QUIET
     ) -> None:
         self._budget, self._write, self._quiet = budget, write, quiet
-        self._begin = self._spoke = time.perf_counter()
-        self._used = time.process_time()
         self._text = ""
         self._lock, self._over = threading.Lock(), threading.Event()
         self._thread = threading.Thread(target=self._beat, daemon=True)

@@ -17,8 +17,7 @@ from studies.gap.answer import (
 )
 from studies.gap.lead import lead
 from studies.gap.words import effect_name, names_of, set_name, unit_text
-from studies.reporting import Prose, Section, Table, Verdict
-from studies.reporting.sections import Cell
+from studies.reporting.sections import Cell, Prose, Section, Table, Verdict
 
 Tone = Literal["good", "warning", "bad", "neutral"]
 TONES: dict[str, Tone] = {
@@ -40,12 +39,10 @@ def banners(result: GapResult, tolerance: float | None) -> list[Section]:
     """The first sentence, one banner per verdict, and what is too small for one."""
     worst = {verdict.kind for verdict in result.verdicts if not is_footnote(verdict)}
     tone: Tone = "good"
-    if result.conventions is not None:
+    if result.conventions is not None or (not result.effects and "unexplained" in worst):
         tone = "bad"
     elif result.effects and worst & {"ambiguous", "unexplained"}:
         tone = "warning"
-    elif not result.effects and "unexplained" in worst:
-        tone = "bad"
     sections: list[Section] = [Verdict(lead(result, tolerance), tone=tone, label="answer")]
     small = []
     for verdict in result.verdicts:
@@ -82,11 +79,7 @@ def evidence(result: GapResult) -> Table:
     if not any(not rival.effects for rival in shown):
         shown += [rival for rival in result.evidence if not rival.effects][:1]
     rows: list[list[Cell]] = [
-        [
-            set_name(rival.effects),
-            float(rival.error),
-            "chosen" if rival.chosen else rival.reason,
-        ]
+        [set_name(rival.effects), float(rival.error), "chosen" if rival.chosen else rival.reason]
         for rival in shown
     ]
     more = len(result.evidence) - len(shown)
@@ -110,30 +103,21 @@ def apart(result: GapResult) -> list[Section]:
         if answer.kind not in ("confirmed", "ambiguous"):
             continue
         label = answer.label
+        together = tuple(" with ".join(names) for names in answer.together[:TOGETHER])
+        in_any = "the same motion in any data"
         groups = (
             ([name for name in rivals(answer) if name != label], "these data", False),
             (answer.form, "these data, and it is of the same family", False),
-            (answer.same_motion, "the same motion in any data", True),
-            (
-                tuple(" with ".join(names) for names in answer.together[:TOGETHER]),
-                "the same motion in any data, in one exact proportion",
-                True,
-            ),
+            (answer.same_motion, in_any, True),
+            (together, f"{in_any}, in one exact proportion", True),
         )
         rows += [
             [effect_name(label), names_of(group), why, experiment(label, group, result, same)]
             for group, why, same in groups
             if group
         ]
-    if not rows:
-        return []
-    return [
-        Table(
-            ["effect", "cannot be told from", "why", "what would tell"],
-            rows,
-            heading="What could not be told apart",
-        )
-    ]
+    columns = ["effect", "cannot be told from", "why", "what would tell"]
+    return [Table(columns, rows, heading="What could not be told apart")] if rows else []
 
 
 def blind(result: GapResult) -> list[Section]:

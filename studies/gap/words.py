@@ -110,28 +110,33 @@ def unit_text(unit: str) -> str:
     return "" if unit in ("", "1") else f" {typeset(unit)}"
 
 
-def _near(number: Number) -> float:
-    """How far the nearer end of the interval is from the value."""
-    return min(number.high - number.value, number.value - number.low)
+def minus(text: str) -> str:
+    """A text of numbers with true minus signs."""
+    return text.replace("-", "\u2212")
+
+
+def with_unit(name: str, unit: str) -> str:
+    """``angle (rad)``; what has no unit stands alone."""
+    return f"{name} ({typeset(unit)})" if unit else name
 
 
 def number_text(number: Number, sign: bool = False) -> str:
     """Value and 95 % interval with the unit; of a number at its bound no interval is known."""
     plus = "+" if sign and number.value > 0 else ""
+    unit = unit_text(number.unit)
     if number.at_bound:
-        return f"{plus}{number.value:.3g}{unit_text(number.unit)} (at its bound)".replace(
-            "-", "\u2212"
-        )
+        return minus(f"{plus}{number.value:.3g}{unit} (at its bound)")
     # Of a lopsided interval the near side says how well the value is known.
-    half, near = 0.5 * (number.high - number.low), _near(number)
+    half = 0.5 * (number.high - number.low)
+    near = min(number.high - number.value, number.value - number.low)
     half = max(near, 0.05 * half) if 0 < near < 0.3 * half else half
     value, low, high = (rounded(x, half) for x in (number.value, number.low, number.high))
-    return f"{plus}{value}{unit_text(number.unit)} ({low} to {high})".replace("-", "\u2212")
+    return minus(f"{plus}{value}{unit} ({low} to {high})")
 
 
-def span_text(span: Span, unit: str = "") -> str:
+def span_text(span: Span) -> str:
     """A forecast error with its interval."""
-    return f"{span.value:.3g}{unit_text(unit)} ({span.low:.3g} to {span.high:.3g})"
+    return f"{span.value:.3g} ({span.low:.3g} to {span.high:.3g})"
 
 
 def quantity_text(value: float, unit: str) -> str:

@@ -33,7 +33,7 @@ from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
 from studies.running.command import Parser
-from studies.running.ending import check_output, guarded
+from studies.running.ending import check_output, guarded, run_as_imported
 from studies.running.progress import Progress
 from studies.running.trials import Execution, run_trials, trial_folder
 
@@ -77,24 +77,21 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
 
 def table(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """Largest values by condition, and over all."""
-    data = pd.DataFrame(results)
-    rows = []
-    parts = [*data.groupby(["excitation", "noise", "runs"]), (("all", "", ""), data)]
-    for (excitation, noise, runs), part in parts:
-        rows.append(
-            {
-                "excitation": excitation, "noise": noise, "runs": runs, "sets": len(part),
-                "chosen": int((part["chosen"] > 0).sum()),
-                "gain median": part["gain"].median(),
-                "gain 99 %": part["gain"].quantile(0.99),
-                "gain worst": part["gain"].max(),
-                "threshold median": part["threshold"].median(),
-                "ratio worst": part["ratio"].max(),
-                "ratio worst, errors": part["ratio_in_errors"].max(),
-                "chance smallest": part["chance"].min(),
-            }
-        )  # fmt: skip
-    return pd.DataFrame(rows)
+    told: dict[str, Any] = {
+        "sets": ("seed", "size"),
+        "chosen": ("chosen", "sum"),
+        "gain median": ("gain", "median"),
+        "gain 99 %": ("gain", lambda gain: gain.quantile(0.99)),
+        "gain worst": ("gain", "max"),
+        "threshold median": ("threshold", "median"),
+        "ratio worst": ("ratio", "max"),
+        "ratio worst, errors": ("ratio_in_errors", "max"),
+        "chance smallest": ("chance", "min"),
+    }
+    data, keys = pd.DataFrame(results), ["excitation", "noise", "runs"]
+    everything = data.assign(excitation="all", noise="", runs="")
+    parts = [part.groupby(keys).agg(**told) for part in (data, everything)]
+    return pd.concat([part.reset_index() for part in parts], ignore_index=True)
 
 
 @guarded()
@@ -113,12 +110,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for number, (_, excitation, noise, runs) in enumerate(cells):
         config = {"excitation": excitation, "noise": noise, "runs": runs}
         config["seed"] = 1_000_000 * (given.seed + 1) + number
-        folders[trial_folder(given.output / "sets", f"{excitation}-{noise}-{runs}", config)] = (
-            config
-        )
-    results, failures = run_trials(
-        "hidden_calibration", folders, run_set, Execution(jobs=given.jobs)
-    )
+        name = f"{excitation}-{noise}-{runs}"
+        folders[trial_folder(given.output / "sets", name, config)] = config
+    execution = Execution(jobs=given.jobs)
+    results, failures = run_trials("hidden_calibration", folders, run_set, execution)
     if failures:
         raise SystemExit(f"{len(failures)} sets failed, see error.txt in {given.output / 'sets'}")
     found = table(results)
@@ -127,7 +122,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    # By its importable name, which worker processes need to find the same classes.
-    from studies.hidden import calibration
-
-    calibration.main()
+    run_as_imported("studies.hidden.calibration")

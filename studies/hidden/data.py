@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import DOP853
+from scipy.integrate import solve_ivp
 
 from residual.trajectories import Trajectory
 from studies.hidden.play import integrate_play
@@ -142,15 +142,13 @@ class Truth:
 def integrate(truth: Truth, states: Array, volts: Array, seconds: float) -> Array:
     """Advance all columns of ``states`` (5, n) under constant ``volts`` (n,)."""
     shape = states.shape
-    solver = DOP853(
-        lambda _, y: truth.derivative(y.reshape(shape), volts).ravel(),
-        0.0, states.ravel(), seconds, rtol=1e-9, atol=1e-10, first_step=min(seconds, 0.01),
+    found = solve_ivp(
+        lambda _, y: truth.derivative(y.reshape(shape), volts).ravel(), (0.0, seconds),
+        states.ravel(), "DOP853", rtol=1e-9, atol=1e-10, first_step=min(seconds, 0.01),
     )  # fmt: skip
-    while solver.status == "running":
-        solver.step()
-    if solver.status == "failed":
-        raise ArithmeticError(f"DOP853 gave up at {solver.t:.4g} of {seconds:.4g} s with {truth}")
-    return solver.y.reshape(shape)
+    if found.status < 0:
+        raise ArithmeticError(f"DOP853 gave up at {found.t[-1]:.4g} of {seconds:.4g} s: {truth}")
+    return found.y[:, -1].reshape(shape)
 
 
 def random_steps(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
@@ -131,10 +132,8 @@ def trials_of(study: HiddenStudy) -> list[dict[str, Any]]:
                         "methods": list(study.methods),
                     }
                 )  # fmt: skip
-        order = rng.permutation(len(cells)).tolist()
-        if block.sets is not None:
-            order = _balanced([cells[i]["hidden"] for i in order], order)[: block.sets]
-        found += [cells[i] for i in order]
+        cells = [cells[i] for i in rng.permutation(len(cells))]
+        found += cells if block.sets is None else _balanced(cells)[: block.sets]
     found += [cell for block in study.dirty for cell in _dirty_cells(block)]
     mixed = [found[i] for i in rng.permutation(len(found))]
     return [{**cell, "seed": 100_000 * study.seed + number} for number, cell in enumerate(mixed)]
@@ -207,12 +206,11 @@ def _possible(hidden: Sequence[str], size: float, excitation: Excitation, noise:
     return True
 
 
-def _balanced(names: Sequence[Sequence[str]], order: Sequence[int]) -> list[int]:
-    """The order with every first name once before any comes a second time, and so on."""
-    turns: dict[str, int] = {}
-    keyed = []
-    for place, (hidden, index) in enumerate(zip(names, order, strict=True)):
-        first = hidden[0] if hidden else ""
-        turns[first] = turns.get(first, 0) + 1
-        keyed.append((turns[first], place, index))
-    return [index for _, _, index in sorted(keyed)]
+def _balanced(cells: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The cells with every first name once before any comes a second time, and so on."""
+    seen: Counter[str] = Counter()
+    turns = []
+    for cell in cells:
+        seen[first := "".join(cell["hidden"][:1])] += 1
+        turns.append(seen[first])
+    return [cells[i] for i in np.argsort(turns, kind="stable")]

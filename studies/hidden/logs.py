@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from simgap_files import atomic_write_text
@@ -28,8 +28,6 @@ def write_log(
         actions: shape (T, n_a).
     """
     # The last command is never applied; a log holds it all the same.
-    held = np.vstack([actions, actions[-1:]])
-    text = io.StringIO()
-    table = np.column_stack([times, states, held])
-    np.savetxt(text, table, "%.9g", ",", header=",".join(["time", *names]), comments="")
-    atomic_write_text(path, text.getvalue())
+    columns = np.column_stack([times, states, np.vstack([actions, actions[-1:]])])
+    table = pd.DataFrame(columns, columns=["time", *names])
+    atomic_write_text(path, table.to_csv(index=False, float_format="%.9g"))

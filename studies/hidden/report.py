@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,19 +10,18 @@ import numpy as np
 import pandas as pd
 import yaml
 from matplotlib.figure import Figure as Drawing
-from scipy.stats import beta
 
 from simgap_files import atomic_write_text
+from studies.hidden.counts import asked, count, told
 from studies.hidden.strengths import HIDDEN
 from studies.reporting.figures import new_figure, save_figure, styled
-from studies.reporting.page import Report
-from studies.reporting.sections import Code, Figure, Prose, Section, Table
+from studies.reporting.sections import Code, Figure, Prose, Report, Section, Table
 from studies.running.versions import versions
 
 #: Residual over noise on held-out windows at which a gap counts as closed.
 CLOSED = 1.1
 NOTHING, NO_NAME = "nothing hidden", "no name"
-RIVALS = {"one_step": "one-step regression", "pysindy": "pysindy"}
+METHODS = {"find_gap": "find_gap", "one_step": "one-step regression", "pysindy": "pysindy"}
 
 
 def tidy(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
@@ -46,115 +45,84 @@ def tidy(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def share(hits: int, count: int) -> str:
-    """A share in per cent with its count and its exact 95 % interval.
-
-    Source: Clopper and Pearson, "The use of confidence or fiducial limits", Biometrika 26 (1934).
-    """
-    if count == 0:
-        return "-"
-    low = beta.ppf(0.025, hits, count - hits + 1) if hits else 0.0
-    high = beta.ppf(0.975, hits + 1, count - hits) if hits < count else 1.0
-    return f"{100 * hits / count:.0f} % ({hits}/{count}; {100 * low:.0f} to {100 * high:.0f})"
-
-
-def count(hits: int, total: int) -> str:
-    """``hits/total``, or a dash if there is nothing to count."""
-    return f"{hits}/{total}" if total else "-"
-
-
-def _share(column: pd.Series, form: Callable[[int, int], str] = share) -> str:
-    known = column.dropna()
-    return form(int(known.astype(bool).sum()), len(known))
-
-
 def cells(data: pd.DataFrame) -> pd.DataFrame:
     """One row per cell of the grid with find_gap's scores as counts."""
-    ours = data[data["method"] == "find_gap"]
     keys = ["block", "excitation", "noise", "size", "runs"]
+    counted = {
+        "first right": "first", "or twin": "first_alike", "all named": "all_named",
+        "closed": "closed", "named": "any_name", "wrong": "wrong", "unexplained": "unexplained",
+    }  # fmt: skip
     rows = []
-    for (block, excitation, noise, size, runs), part in ours.groupby(keys):
-        row = {"block": block, "logs": f"{excitation} {noise} x {runs}", "size": size}
-        rows.append(row | _scores(part))
+    for (block, excitation, noise, size, runs), part in _ours(data).groupby(keys):
+        logs = {"block": block, "logs": f"{excitation} {noise} x {runs}", "size": size}
+        rows.append(
+            {**logs, "sets": len(part)}
+            | {title: told(part[column]) for title, column in counted.items()}
+            | {
+                "cover": count(*_covered(part)),
+                "s": round(float(part["seconds"].median()), 1),
+                "s most": round(float(part["seconds"].max()), 1),
+            }
+        )
     return pd.DataFrame(rows)
 
 
-def _scores(part: pd.DataFrame) -> dict[str, Any]:
-    hits, numbers = int(part["numbers_covered"].sum()), int(part["numbers"].sum())
-    return {
-        "sets": len(part),
-        "first right": _share(part["first"], count),
-        "or twin": _share(part["first_alike"], count),
-        "all named": _share(part["all_named"], count),
-        "cover": count(hits, numbers),
-        "closed": _share(part["after"] <= CLOSED, count),
-        "named": _share(part["named"].astype(bool), count),
-        "wrong": _share(part["false_sure"] > 0, count),
-        "unexplained": _share(part["unexplained"], count),
-        "s": round(float(part["seconds"].median()), 1),
-        "s most": round(float(part["seconds"].max()), 1),
-    }
+def _ours(data: pd.DataFrame) -> pd.DataFrame:
+    """The rows of find_gap, with what is counted of them."""
+    ours = data[data["method"] == "find_gap"]
+    return ours.assign(
+        closed=ours["after"] <= CLOSED,
+        wrong=ours["false_sure"] > 0,
+        any_name=ours["named"].fillna("").astype(bool),
+        unexplained=ours["unexplained"].astype(bool),
+        twin=ours["first_alike"].eq(True),
+    )
+
+
+def _covered(part: pd.DataFrame) -> tuple[int, int]:
+    """Intervals that hold the true number, and all intervals."""
+    return int(part["numbers_covered"].sum()), int(part["numbers"].sum())
 
 
 def headlines(data: pd.DataFrame) -> pd.DataFrame:
     """What is asked of find_gap, how often it should be so, and how often it was."""
-    ours = data[data["method"] == "find_gap"]
-    calm = ours["excitation"] != "policy"
-    single, pair = ours["block"] == "single", ours["block"] == "pair"
-    nothing, removed = ours["block"] == "no gap", ours["block"] == "removed"
-    some = ours["hidden"] != NOTHING
-    rows: list[tuple[str, str, str]] = []
-
-    def add(what: str, wanted: str, part: pd.DataFrame, column: pd.Series) -> None:
-        if len(part):
-            rows.append((what, wanted, _share(column[part.index])))
-
-    closed, wrong = ours["after"] <= CLOSED, ours["false_sure"] > 0
-    named = ours["named"].fillna("").astype(bool)
-    for title, part, first in (
-        ("", ours[single & calm], 97),
-        ("policy, ", ours[~calm & single], 92),
-    ):
-        add(f"{title}first name right", f"{first} %", part, ours["first"])
-        add(f"{title}or its near-twin", "", part, ours["first_alike"])
-        hits, numbers = int(part["numbers_covered"].sum()), int(part["numbers"].sum())
-        if numbers:
-            wanted = "90 to 99 %" if not title else "90 %"
-            rows.append((f"{title}95 % intervals that cover", wanted, share(hits, numbers)))
-        add(f"{title}a confident wrong name", "at most 2 %", part, wrong)
-    add("both of a pair", "90 %", ours[pair], ours["all_named"])
-    add("pairs with a confident wrong name", "", ours[pair], wrong)
-    add(
-        f"gap after at most {CLOSED} times the noise",
-        "97 %",
-        ours[some & (single | pair) & calm],
-        closed,
+    ours = _ours(data)
+    single, pair, nothing, removed, outside = (
+        ours[ours["block"] == block] for block in ("single", "pair", "no gap", "removed", "outside")
     )
-    add("nothing hidden, yet a name", "at most 1 %", ours[nothing], named)
-    add("nothing hidden, yet unexplained", "at most 3 %", ours[nothing], ours["unexplained"])
+    some = ours[ours["block"].isin(["single", "pair"]) & (ours["hidden"] != NOTHING)]
+    rows: list[tuple[str, str, pd.Series]] = []
+    driven = single["excitation"] == "policy"
+    for title, part, first, cover in (
+        ("", single[~driven], "97 %", "90 to 99 %"),
+        ("policy, ", single[driven], "92 %", "90 %"),
+    ):
+        hits, numbers = _covered(part)
+        rows += [
+            (f"{title}first name right", first, part["first"]),
+            (f"{title}or its near-twin", "", part["first_alike"]),
+            (f"{title}95 % intervals that cover", cover, pd.Series(np.arange(numbers) < hits)),
+            (f"{title}a confident wrong name", "at most 2 %", part["wrong"]),
+        ]
     # With a pair that imitates something not on offer the answer is "unexplained" and says what it
     # imitates; nobody could say that of an effect that no library holds, so it is counted apart.
-    inside = ours["doubted_for_it"].eq(True)
-    unexplained = ours["unexplained"].astype(bool)
-    twin = ours["first_alike"].eq(True)
-    add("removed from the library: unexplained, or a near-twin", "90 %", ours[removed],
-        unexplained | twin)  # fmt: skip
-    add("removed: the same, without doubts that look up what was removed", "", ours[removed],
-        (unexplained & ~inside) | twin)  # fmt: skip
-    add("removed: a confident wrong name", "", ours[removed], wrong)
-    outside = ours[ours["block"] == "outside"]
-    add("outside of every library: unexplained", "", outside, ours["unexplained"])
-    add("outside: a confident wrong name", "", outside, wrong)
-    seconds = ours["seconds"]
-    if len(seconds):
-        rows.append(
-            (
-                "s for a set, median and worst",
-                "60 and 120",
-                f"{seconds.median():.1f} and {seconds.max():.1f}",
-            )
-        )
-    return pd.DataFrame(rows, columns=["what", "wanted", "found"])
+    by_itself = removed["unexplained"] & ~removed["doubted_for_it"].eq(True)
+    rows += [
+        ("both of a pair", "90 %", pair["all_named"]),
+        ("pairs with a confident wrong name", "", pair["wrong"]),
+        (f"gap after at most {CLOSED} times the noise", "97 %",
+         some[some["excitation"] != "policy"]["closed"]),
+        ("nothing hidden, yet a name", "at most 1 %", nothing["any_name"]),
+        ("nothing hidden, yet unexplained", "at most 3 %", nothing["unexplained"]),
+        ("removed from the library: unexplained, or a near-twin", "90 %",
+         removed["unexplained"] | removed["twin"]),
+        ("removed: the same, without doubts that look up what was removed", "",
+         by_itself | removed["twin"]),
+        ("removed: a confident wrong name", "", removed["wrong"]),
+        ("outside of every library: unexplained", "", outside["unexplained"]),
+        ("outside: a confident wrong name", "", outside["wrong"]),
+    ]  # fmt: skip
+    return asked(rows, ours["seconds"], "60 and 120")
 
 
 def rivals(data: pd.DataFrame) -> pd.DataFrame:
@@ -163,12 +131,11 @@ def rivals(data: pd.DataFrame) -> pd.DataFrame:
     for (block, excitation, noise), part in data.groupby(["block", "excitation", "noise"]):
         row: dict[str, Any] = {"block": block, "excitation": excitation, "noise": noise}
         row["sets"] = part["seed"].nunique()
-        for method, title in {"find_gap": "find_gap", **RIVALS}.items():
+        for method, title in METHODS.items():
             own = part[part["method"] == method]
-            if own.empty:
-                continue
-            row[f"{title}: first right"] = _share(own["first_alike"], count)
-            row[f"{title}: a false name"] = _share(own["false"] > 0, count)
+            if len(own):
+                row[f"{title}: first right"] = told(own["first_alike"])
+                row[f"{title}: a false name"] = told(own["false"] > 0)
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -197,11 +164,11 @@ def confusion(table: pd.DataFrame) -> Drawing:
         table.to_numpy() / np.maximum(total, 1), cmap="Blues", vmin=0, vmax=1, aspect="auto"
     )
     for i, row in enumerate(table.to_numpy()):
-        for j, count in enumerate(row):
-            if count:
-                dark = count > 0.5 * total[i, 0]
-                axis.text(j, i, str(count), ha="center", va="center", fontsize=7,
-                          color="white" if dark else "black")  # fmt: skip
+        for j, sets in enumerate(row):
+            if sets:
+                colour = "white" if sets > 0.5 * total[i, 0] else "black"
+                place = {"ha": "center", "va": "center", "fontsize": 7}
+                axis.text(j, i, str(sets), color=colour, **place)
     axis.set_xticks(range(len(table.columns)), table.columns, rotation=60, ha="right", fontsize=7)
     axis.set_yticks(range(len(table)), table.index, fontsize=7)
     axis.set(xlabel="named first", ylabel="hidden")
@@ -238,32 +205,21 @@ def write_report(
         if counts.size:
             drawn = confusion(counts)
             save_figure(drawn, output / "confusion.png", counts.reset_index())
-            sections.append(
-                Figure(
-                    drawn,
-                    "Hidden effects against the name given first; the diagonal is right.",
-                    "Counts of sets; rows of effects hidden alone.",
-                    heading="What is taken for what",
-                )
-            )
-        sections.append(
-            Table.of(
-                table,
-                "Every cell",
-                f"Counts. Closed: the gap after is at most {CLOSED}; wrong: a confident name that "
-                "means nothing hidden. Logs: excitation, noise, number of trajectories.",
-            )
+            alt = "Hidden effects against the name given first; the diagonal is right."
+            caption = "Counts of sets; rows of effects hidden alone."
+            sections.append(Figure(drawn, alt, caption, heading="What is taken for what"))
+        caption = (
+            f"Counts. Closed: the gap after is at most {CLOSED}; wrong: a confident name that "
+            "means nothing hidden. Logs: excitation, noise, number of trajectories."
         )
+        sections.append(Table.of(table, "Every cell", caption))
     compared = rivals(data)
     atomic_write_text(output / "rivals.csv", compared.to_csv(index=False))
-    sections.append(
-        Table.of(
-            compared,
-            "Beside other methods",
-            "Near-twins count as right. pysindy differentiates over 50 ms, across the jumps of a "
-            "held input, which it was not made for.",
-        )
+    caption = (
+        "Near-twins count as right. pysindy differentiates over 50 ms, across the jumps of a held "
+        "input, which it was not made for."
     )
+    sections.append(Table.of(compared, "Beside other methods", caption))
     sections.append(Code(yaml.safe_dump(dict(config), sort_keys=False), summary="settings"))
     found = ", ".join(f"{name} {version}" for name, version in versions().items())
     Report("Hidden effects", "What find_gap names, known what was hidden.", sections, found).write(

@@ -55,10 +55,7 @@ def states(run: Trajectory) -> Array:
     if np.isfinite(rate).all():
         return np.array(run.states)
     step = float(np.median(run.durations))
-    return np.stack(
-        [savgol_filter(angle, WINDOW, 3), savgol_filter(angle, WINDOW, 3, deriv=1, delta=step)],
-        axis=1,
-    )
+    return np.stack([savgol_filter(angle, WINDOW, 3, deriv=d, delta=step) for d in (0, 1)], axis=1)
 
 
 def columns(
@@ -99,25 +96,21 @@ def regression(
     samples = Samples.join(runs, simulator.substeps)
     by_name = {run.name: run for run in runs}
     nodes = np.concatenate([states(by_name[name]) for name in samples.names])
-    rate = nodes[:, 1]
     matrix, owner = columns(simulator, offered, samples, nodes)
     ahead = Model(simulator).advance(samples, nodes[None], np.zeros((1, 0)))[0, :, 1]
     expected = (ahead - nodes[:, 1]) / samples.durations
     target = np.full(len(nodes), np.nan)
     for start, stop in samples.runs:
-        part = slice(start, stop)
-        step = float(np.median(samples.durations[part]))
+        rate, step = nodes[start:stop, 1], float(np.median(samples.durations[start:stop]))
+        found = np.diff(rate) / step
         if differentiate:
             pysindy = importlib.import_module("pysindy")
-            times = step * np.arange(stop - start)
-            method = pysindy.SmoothedFiniteDifference(
-                smoother_kws={"window_length": WINDOW, "polyorder": 3}
-            )
+            smooth = {"window_length": WINDOW, "polyorder": 3}
+            method = pysindy.SmoothedFiniteDifference(smoother_kws=smooth)
             # The mean of two derivatives is that over the interval between the samples.
-            slope = method(nodes[part, 1:2], times)[:, 0]
-            target[start : stop - 1] = 0.5 * (slope[:-1] + slope[1:])
-        else:
-            target[start : stop - 1] = np.diff(rate[part]) / step
+            slope = method(rate[:, None], step * np.arange(len(rate)))[:, 0]
+            found = 0.5 * (slope[:-1] + slope[1:])
+        target[start : stop - 1] = found
     target = target - expected
     inside = np.isfinite(target)
     for start, stop in samples.runs:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from residual.gap import GapResult
@@ -84,32 +84,27 @@ def score(
         strengths: What was hidden, of ``HIDDEN``.
         outside: Whether something that no library holds was hidden too.
     """
-    named = [v.effect for v in result.verdicts if v.effect]
-    confirmed = [v for v in result.verdicts if v.effect and v.kind == "confirmed"]
-    sure = [v.effect for v in confirmed]
-    said = {name.split("@")[0] for v in result.verdicts if v.effect for name in v.alternatives}
+    chosen = [v for v in result.verdicts if v.effect]
+    confirmed = [v for v in chosen if v.kind == "confirmed"]
+    named = [v.effect for v in chosen]
     kinds = [v.kind for v in result.verdicts]
-    doubts = {
-        label.split("@")[0]
-        for v in result.verdicts
-        if v.kind == "unexplained"
-        for label in v.alternatives
-    }
+    said = _names(label for v in chosen for label in v.alternatives)
+    unexplained = [v for v in result.verdicts if v.kind == "unexplained"]
+    doubts = _names(label for v in unexplained for label in v.alternatives)
     hidden = [*strengths, *(["outside"] if outside else [])]
     row = score_names(named, hidden)
     # Where the form is said to be undecided, the family is what is confirmed.
     meant = set().union(*(alike(name) for name in hidden))
-    families = [{v.effect, *(label.split("@")[0] for label in v.form)} for v in confirmed]
+    families = [{v.effect, *_names(v.form)} for v in confirmed]
     row["false_sure"] = sum(not family & meant for family in families)
-    first = next((v for v in result.verdicts if v.effect), None)
-    if first and first.kind == "confirmed" and hidden:
+    if chosen and chosen[0].kind == "confirmed" and hidden:
         row["first_alike"] = bool(row["first_alike"] or families[0] & meant)
     row["in_set"] = (
         all(alike(name) & (set(named) | said) for name in strengths) if strengths else None
     )
     row |= {
         "named": named,
-        "sure": sure,
+        "sure": [v.effect for v in confirmed],
         "kinds": kinds,
         "no_gap": "no_gap" in kinds,
         "unexplained": "unexplained" in kinds,
@@ -126,13 +121,17 @@ def score(
     return row
 
 
+def _names(labels: Iterable[str]) -> set[str]:
+    """Names of effects, without where they act."""
+    return {label.split("@")[0] for label in labels}
+
+
 def coverage(result: GapResult, strengths: Mapping[str, float]) -> list[bool]:
     """Whether the interval of each number holds the true one, for effects named as hidden."""
     found = []
     for verdict in result.verdicts:
-        if verdict.effect not in strengths:
-            continue
-        effect = HIDDEN[verdict.effect].effect(strengths[verdict.effect])
-        for name, number in verdict.parameters.items():
-            found.append(bool(number.low <= getattr(effect, name) <= number.high))
+        if verdict.effect in strengths:
+            effect = HIDDEN[verdict.effect].effect(strengths[verdict.effect])
+            for name, number in verdict.parameters.items():
+                found.append(bool(number.low <= getattr(effect, name) <= number.high))
     return found

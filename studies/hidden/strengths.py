@@ -107,17 +107,9 @@ def truth(strengths: Mapping[str, float]) -> Truth:
     return Truth(**values)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Reference:
-    """Windows of a pendulum that lacks nothing, around its true path."""
-
-    fitter: SmoothFitter
-    fit: Fit
-    freedom: int
-
-
 @functools.cache
-def _reference(excitation: Excitation, noise: str) -> _Reference:
+def _reference(excitation: Excitation, noise: str) -> tuple[SmoothFitter, Fit, int]:
+    """Windows of a pendulum that lacks nothing, around its true path; their fit and freedom."""
     simulator = PendulumEquation()
     rng = np.random.default_rng(0)
     path, volts = simulate(Truth(), rng, excitation, runs=4, steps=250)
@@ -136,7 +128,7 @@ def _reference(excitation: Excitation, noise: str) -> _Reference:
     grouped = blocks(samples, windows, np.zeros(len(samples)), len(windows))
     fitter = SmoothFitter(samples, grouped, nodes, slope.by_state, sigma, scale, turns=2)
     freedom = int(windows.inside.sum()) * len(sigma) - 2 * len(windows)
-    return _Reference(fitter, fitter.fit(model, none), freedom)
+    return fitter, fitter.fit(model, none), freedom
 
 
 def sizes(name: str, strengths: Array, excitation: Excitation, noise: str) -> Array:
@@ -144,23 +136,21 @@ def sizes(name: str, strengths: Array, excitation: Excitation, noise: str) -> Ar
 
     Strengths are as ``strength`` gives them.
     """
-    ground = _reference(excitation, noise)
+    fitter, fit, freedom = _reference(excitation, noise)
     hidden = HIDDEN[name]
-    simulator = ground.fit.model.simulator
+    simulator = fit.model.simulator
     bound = [hidden.effect(_from_reach(name, float(s), excitation)) for s in strengths]
-    (candidate,) = (
-        c
-        for c in candidates(simulator, [bound[0]], ground.fitter.samples)
-        if name != "cogging" or getattr(c.effect, "order", None) == Truth.cogging_order
-    )
+    pool = candidates(simulator, [bound[0]], fitter.samples)
+    order = Truth.cogging_order if name == "cogging" else None
+    (candidate,) = [c for c in pool if order in (None, getattr(c.effect, "order", None))]
     names = [knob.field for knob in candidate.knobs]
     trials = tuple(
         Trial(np.array([[getattr(effect, n) for n in names]]), np.array([True])) for effect in bound
     )
     tried = dataclasses.replace(candidate, trials=trials)
-    columns = ground.fitter.columns(ground.fit, [tried])
-    found = signatures(ground.fit, trial_variants([tried]), columns)
-    return np.sqrt(1 + found.strengths / ground.freedom)
+    columns = fitter.columns(fit, [tried])
+    found = signatures(fit, trial_variants([tried]), columns)
+    return np.sqrt(1 + found.strengths / freedom)
 
 
 def _from_reach(name: str, strength: float, excitation: Excitation) -> float:
@@ -181,9 +171,8 @@ def draw(
     hidden = HIDDEN[name]
     usual = strength(name, size, excitation, noise)
     sign = rng.choice([-1.0, 1.0]) if hidden.two_signed else 1.0
-    return _from_reach(
-        name, float(sign * min(usual * rng.uniform(0.85, 1.2), hidden.most)), excitation
-    )
+    found = float(sign * min(usual * rng.uniform(0.85, 1.2), hidden.most))
+    return _from_reach(name, found, excitation)
 
 
 @functools.cache
@@ -198,8 +187,7 @@ def strength(name: str, size: float, excitation: Excitation, noise: str) -> floa
     hidden = HIDDEN[name]
     centre = hidden.typical
     for factor in (10.0, 2.0, 1.1):
-        grid = np.minimum(centre * factor ** np.arange(-4.0, 5.0), hidden.most)
-        grid = np.unique(grid)
+        grid = np.unique(np.minimum(centre * factor ** np.arange(-4.0, 5.0), hidden.most))
         got = sizes(name, grid, excitation, noise)
         # Between grid points the size above the noise grows as a power of the strength.
         above = np.log(np.maximum(got**2 - 1, 1e-12))

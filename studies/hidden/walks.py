@@ -8,7 +8,7 @@ import numpy as np
 from jsonargparse.typing import NonNegativeFloat, PositiveInt
 
 from policy.evaluate import collect
-from policy.learner import load_policy
+from policy.learner import Algorithm, load_policy
 from policy.noise import OrnsteinUhlenbeck
 from sims.environment import SimulatorEnv
 from sims.leo import Leo, Walking
@@ -25,6 +25,7 @@ SHORTEST = 14
 def write_walks(
     folder: Path,
     policy: str | Path,
+    learner: Algorithm | None = None,
     torso_mass: float = 1.25,
     friction: NonNegativeFloat = 0.03,
     transitions: PositiveInt = 1000,
@@ -38,6 +39,7 @@ def write_walks(
         folder: Where to.
         policy: Of ``policies/`` that studies.leo_gap leaves, or the import path of one of your own,
             with ``act`` or ``predict``.
+        learner: The algorithm that learnt the policy, if it is not ``policy.DDPG``.
         torso_mass: kg; 0.94226 is the idealised Leo.
         friction: Viscous friction of all joints, N m s/rad.
         transitions: Control steps of 0.03 s in all; those of episodes shorter than 14 steps are
@@ -52,7 +54,7 @@ def write_walks(
     leo = Leo(torso_mass, friction, substeps=SUBSTEPS)
     env = SimulatorEnv(leo, Walking(start_at="around"))
     rng = np.random.default_rng(seed)
-    walker = load_policy(policy)
+    walker = learner.load(Path(policy), env).policy if learner else load_policy(policy)
     noise = OrnsteinUhlenbeck(6, exploration, 0.15, rng)
     names = [channel.name for channel in leo.state_channels]
     spread = np.repeat([PLACE, ANGLE, RATE], [2, 7, 9])

@@ -81,15 +81,8 @@ class Forecasts:
             paths = paths.reshape(width + 1, n, self.lead + 1, width)
             off = np.nan_to_num(self._off(paths[0]) / self.noise).reshape(n, -1)
             there = np.isfinite(self.seen[:, : self.lead + 1])
-            slopes = np.stack(
-                [
-                    np.where(there, (paths[j + 1] - paths[0]) / step[j] / self.noise, 0.0).reshape(
-                        n, -1
-                    )
-                    for j in range(width)
-                ],
-                axis=2,
-            )
+            moved = (paths[1:] - paths[0]) / step[:, None, None, None] / self.noise
+            slopes = np.where(there, moved, 0.0).reshape(width, n, -1).transpose(1, 2, 0)
             slopes = np.clip(np.nan_to_num(slopes), -1e9, 1e9)
             matrix = slopes.transpose(0, 2, 1) @ slopes + np.diag(prior**-2.0)
             right = np.einsum("nrj,nr->nj", slopes, off) + (states - self.states) / prior**2
@@ -197,14 +190,12 @@ def plan(
 def root_mean_squares(simulator: HostSimulator, forecasts: Sequence[Forecasts]) -> dict[str, float]:
     """Root mean square of the error over all forecasts and rows, by measured channel."""
     physical = simulator.physical_channels
-    errors = np.concatenate(
-        [group.errors(simulator).reshape(-1, len(physical)) for group in forecasts]
-    )
-    there = np.isfinite(errors).any(axis=0)
+    errors = [group.errors(simulator).reshape(-1, len(physical)) for group in forecasts]
+    found = np.concatenate(errors)
     return {
-        channel.name: float(np.sqrt(np.nanmean(errors[:, j] ** 2)))
-        for j, channel in enumerate(physical)
-        if there[j]
+        channel.name: float(np.sqrt(np.nanmean(column**2)))
+        for channel, column in zip(physical, found.T, strict=True)
+        if np.isfinite(column).any()
     }
 
 

@@ -59,9 +59,8 @@ def fit_effects(
 
     def slopes(x: Array) -> Array:
         here = residuals(x)
-        step = np.where(x + 1e-4 < high, 1e-4, -1e-4)
-        ahead = [residuals(x + np.eye(len(x))[j] * step[j]) for j in range(len(x))]
-        return np.stack([(r - here) / h for r, h in zip(ahead, step, strict=True)], axis=1)
+        steps = np.diag(np.where(x + 1e-4 < high, 1e-4, -1e-4))
+        return np.stack([(residuals(x + h) - here) / h.sum() for h in steps], axis=1)
 
     x = np.array([0.01 if np.isfinite(known[i][f].nominal) else 1.0 for i, f in fields])
     x = np.clip(x, low, high)
@@ -69,16 +68,10 @@ def fit_effects(
     for j, (i, field) in enumerate(fields):
         starts = np.array(known[i][field].starts) / units[j]
         if starts.size:
-            tried = np.clip([*starts, x[j]], low[j], high[j])
-            costs = [float((residuals(_at(x, j, t)) ** 2).sum()) for t in tried]
-            x[j] = tried[int(np.argmin(costs))]
+            tried = np.tile(x, (len(starts) + 1, 1))
+            tried[:-1, j] = np.clip(starts, low[j], high[j])
+            x = tried[int(np.argmin([(residuals(row) ** 2).sum() for row in tried]))]
     found = least_squares(
         residuals, x, slopes, bounds=(low, high), x_scale="jac", max_nfev=40, ftol=1e-6, xtol=1e-6
     )
     return bound(found.x)
-
-
-def _at(x: Array, j: int, value: float) -> Array:
-    moved = x.copy()
-    moved[j] = value
-    return moved

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import importlib.util
 import time
@@ -12,16 +13,22 @@ from typing import Any
 import yaml
 
 from simgap_files import atomic_write_text, read_sealed, remove_partial_files, write_sealed
-from studies.learning.settings import ALIASES, build_parser, instantiate, resolve, trial_label
 from studies.learning.study import Study
-from studies.learning.trial import code_of_trial, run_trial
+from studies.learning.trial import (
+    ALIASES,
+    build_parser,
+    code_of_trial,
+    instantiate,
+    resolve,
+    run_trial,
+    trial_label,
+)
 from studies.learnt.films import write_films
 from studies.learnt.report import read_episodes, write_report
 from studies.learnt.tables import write_tables
-from studies.running.curves import Curves
 from studies.running.ending import check_output, fail, guarded
 from studies.running.grids import expand_grid
-from studies.running.progress import Bars, Several
+from studies.running.progress import Bars, Curves, Several
 from studies.running.trials import (
     Execution,
     Failures,
@@ -30,8 +37,6 @@ from studies.running.trials import (
     tell_failures,
     trial_folder,
 )
-
-BEST = "best.json"
 
 
 def command(study: Study) -> Callable[..., None]:
@@ -50,10 +55,8 @@ def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     settings = parser.plain(given)
     output, grid = settings.pop("output"), settings.pop("grid")
-    execution = Execution(
-        **{name: settings.pop(name) for name in ("backend", "jobs", "scheduler")},
-        tensorboard=_curves_folder(settings.pop("tensorboard")),
-    )
+    settings["tensorboard"] = _curves_folder(settings["tensorboard"])
+    execution = Execution(**{f.name: settings.pop(f.name) for f in dataclasses.fields(Execution)})
     settings.pop("config", None)
     home = Path("results", study.name)
     # Runs in the default place share their finished steps; a folder given holds all of its own.
@@ -119,9 +122,6 @@ def run_grid(
     remove_partial_files(output)
     work = functools.partial(run_trial, study, kept.resolve())
     run_trials(study.name, trials, work, execution, made_by)
-    # For later reports, which load nothing that a file names.
-    if best := study.system(instantiate(study, configs[0])).best:
-        write_sealed(output / BEST, {"return": best()})
     failures = report_grid(output)
     if failures:
         raise SystemExit(1)
@@ -131,9 +131,8 @@ def report_grid(folder: Path) -> Failures:
     """Tables and report of a grid from the trials in its folder; returns the failed ones."""
     results, failures = read_trials(folder)
     if results:
-        best = read_sealed(folder / BEST)["return"] if (folder / BEST).exists() else None
         write_tables(results, folder)
-        table = write_report(results, folder, failures=failures, best=best)
+        table = write_report(results, folder, failures=failures)
         print(f"\n{table}\n\nreport: {folder / 'report.html'}")
     tell_failures(failures)
     return failures

@@ -24,8 +24,17 @@ import gymnasium
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from studies.learning.compiled import code_hash, file_content, hash_of, named_in
-from studies.learning.parts import attributes_of, cell_content, layers_of, named, written
+from studies.learning.parts import (
+    attributes_of,
+    cell_content,
+    code_hash,
+    file_content,
+    hash_of,
+    layers_of,
+    named,
+    named_in,
+    written,
+)
 from studies.learning.sources import is_ours, is_users
 
 #: Objects within objects are followed so far, and lists of plain values written out so far.

@@ -43,7 +43,7 @@ def run_loop(steps: Steps, budget: Budget, corrected: Simulator | None = None) -
         corrected: The simulator with what it lacked: a policy is trained on it as well, from the
             idealised one, without a true sample.
     """
-    learnt, samples, model = Learnt.of(steps.system), [], None
+    learnt, samples, model = Learnt(steps.system.description()), [], None
     policy = idealised = steps.train("idealised", budget.idealised_steps)
     learnt.add_policy("idealised", idealised)
     start = begin = WarmStart.begin(idealised, steps.replay)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from policy.evaluate import Policy
 from residual.difference import DifferenceModel
-from sims.system import System
 from studies.learning.results import Measured, Model
 from studies.learning.training import Training
 from studies.learnt.words import record_key
@@ -39,16 +38,10 @@ class Learnt:
     trainings: dict[str, Training] = dataclasses.field(default_factory=dict)
     models: list[DifferenceModel] = dataclasses.field(default_factory=list)
 
-    @classmethod
-    def of(cls, system: System) -> Learnt:
-        """An empty result for a system."""
-        return cls(system.description())
-
     @property
     def policy(self) -> Policy:
         """The policy after the last update, or the idealised one."""
-        last = [name for name in self.trainings if name.startswith("difference")]
-        return self.trainings[last[-1] if last else "idealised"].policy
+        return self.trainings[record_key(self._last())].policy
 
     @property
     def model(self) -> DifferenceModel:
@@ -121,11 +114,11 @@ class Learnt:
     def __repr__(self) -> str:
         if not self.policies:
             return f"Learnt({self.system['name']}: nothing yet)"
-        first, last = self.policies[0], self._last()
+        first, last, updates = self.policies[0], self._last(), len(self.models)
         return (
             f"Learnt({self.system['name']}: return on the true system "
             f"{first['return_true']:.4g} -> {last['return_true']:.4g} "
-            f"with {last['true_samples']} true samples, {len(self.models)} updates)"
+            f"with {last['true_samples']} true samples, {updates} update{'s' * (updates != 1)})"
         )
 
     def _last(self) -> Mapping[str, Any]:

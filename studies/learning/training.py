@@ -5,9 +5,8 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium
 import numpy as np
@@ -16,20 +15,33 @@ from policy.evaluate import Policy, Rollout, evaluate, rollout
 from policy.learner import Algorithm, Learner
 from policy.noise import OrnsteinUhlenbeck
 from policy.selection import Point, learn_and_select
+from residual.corrected import CorrectedSimulator
 from residual.trajectories import Transitions
+from residual.uncertainty_penalty import PenalisedTask
 from simgap_npz import read_npz, write_npz
 from sims.simulator import Array, Simulator
 from sims.system import USUAL_STARTS, System
 from studies.learning.streams import stream
-from studies.learning.warm_start import Simulated
+from studies.learning.warm_start import Recorder, Simulated, WarmStart
 
-AGENT, CURVE, SUMMARY, EPISODE, SIMULATED = (
-    "agent.safetensors",
-    "curve.json",
-    "summary.json",
-    "rollout.npz",
-    "simulated.npz",
-)
+if TYPE_CHECKING:
+    from studies.learning.results import Model
+    from studies.learning.steps import Steps
+
+AGENT, CURVE, SUMMARY = "agent.safetensors", "curve.json", "summary.json"
+EPISODE, SIMULATED = "rollout.npz", "simulated.npz"
+# Policies learnt from nothing begin with random actions, the baselines too.
+RANDOM_STEPS = 1000
+
+Kind = Literal["idealised", "difference", "control", "corrected", "cold", "warm"]
+_TITLES = {
+    "idealised": "train on the simulator",
+    "difference": "train on the corrected simulator",
+    "control": "train on, no difference model",
+    "corrected": "train on what was corrected by name",
+    "cold": "cold start on the true system",
+    "warm": "warm start on the true system",
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,65 +99,92 @@ class Training:
 
 
 def train(
-    system: System,
-    learner: Learner,
-    env: gymnasium.Env,
-    tested: gymnasium.Env,
-    steps: int,
-    seed: int,
-    starts: int,
-    tell: Callable[[Point], None],
-    on_true: bool = False,
-    random_steps: int = 0,
-    believed: Simulator | None = None,
+    steps: Steps,
+    kind: Kind,
+    count: int,
+    start: WarmStart | Training | None,
+    on: Model | Simulator | None,
+    update: int,
 ) -> Training:
     """Learn, and keep the policy that is best in the environment learnt in.
 
     Args:
-        system: Says how policies are tested.
-        learner: Learns on from where it stands; ends with the networks of the policy kept.
-        env: To learn in.
-        tested: Another one like it.
-        steps: Of the environment.
-        seed: Of the tests while it learns.
-        starts: Of the starts on the true system, the same for policies that are to be compared.
-        tell: Told every test.
-        on_true: Whether the environment is the true system: then the test is the measure itself.
-        random_steps: The first so many actions are random.
-        believed: Makes a state of what the true system's sensors show, see ``System``.
+        steps: Of whom this is one.
+        kind: See ``Steps.train``, as the others.
+        count: Steps of the environment.
+        start: Where it starts from.
+        on: The difference model to add to the simulator, or another simulator.
+        update: Which update it belongs to.
     """
-    protocol, updates, begin = system.evaluation, learner.updates, time.perf_counter()
-    selection = learn_and_select(
-        learner,
-        env,
-        tested,
-        steps,
-        every=protocol.every_true if on_true else protocol.every,
-        noisy=0 if on_true else protocol.noisy,
-        seed=seed,
-        callback=tell,
-        random_steps=random_steps,
-        episodes=protocol.episodes,
-        finalists=protocol.finalists,
-        final_episodes=protocol.final_episodes,
+    system, all_again = steps.system, steps.replay == "all"
+    simulator, task, difference = system.nominal, system.task, None
+    if isinstance(on, Simulator):
+        simulator = on
+    elif on is not None:
+        difference, simulator = on.difference, steps.corrected(on)
+        if steps.uncertainty_penalty:
+            task = PenalisedTask.around(task, difference, on.data, steps.uncertainty_penalty)
+    on_true = kind in ("cold", "warm")
+    env, tested = (
+        system.true_environment() if on_true else system.environment(simulator, task)
+        for _ in range(2)
     )
-    seconds, updates = time.perf_counter() - begin, learner.updates - updates
-    learner.restore(selection.networks)
-    tests, episode = test_on_truth(system, learner.policy, starts, believed)
-    on_model, count = selection.best.deterministic, len(tests["tests"])
-    if selection.final is not None:
-        on_model = selection.final
-    elif count > protocol.episodes and not on_true:
-        # One start tells little where they differ: from as many as on the true system.
-        on_model = float(evaluate(learner.policy, tested, count, starts).mean())
-    summary = {
-        "simulated_steps": steps,
-        "updates": updates,
+    sigma = system.cold_noise_sigma if start is None else None
+    seed = stream(steps.seed, "train", kind, update)
+    learner = steps.algorithm.make(env, seed, sigma, steps.scaling)
+    if isinstance(start, WarmStart) and start.rows:
+        with steps.progress.task("take up what was simulated", start.rows) as tell:
+            again = isinstance(on, Simulator)
+            start.fill(learner, env, again, lambda done: tell(done, ""))  # type: ignore[arg-type]
+    if start:
+        last = start.last if isinstance(start, WarmStart) else start
+        learner.restore(last.learner.networks())
+    recorder = None
+    if not on_true and (all_again or kind in ("difference", "control")):
+        recorder = Recorder(env)  # type: ignore[arg-type]
+    protocol, updates, begin = system.evaluation, learner.updates, time.perf_counter()
+    with steps.progress.task(_TITLES[kind], count) as tell:
+
+        def report(point: Point) -> None:
+            numbers = {"return": point.deterministic}
+            tell(point.step, f"return {point.deterministic:.4g}", numbers)
+
+        selection = learn_and_select(
+            learner,
+            recorder or env,
+            tested,
+            count,
+            every=protocol.every_true if on_true else protocol.every,
+            noisy=0 if on_true else protocol.noisy,
+            seed=stream(steps.seed, "select", kind, update),
+            callback=report,
+            random_steps=RANDOM_STEPS if start is None else 0,
+            episodes=protocol.episodes,
+            finalists=protocol.finalists,
+            final_episodes=protocol.final_episodes,
+        )
+    summary: dict[str, Any] = {
+        "simulated_steps": count,
+        "updates": learner.updates - updates,
         "best_step": selection.best.step,
-        "return_model": on_model,
-        "seconds": seconds,
+        "return_model": selection.best.deterministic,
+        "seconds": time.perf_counter() - begin,
     }
-    return Training(learner, selection.curve, summary | tests, episode)
+    learner.restore(selection.networks)
+    # Of no kind and no update: what differs between policies is not where they began.
+    starts = stream(steps.seed, "test starts")
+    # One of its own: what the filter steps is not what was trained on and held.
+    believed = simulator if isinstance(on, Simulator | None) else steps.corrected(on)
+    tests, episode = test_on_truth(system, learner.policy, starts, believed)
+    if selection.final is not None:
+        summary["return_model"] = selection.final
+    elif len(tests["tests"]) > protocol.episodes and not on_true:
+        # One start tells little where they differ: from as many as on the true system.
+        again_tested = evaluate(learner.policy, tested, len(tests["tests"]), starts)
+        summary["return_model"] = float(again_tested.mean())
+    summary["held"] = simulator.held if isinstance(simulator, CorrectedSimulator) else 0
+    taken = recorder.taken(difference if all_again else None) if recorder else None
+    return Training(learner, selection.curve, summary | tests, episode, taken)
 
 
 def test_on_truth(

@@ -1,7 +1,8 @@
-"""One trial of a study: the loop, and the files that it leaves."""
+"""One trial of a study: its settings as options, the loop, and the files that it leaves."""
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import importlib.util
 import json
@@ -10,6 +11,7 @@ from typing import Any
 
 import threadpoolctl
 import torch
+from jsonargparse.typing import NonNegativeFloat
 
 from residual.persistence import is_ours, save
 from simgap_npz import write_npz
@@ -17,13 +19,74 @@ from studies.learning.described import modules_in, settings_of
 from studies.learning.fingerprint import fingerprint
 from studies.learning.kept import OnDisk
 from studies.learning.loop import run_loop
-from studies.learning.settings import instantiate
 from studies.learning.sources import code_of
 from studies.learning.steps import Steps
-from studies.learning.study import Config, Study
+from studies.learning.study import Config, Study, Trial
+from studies.running.command import Parser
 from studies.running.grids import class_label
 from studies.running.progress import Progress
+from studies.running.trials import Execution
 from studies.running.versions import versions
+
+#: Settings under their earlier names.
+ALIASES = {"caution": "uncertainty_penalty"}
+
+
+def build_parser(study: Study) -> Parser:
+    """The command line of a study."""
+    parser = Parser(prog=f"python -m studies.{study.name}", description=study.description)
+    parser.add_argument("--config", action="config", help="YAML file with any of the settings.")
+    parser.add_argument(
+        "--output",
+        type=Path | None,
+        default=None,
+        help=f"Folder for the results; default: results/{study.name}/ and a name.",
+    )
+    parser.add_class_arguments(Execution)
+    parser.add_argument(
+        "--grid",
+        type=list[dict[str, list[Any]]] | None,
+        default=None,
+        help="For config files: blocks of settings and the values they take; one trial for each "
+        "combination within a block.",
+    )
+    penalty = "uncertainty_penalty"
+    parser.add_class_arguments(study.trial, sub_configs=True, skip={penalty})
+    parser.add_argument(
+        f"--{penalty}",
+        "--caution",
+        type=NonNegativeFloat,
+        default=0.0,
+        help="Reward lost per step, on the corrected simulator, for each multiple of the "
+        "difference model's typical standard deviation; 0 learns as in the paper.",
+    )
+    parser.set_defaults(estimator={"class_path": study.estimator})
+    return parser
+
+
+def instantiate(study: Study, config: Config) -> Trial:
+    """The trial that plain settings describe; exits with one line if they are wrong."""
+    parser = build_parser(study)
+    # The parser changes nested lists of what it is given.
+    chosen = parser.instantiate(parser.parse_object(copy.deepcopy(dict(config))))
+    return study.trial(**{name: chosen[name] for name in study.settings})
+
+
+def resolve(study: Study, config: Config) -> dict[str, Any]:
+    """``config`` with every default filled in, checked by the parser."""
+    parser = build_parser(study)
+    chosen = parser.parse_object(copy.deepcopy(dict(config)))
+    settings = parser.plain(chosen)
+    return {name: settings[name] for name in study.settings}
+
+
+def trial_label(config: Config) -> str:
+    """A readable name for a trial's folder."""
+    estimator = config["estimator"]["class_path"].rsplit(".", 1)[-1]
+    name = f"{estimator}-{config['budget']['true_samples']}-seed{config['seed']}"
+    # One file may hold several systems: arm.SYSTEM and arm.LAGGED.
+    system = ".".join(str(config.get("system") or "").split(".")[-2:])
+    return f"{system}-{name}" if system else name
 
 
 def run_trial(
@@ -86,9 +149,7 @@ def code_of_trial(study: Study, config: Config) -> str:
     system = study.system_of(trial)
     corrected = [] if trial.corrected is None else [trial.corrected]
     settings = [fingerprint(system), settings_of(trial.estimator), settings_of(corrected)]
-    code = code_of(
-        run_trial, study.trial, study.system, *system.code(), trial.estimator,
-        trial.algorithm.kind(), *corrected, *sorted(modules_in(settings)),
-    )  # fmt: skip
+    roots = [run_trial, study.trial, study.system, *system.code(), trial.algorithm.kind()]
+    code = code_of(*roots, *sorted(modules_in(settings)))
     told = json.dumps([settings, code], sort_keys=True)
     return hashlib.sha256(told.encode()).hexdigest()

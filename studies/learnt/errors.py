@@ -6,9 +6,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import pandas as pd
-
-from studies.learnt.words import grouped
 
 # A step of the true system that differs by less, as a share of what the step changes, does not.
 _NO_GAP = 1e-4
@@ -35,9 +34,9 @@ def by_group(errors: pd.DataFrame, prefix: str, about: Mapping[str, Any]) -> pd.
     if prefix == "one_step":
         gaps = _measured(errors, "gap").reindex(columns=part.columns)
         part = part.mask(gaps <= _NO_GAP)
-    found = [grouped({str(k): v for k, v in row.items()}, about["groups"])
-             for _, row in part.iterrows()]  # fmt: skip
-    return pd.DataFrame(found, columns=list(about["groups"]), dtype=float)
+    part = part.replace([np.inf, -np.inf], np.nan)
+    groups = {name: part.reindex(columns=list(own)) for name, own in about["groups"].items()}
+    return pd.DataFrame({name: own.mean(axis=1) for name, own in groups.items()})
 
 
 def _measured(errors: pd.DataFrame, prefix: str) -> pd.DataFrame:

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from studies.learnt.statistics import mean
 from studies.learnt.words import Results, policy_name
-from studies.reporting.figures import PALETTE, draw_lines, draw_over_time, new_figure, styled
+from studies.reporting.figures import PALETTE, draw_lines, legend_above, new_figure, styled
 
 Drawn = tuple[Figure, pd.DataFrame]
 
@@ -71,11 +71,9 @@ def curves_figure(results: Results) -> Drawn:
     if series:
         figure.legend(loc="outside upper left", ncols=2, handlelength=1.4)
     rows = [
-        {"policy": name, "steps": a, "return": b}
-        for name, (x, y) in series.items()
-        for a, b in zip(x, y, strict=True)
+        pd.DataFrame({"policy": name, "steps": x, "return": y}) for name, (x, y) in series.items()
     ]
-    return figure, pd.DataFrame(rows)
+    return figure, pd.concat(rows) if rows else pd.DataFrame()
 
 
 def drawn_steps(dt: float) -> int:
@@ -93,17 +91,18 @@ def episodes_figure(
         about: The system.
         episodes: ``states`` and ``actions`` by name of the policy.
     """
-    names = [channel["name"] for channel in about["states"]]
     steps = drawn_steps(about["dt"])
     wanted: list[tuple[str, int, dict[str, Any]]] = [
-        ("states", names.index(name), about["states"][names.index(name)]) for name in about["shown"]
+        ("states", column, channel)
+        for name in about["shown"]
+        for column, channel in enumerate(about["states"])
+        if channel["name"] == name
     ]
     if len(about["actions"]) == 1:
         wanted.append(("actions", 0, about["actions"][0]))
     figure, axes = new_figure(len(wanted), 1, height=1.2 + 1.7 * len(wanted), share_x=True)
-    rows, data = {}, []
-    for what, column, channel in wanted:
-        label = f"{channel['name']} ({channel['unit']})"
+    data = []
+    for axis, (what, column, channel) in zip(axes[:, 0], wanted, strict=True):
         series = {}
         for name, episode in episodes.items():
             values = episode[what][:steps, column]
@@ -112,10 +111,12 @@ def episodes_figure(
                 values = values - 2 * np.pi * np.round(values[-1] / (2 * np.pi))
             time = np.arange(len(values)) * about["dt"]
             series[name] = (time, values)
-            data.append(pd.DataFrame({"time_s": time, "policy": name, "channel": channel["name"],
-                                      "value": values}))  # fmt: skip
-        rows[label] = series
-    draw_over_time(figure, axes[:, 0], rows)
+            columns = {"time_s": time, "policy": name, "channel": channel["name"], "value": values}
+            data.append(pd.DataFrame(columns))
+        draw_lines(axis, series)
+        axis.set_ylabel(f"{channel['name']} ({channel['unit']})")
+    axes[-1, 0].set_xlabel("time (s)")
+    legend_above(figure, axes[0, 0])
     return figure, pd.concat(data, ignore_index=True)
 
 
@@ -180,9 +181,7 @@ def updates_figure(rows: pd.DataFrame) -> Drawn:
 
 
 @styled()
-def budgets_figure(
-    rows: pd.DataFrame, errors: pd.DataFrame, about: Mapping[str, Any], best: float | None
-) -> Drawn:
+def budgets_figure(rows: pd.DataFrame, errors: pd.DataFrame, about: Mapping[str, Any]) -> Drawn:
     """Return and one-step error after one update, against the true samples by estimator."""
     figure, axes = new_figure(2, 1, height=6.4, share_x=True)
     first = rows[(rows["name"] == "difference") & (rows["iteration"] == 1)]
@@ -211,7 +210,7 @@ def budgets_figure(
              "half_width": m.half_width, "worst": m.worst, "one_step": error.get(n)}
             for n, m in means.items()
         ]  # fmt: skip
-    if best is not None:
+    if (best := about.get("best")) is not None:
         reference_line(axes[0, 0], factor * best, "the best possible")
     axes[0, 0].set_xscale("log")
     axes[1, 0].set(

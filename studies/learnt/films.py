@@ -12,12 +12,12 @@ from simgap_files import atomic_write_bytes
 from sims.render import renderer_for
 from sims.simulator import Simulator
 from studies.learnt.report import read_episodes
+from studies.learnt.words import shown
 from studies.reporting.media import encode_gif
 
 # So much of an episode is filmed, in s, and of a slow system at least so many control periods.
 _SECONDS, _LEAST_STEPS = 6.0, 60
 _FRAME = 0.05  # s between pictures, if the control period is shorter
-_SHOWN = ("idealised", "corrected", "true")
 
 
 def write_films(results: Mapping[str, Any], folder: Path, simulator: Simulator) -> list[Path]:
@@ -26,10 +26,8 @@ def write_films(results: Mapping[str, Any], folder: Path, simulator: Simulator) 
         renderer_for(simulator)
     except ValueError:  # it does not say how it looks, or this machine cannot draw it
         return []
-    episodes = read_episodes(results, folder)
-    last = [name for name in episodes if name.startswith("difference")][-1:]
-    paths = []
-    for name in (*_SHOWN, *last):
+    episodes, paths = read_episodes(results, folder), []
+    for name in shown(results):
         if name in episodes:
             paths.append(folder / "films" / f"{name}.gif")
             atomic_write_bytes(paths[-1], film(simulator, episodes[name]["states"]))

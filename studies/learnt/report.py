@@ -29,9 +29,9 @@ from studies.learnt.sections import (
 )
 from studies.learnt.tables import apart, tables_of
 from studies.learnt.verdict import headline
-from studies.learnt.words import Results, by_name, measures_of, policy_name, record_key
-from studies.reporting import Animation, Code, Figure, Gallery, KeyValues, Report, Section
+from studies.learnt.words import Results, measures_of, record_key, shown
 from studies.reporting.figures import save_figure
+from studies.reporting.sections import Animation, Code, Figure, Gallery, KeyValues, Report, Section
 
 Episodes = Mapping[str, Mapping[str, np.ndarray]]
 #: Name of its file, the figure with its numbers, heading, what it shows, caption.
@@ -54,7 +54,6 @@ def write_report(
     episodes: Episodes | None = None,
     films: Mapping[str, Path] | None = None,
     failures: Mapping[Path, str] | None = None,
-    best: float | None = None,
     name: str = "report.html",
 ) -> str:
     """Figures as PNG with their numbers as CSV, and one page, into ``folder``.
@@ -65,7 +64,6 @@ def write_report(
         episodes: Of a single trial, one of each policy on the true system, by ``record_key``.
         films: GIF files of some of them.
         failures: Traceback of every failed trial, by folder.
-        best: The best return that is possible, if it is known.
         name: Of the page.
 
     Returns:
@@ -76,7 +74,7 @@ def write_report(
     once = policies_once(rows)
     measures = list(dict.fromkeys(m for p in results[0]["policies"] for m in measures_of(p)))
     summary = summarise(once, errors, about, measures)
-    sections: list[Section] = headline(once, errors, about, best)
+    sections: list[Section] = headline(once, errors, about)
     if failures:
         text = "\n".join(f"{path}\n{failure}" for path, failure in failures.items())
         count = f"{len(failures)} trials failed and are in no mean"
@@ -85,12 +83,12 @@ def write_report(
     if episodes:
         sections += _before_and_after(results[0], films or {})
         drawings += _of_episodes(results[0], episodes)
-    drawings += _of_returns(results, rows, once, errors, best)
+    drawings += _of_returns(results, rows, once, errors)
     for file, (figure, numbers), heading, alt, caption in drawings:
         save_figure(figure, folder / "figures" / f"{file}.png", numbers)
         sections.append(Figure(figure, alt, caption, heading=heading))
     sections += [
-        policies_section(summary, once, best),
+        policies_section(summary, once, about),
         *accuracy_section(errors, about),
         *samples_section(once, apart(results), about),
         *_provenance(results),
@@ -110,10 +108,10 @@ def write_report(
 
 def _before_and_after(results: Results, films: Mapping[str, Path]) -> list[Section]:
     """The films of the policies that pictures show, if there are any."""
-    moving = {title: films[key] for key, title in _shown(results).items() if key in films}
     pictures = [
-        Animation(path, f"The true system under the policy: {title}.", title)
-        for title, path in moving.items()
+        Animation(films[key], f"The true system under the policy: {title}.", title)
+        for key, title in shown(results).items()
+        if key in films
     ]
     caption = "The first seconds on the **true** system."
     return [Gallery(pictures, caption, heading="Before and after")] if pictures else []
@@ -122,7 +120,7 @@ def _before_and_after(results: Results, films: Mapping[str, Path]) -> list[Secti
 def _of_episodes(results: Results, episodes: Episodes) -> list[Drawing]:
     """Pictures of one episode of each policy on the true system."""
     about = results["about"]
-    drawn = {title: episodes[key] for key, title in _shown(results).items() if key in episodes}
+    drawn = {title: episodes[key] for key, title in shown(results).items() if key in episodes}
     drawings = [(
         "trajectories", episodes_figure(about, drawn), "Episodes on the true system",
         "State and action over time for each policy on the true system.",
@@ -139,15 +137,14 @@ def _of_episodes(results: Results, episodes: Episodes) -> list[Drawing]:
 
 
 def _of_returns(
-    results: Sequence[Results], rows: pd.DataFrame, once: pd.DataFrame, errors: pd.DataFrame,
-    best: float | None,
-) -> list[Drawing]:  # fmt: skip
+    results: Sequence[Results], rows: pd.DataFrame, once: pd.DataFrame, errors: pd.DataFrame
+) -> list[Drawing]:
     """Pictures of the returns by budget, by update and while learning, those that say something."""
     about, drawings = results[0]["about"], []
     learnt = rows[rows["name"] == "difference"]
     if learnt["samples_per_update"].nunique() > 1:
         drawings.append((
-            "budgets", budgets_figure(rows, errors, about, best), "Return by sample budget",
+            "budgets", budgets_figure(rows, errors, about), "Return by sample budget",
             "Return and accuracy against the number of true samples for each estimator.",
             "After one update, mean and 95 % interval of the mean over seeds; below, the one-step "
             "error where the policy goes, as a share of the gap.",
@@ -169,16 +166,6 @@ def _of_returns(
     return drawings
 
 
-def _shown(results: Results) -> dict[str, str]:
-    """The policies that pictures show: name of their files, and in words."""
-    last = by_name(results, "difference")[-1:]
-    shown = [
-        *by_name(results, "idealised"), *last, *by_name(results, "corrected"),
-        *by_name(results, "true"),
-    ]  # fmt: skip
-    return {record_key(record): policy_name(record) for record in shown}
-
-
 def _provenance(results: Sequence[Results]) -> list[Section]:
     """What made the numbers."""
     sections: list[Section] = []
@@ -186,6 +173,5 @@ def _provenance(results: Sequence[Results]) -> list[Section]:
         sections.append(KeyValues(dict(results[0]["versions"]), heading="Versions"))
     if len(results) == 1 and "config" in results[0]:
         settings = yaml.safe_dump(results[0]["config"], sort_keys=False)
-        summary = "The resolved configuration"
-        sections.append(Code(settings, summary=summary, heading="Configuration"))
+        sections.append(Code(settings, "The resolved configuration", heading="Configuration"))
     return sections

@@ -9,7 +9,7 @@ import pandas as pd
 
 from studies.learnt.statistics import mean
 from studies.learnt.words import NEAR, POLICY_WORDS, Results
-from studies.reporting import Section, Table
+from studies.reporting.sections import Section, Table
 
 
 def samples_section(
@@ -51,20 +51,18 @@ def samples_section(
 
 def samples_to(target: float, results: Sequence[Results]) -> dict[str, dict[int, int | None]]:
     """By method and seed, the true samples after which ``target`` was first reached."""
-    reached: dict[str, dict[int, int | None]] = {}
-
-    def note(method: str, seed: int, values: Sequence[int]) -> None:
-        by_seed = reached.setdefault(method, {})
-        known = by_seed.get(seed)
-        every = [*values, *([known] if known is not None else [])]
-        by_seed[seed] = min(every) if every else None
-
+    reached: dict[str, dict[int, list[int]]] = {}
     for trial in results:
-        loop = [p for p in trial["policies"] if p["name"] in ("idealised", "difference")]
-        at = [p["true_samples"] for p in loop if p["return_true"] >= target]
-        note(f"difference model, {trial['label']}", trial["seed"], at)
+        at: dict[str, list[int]] = {f"difference model, {trial['label']}": []}
         for record in trial["policies"]:
             if record["name"] in ("cold", "warm"):
                 steps = [step for step, value in record["curve"] if value >= target]
-                note(record["name"], trial["seed"], steps)
-    return reached
+                at.setdefault(record["name"], []).extend(steps)
+            elif record["name"] in ("idealised", "difference") and record["return_true"] >= target:
+                next(iter(at.values())).append(record["true_samples"])
+        for method, values in at.items():
+            reached.setdefault(method, {}).setdefault(trial["seed"], []).extend(values)
+    return {
+        method: {seed: min(values, default=None) for seed, values in by_seed.items()}
+        for method, by_seed in reached.items()
+    }

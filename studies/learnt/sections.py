@@ -10,10 +10,9 @@ import numpy as np
 import pandas as pd
 
 from studies.learnt.errors import by_group, model_errors
-from studies.learnt.pairs import above, starts
-from studies.learnt.statistics import Mean, mean
+from studies.learnt.statistics import Mean, above, mean, starts
 from studies.learnt.words import POLICY_WORDS, duration
-from studies.reporting import Section, Table
+from studies.reporting.sections import Section, Table
 
 About = Mapping[str, Any]
 
@@ -103,8 +102,9 @@ def legend(summary: pd.DataFrame, once: pd.DataFrame) -> list[str]:
     return says
 
 
-def policies_section(summary: pd.DataFrame, once: pd.DataFrame, best: float | None) -> Table:
+def policies_section(summary: pd.DataFrame, once: pd.DataFrame, about: About) -> Table:
     """What ``summarise`` found."""
+    best = about.get("best")
     known = [f"The best return that is possible is {best:.0f}."] if best is not None else []
     caption = " ".join([*legend(summary, once), *known])
     return Table.of(summary, heading="Policies", caption=caption, digits=2)

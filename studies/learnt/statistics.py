@@ -1,4 +1,4 @@
-"""Means over seeds with their intervals."""
+"""Means over seeds with their intervals, and by how much policies differ in pairs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
 from scipy import stats
+
+from studies.learnt.tables import BY_START
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,11 +42,9 @@ class Mean:
         if self.count == 1:
             return return_text(self.value)
         larger = max(abs(self.value), float(np.nan_to_num(self.half_width)))
-        if abs(self.value) >= 100:
-            return self._decimals(0)
         # Of what is small, two digits.
         size = np.floor(np.log10(larger)) if larger else 0
-        return self._decimals(int(np.clip(1 - size, 1, 9)))
+        return self._decimals(0 if abs(self.value) >= 100 else int(np.clip(1 - size, 1, 9)))
 
     def text(self, digits: int) -> str:
         """The mean to so many digits, and its interval."""
@@ -53,10 +54,9 @@ class Mean:
         return self._decimals(int(max(0, digits - 1 - size)))
 
     def _decimals(self, digits: int) -> str:
-        if self.count == 1:
-            return f"{self.value:.{digits}f}"
         # With spaces that do not break a line.
-        return f"{self.value:.{digits}f}\u00a0±\u00a0{self.half_width:.{digits}f}"
+        interval = "" if self.count == 1 else f"\u00a0±\u00a0{self.half_width:.{digits}f}"
+        return f"{self.value:.{digits}f}{interval}"
 
 
 def mean(values: Sequence[float]) -> Mean:
@@ -70,11 +70,35 @@ def mean(values: Sequence[float]) -> Mean:
         raise ValueError("a mean needs at least one value")
     half = np.nan
     if len(sample) > 1:
-        standard_error = sample.std(ddof=1) / np.sqrt(len(sample))
-        half = float(stats.t.ppf(0.975, len(sample) - 1) * standard_error)
+        half = float(stats.t.ppf(0.975, len(sample) - 1) * stats.sem(sample))
     return Mean(float(sample.mean()), half, float(sample.min()), len(sample))
 
 
 def return_text(value: float) -> str:
     """A return as people write it: five digits, and of what is large the units."""
     return f"{value:.0f}" if 1e5 <= abs(value) < 1e9 else f"{value:.5g}"
+
+
+def above(one: pd.DataFrame, other: pd.DataFrame) -> list[float]:
+    """Returns on the true system of one kind of policy less those of another.
+
+    Args:
+        one: Rows of ``tables.policy_rows``, one for each seed.
+        other: The same of another kind; rows of other settings do not count.
+
+    Returns:
+        Of several seeds one difference for each that both have; of a single one a difference for
+        each common start, or of the means if none was kept. Empty without a common seed.
+    """
+    keys = ["seed", *(["settings"] if "settings" in one and "settings" in other else [])]
+    pairs = one.merge(other.drop_duplicates(keys), on=keys)
+    if len(pairs) == 1:
+        first, second = (pairs[f"{BY_START}_{side}"].iloc[0] for side in ("x", "y"))
+        if common := [first[start] - second[start] for start in first if start in second]:
+            return common
+    return [float(value) for value in pairs["return_true_x"] - pairs["return_true_y"]]
+
+
+def starts(rows: pd.DataFrame) -> int:
+    """From how many starts each policy was tested on the true system."""
+    return max([1, *rows[BY_START].map(len)])

@@ -17,14 +17,8 @@ BY_START = "by_start"
 
 # Policies of trials that differ in these only are the same, or stand in rows of their own.
 _IN_COLUMNS = {
-    "seed",
-    *(
-        f"budget.{name}"
-        for name in (
-            "true_samples", "iterations", "true_steps", "baseline_steps", "control_steps",
-            "corrected_steps",
-        )
-    ),
+    "seed", "budget.true_samples", "budget.iterations", "budget.true_steps",
+    "budget.baseline_steps", "budget.control_steps", "budget.corrected_steps",
 }  # fmt: skip
 
 

@@ -13,10 +13,9 @@ from typing import Any, Literal
 import pandas as pd
 
 from studies.learnt.errors import by_group, model_errors, no_gap
-from studies.learnt.pairs import above, starts
-from studies.learnt.statistics import Mean, mean, return_text
+from studies.learnt.statistics import Mean, above, mean, return_text, starts
 from studies.learnt.words import NEAR, POLICY_WORDS, duration
-from studies.reporting import KeyValues, Section, Verdict
+from studies.reporting.sections import KeyValues, Section, Verdict
 
 About = Mapping[str, Any]
 Tone = Literal["good", "warning", "bad", "neutral"]
@@ -88,16 +87,13 @@ class Evidence:
         return "gap closed", "good"
 
 
-def headline(
-    once: pd.DataFrame, errors: pd.DataFrame, about: About, best: float | None
-) -> list[Section]:
+def headline(once: pd.DataFrame, errors: pd.DataFrame, about: About) -> list[Section]:
     """Did it work, was it the difference model's doing, and in which numbers?
 
     Args:
         once: Every policy once, as ``policies_once`` gives them.
         errors: One row for each measurement of accuracy.
         about: The system.
-        best: The best return that is possible, if it is known.
     """
     kinds = {str(name): part for name, part in once.groupby("name")}
     before, target = kinds["idealised"], about["target"]
@@ -112,8 +108,9 @@ def headline(
     chosen, reached = _chosen(learnt, target)
     samples, estimator, update = chosen.iloc[0][_PLACE]
     seen = model_errors(errors, estimator, samples, update)
-    control, value = _control(kinds, update), _value(chosen)
-    pairs = above(chosen, control) if control is not None else []
+    value = _value(chosen)
+    control = once[(once["name"] == "control") & (once["iteration"] == update)]
+    pairs = above(chosen, control) if len(control) else []
     true = _value(kinds["true"]) if "true" in kinds else None
     worst, error = _worst(seen, about)
     found = Evidence(
@@ -131,10 +128,10 @@ def headline(
     needed = f"{samples} true samples, {duration(samples * about['dt'])}"
     gone = f"from {return_text(start)} to {return_text(value)} ({by}, {needed})"
     went = f"On the true system the return went {gone}."
-    alone = _value(control) if control is not None else None
+    alone = _value(control) if len(control) else None
     text = [went] if found.same else []
     text += [_of_gain(found, starts(chosen)), *_of_target(found, target)]
-    text += [*_of_cause(found, alone), *_of_rest(found, true, best)]
+    text += [*_of_cause(found, alone), *_of_rest(found, true, about.get("best"))]
     tiles = {
         "idealised policy": return_text(start), f"after update {update}": return_text(value),
         "gain": str(found.gain), "true interaction": duration(samples * about["dt"]),
@@ -211,14 +208,6 @@ def _of_rest(found: Evidence, true: float | None, best: float | None) -> list[st
 def _value(rows: pd.DataFrame) -> float:
     """The mean return on the true system over seeds."""
     return float(rows.groupby("seed")["return_true"].mean().mean())
-
-
-def _control(kinds: Mapping[str, pd.DataFrame], update: int) -> pd.DataFrame | None:
-    """As much training without a difference model, if there is any."""
-    if "control" not in kinds:
-        return None
-    rows = kinds["control"][kinds["control"]["iteration"] == update]
-    return rows if len(rows) else None
 
 
 def _worst(seen: pd.DataFrame, about: About) -> tuple[str, float | None]:

@@ -1,19 +1,16 @@
-"""What a study left, in words: policies by name, errors by group, times."""
+"""What a study left, in words: policies by name, times."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 Results = Mapping[str, Any]
 Record = Mapping[str, Any]
-Errors = Mapping[str, float | None]
 #: A state, and which of the tests from it.
 Start = tuple[tuple[float, ...], int]
-Groups = Mapping[str, Sequence[str]]
 
 POLICY_WORDS = {
     "idealised": "idealised policy",
@@ -31,11 +28,6 @@ NEAR = 0.9
 def policy_name(record: Record) -> str:
     """A policy in words."""
     return POLICY_WORDS[record["name"]].format(**record)
-
-
-def by_name(results: Results, name: str) -> list[Record]:
-    """The records of one kind of policy, in order."""
-    return [record for record in results["policies"] if record["name"] == name]
 
 
 def measures_of(record: Record) -> dict[str, float]:
@@ -59,20 +51,16 @@ def returns_by_start(record: Record) -> dict[Start, float]:
     return found
 
 
-def grouped(errors: Errors, groups: Groups) -> dict[str, float]:
-    """Errors by channel, averaged within each group; a channel without a number is left out."""
-    found = {}
-    for name, channels in groups.items():
-        values = [errors[c] for c in channels if c in errors]
-        finite = [value for value in values if value is not None and np.isfinite(value)]
-        if finite:
-            found[name] = float(np.mean(finite))
-    return found
-
-
 def duration(seconds: float) -> str:
     """A time that a reader can grasp."""
     return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.1f} min"
+
+
+def shown(results: Results) -> dict[str, str]:
+    """The policies that pictures and films show: name of their files, and in words."""
+    names = ("idealised", "difference", "corrected", "true")
+    last = {record["name"]: record for record in results["policies"]}
+    return {record_key(last[name]): policy_name(last[name]) for name in names if name in last}
 
 
 def record_key(record: Record) -> str:

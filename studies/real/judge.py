@@ -1,4 +1,4 @@
-"""A rig asked and judged: find_gap on the fit part, three simulators on the judge part."""
+"""A rig asked and judged: its names by the key, three simulators on the judge part."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from residual.gap.result import Verdict
 from residual.logs import LogFormat
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
+from sims.effects.library import library
 from sims.host import HostSimulator
 from sims.loading import load_simulator
 from studies import find_gap
@@ -23,9 +24,50 @@ from studies.gap.files import CORRECTED
 from studies.judging.forecasts import Forecasts, plan, root_mean_squares
 from studies.judging.oracle import fit_effects
 from studies.real import phone
-from studies.real.names import Named, named
 from studies.real.prepare import local_slope
 from studies.real.rigs import Part, Rig
+
+
+@dataclasses.dataclass(frozen=True)
+class Named:
+    """Names against a key.
+
+    Attributes:
+        right: For each thing that is wanted: ``"confirmed"``, ``"one of ..."`` families, or
+            ``"missing"``.
+        wrong: Confirmed labels that the key does not support.
+    """
+
+    right: tuple[str, ...]
+    wrong: tuple[str, ...]
+
+    @property
+    def enough(self) -> bool:
+        """Everything wanted is confirmed, or one of at most two families."""
+        return all(how in ("confirmed", "one of 1", "one of 2") for how in self.right)
+
+
+def named(rig: Rig, simulator: HostSimulator, verdicts: Sequence[Verdict]) -> Named:
+    """Compare verdicts with the key of a rig."""
+    family = {str(effect): _family(effect, simulator) for effect in library(simulator)}
+    chosen = [v for v in verdicts if v.effect and v.kind in ("confirmed", "ambiguous")]
+    right = []
+    for accepted in rig.wanted:
+        offers = [{v.label, *v.alternatives} for v in chosen]
+        families = [{family.get(name, name) for name in some} for some in offers if some & accepted]
+        if any(v.kind == "confirmed" and v.label in accepted for v in chosen):
+            right.append("confirmed")
+        else:
+            right.append(f"one of {len(families[0])}" if families else "missing")
+    sure = [v.label for v in verdicts if v.kind == "confirmed" and v.effect]
+    return Named(tuple(right), tuple(label for label in sure if label not in rig.allowed))
+
+
+def _family(effect: Effect, simulator: HostSimulator) -> str:
+    """Family and place, so that the friction of two joints is not one thing."""
+    family = effect.family_in(simulator)
+    return f"{family}@{effect.where}" if family and effect.enters != "parameter" else str(effect)
+
 
 CONFIGS = Path(studies.__file__).parent / "configs" / "find_gap"
 
@@ -93,11 +135,9 @@ class Judge:
         ours = ("output", "jobs", "config")
         self.settings = {k: v for k, v in parser.plain(given).items() if k not in ours}
         made = parser.instantiate(given)
-        asked: HostSimulator = made["simulator"]
-        hold = made["hold"]
-        self.simulator = asked
-        if hold != "auto":
-            self.simulator = asked.with_hold({c.name: hold for c in asked.action_channels})
+        self.simulator: HostSimulator = made["simulator"]
+        if hold := find_gap.holds(self.simulator, made["hold"]):
+            self.simulator = self.simulator.with_hold(hold)
         self._format: LogFormat = made["columns"]
         self._fit = self._read(rig.fit, logs)
         self._runs = self._read(rig.judge, files_of(rig, rig.judge, data, scratch))
@@ -124,11 +164,8 @@ class Judge:
         return plan(self.simulator, runs, self.rig.horizon)
 
     def _read(self, part: Part, logs: Sequence[Path]) -> list[Trajectory]:
-        changed = {
-            name: value
-            for name in ("start", "stop", "only")
-            if (value := getattr(part, name)) is not None
-        }
+        given = {name: getattr(part, name) for name in ("start", "stop", "only")}
+        changed = {name: value for name, value in given.items() if value is not None}
         states = {**self._format.states, **self.rig.derived}
         layout = dataclasses.replace(self._format, states=states, **changed)
         data = find_gap.read(self.simulator, [str(log) for log in logs], layout)

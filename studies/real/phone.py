@@ -21,16 +21,9 @@ Array = NDArray[np.float64]
 def speed_change_error(simulator: HostSimulator, trials: Sequence[Trajectory]) -> float:
     """Root mean square over trials of the error of the speed change over the second half, m/s."""
     misses, times = _accelerations_missed(simulator, trials, 0.5)
-    return float(
-        np.sqrt(
-            np.mean(
-                [
-                    float(miss[len(miss) // 2 :] @ step[len(miss) // 2 :]) ** 2
-                    for miss, step in zip(misses, times, strict=True)
-                ]
-            )
-        )
-    )
+    late = [len(miss) // 2 for miss in misses]
+    changes = [m[k:] @ t[k:] for m, t, k in zip(misses, times, late, strict=True)]
+    return float(np.sqrt(np.mean(np.square(changes))))
 
 
 def fit_drag(simulator: HostSimulator, trials: Sequence[Trajectory]) -> QuadraticDrag:

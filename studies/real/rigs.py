@@ -14,12 +14,7 @@ from sims.effects.base import Effect
 from studies.real.prepare import cut_coast, sum_accelerations
 
 #: What takes energy out of a joint.
-FRICTION = (
-    "viscous_friction",
-    "coulomb_friction",
-    "stribeck_friction",
-    "directional_friction",
-)
+FRICTION = ("viscous_friction", "coulomb_friction", "stribeck_friction", "directional_friction")
 DISSIPATION = (*FRICTION, "quadratic_drag")
 LATE = ("delay", "actuator_lag")
 
@@ -104,22 +99,6 @@ def _coast(source: Path, target: Path) -> None:
     cut_coast(source, target, *ROCKETS[source.name])
 
 
-def _drives(names: Sequence[str], *kinds: Callable[[str], Effect]) -> tuple[Effect, ...]:
-    return tuple(kind(name) for name in names for kind in kinds)
-
-
-def _inertia(name: str) -> Effect:
-    return known.ParameterChange(f"inertia {name}")
-
-
-def _viscous(name: str) -> Effect:
-    return known.ViscousFriction(f"angle {name}")
-
-
-def _coulomb(name: str) -> Effect:
-    return known.CoulombFriction(f"angle {name}")
-
-
 RIGS: Sequence[Rig] = (
     Rig(
         "airtrack",
@@ -170,8 +149,7 @@ RIGS: Sequence[Rig] = (
         judged=(("angle",),),
         key=(known.ActuatorGain("torque"), known.CoulombFriction("angle")),
         wanted=(frozenset({"actuator_gain@torque", "payload", "inertia"}),),
-        supported=_at(("coulomb_friction", "stribeck_friction", "directional_friction"), "angle")
-        | {"moment"},
+        supported=_at(FRICTION[1:], "angle") | {"moment"},
     ),
     Rig(
         "arm-three-axes",
@@ -179,7 +157,11 @@ RIGS: Sequence[Rig] = (
         judge=Part(("run.csv",), start=4.5, stop=7.4),
         horizon=0.1,
         judged=(("rate 1",), ("rate 4",), ("rate 6",)),
-        key=_drives("146", _viscous, _coulomb),
+        key=tuple(
+            kind(f"angle {n}")
+            for n in "146"
+            for kind in (known.ViscousFriction, known.CoulombFriction)
+        ),
         wanted=tuple(_at(FRICTION, f"angle {n}") for n in "146"),
         slopes=0.02,
     ),
@@ -189,7 +171,14 @@ RIGS: Sequence[Rig] = (
         judge=Part(_numbered(range(2, 21, 2))),
         horizon=0.3,
         judged=(("rate 1",), ("rate 5",), ("rate 6",)),
-        key=_drives("156", _viscous, _inertia),
+        key=tuple(
+            effect
+            for n in "156"
+            for effect in (
+                known.ViscousFriction(f"angle {n}"),
+                known.ParameterChange(f"inertia {n}"),
+            )
+        ),
         wanted=tuple(_at(FRICTION, f"angle {n}") for n in "156"),
         supported=frozenset({"inertia 1", "inertia 5", "inertia 6"}),
     ),

@@ -28,7 +28,7 @@ class FreeCart(EquationOfMotion):
         Channel("velocity", "m/s", "rate", rate_of="position", scale=100.0),
     )
     action_channels = ()
-    parameters = {"mass": Parameter(1.0, "kg", "mass of the cart", low=1e-3)}  # noqa: RUF012
+    parameters = {"mass": Parameter(1.0, "kg", "mass of the cart", low=1e-3)}
 
     def acceleration(self, q: Array, v: Array, u: Array, force: Array, p: Any) -> Array:
         """Force over mass."""
@@ -93,7 +93,7 @@ class Heater(FirstOrderSystem):
     substeps = 2
     state_channels = (Channel("temperature", "K", "other", scale=50.0),)
     action_channels = (Channel("level", "1", "input", scale=150.0),)
-    parameters = {  # noqa: RUF012
+    parameters = {
         "gain": Parameter(0.3635, "K", "warming for one unit of drive level", low=0.0),
         "time_constant": Parameter(138.7, "s", "time constant", low=1.0),
         "ambient": Parameter(299.53, "K", "temperature without heating"),
@@ -179,7 +179,7 @@ class Car(FirstOrderSystem):
         Channel("steering", "rad", "input", scale=0.2),
         Channel("speed_command", "m/s", "input"),
     )
-    parameters = {"wheelbase": Parameter(0.3302, "m", "wheelbase", low=0.01)}  # noqa: RUF012
+    parameters = {"wheelbase": Parameter(0.3302, "m", "wheelbase", low=0.01)}
 
     def derivative(self, x: Array, u: Array, p: Any) -> Array:
         """Rolling without slip."""

@@ -110,19 +110,10 @@ def draw_lines(axis: Axes, series: Mapping[str, tuple[ArrayLike, ArrayLike]]) ->
         axis.plot(x, y, label=name, marker="o" if few else None, markersize=4.5)
 
 
-def draw_over_time(
-    figure: Figure,
-    axes: np.ndarray,
-    rows: Mapping[str, Mapping[str, tuple[ArrayLike, ArrayLike]]],
-) -> None:
-    """Draw curves over time below each other, by their label, with one legend above them."""
-    for axis, (label, series) in zip(axes, rows.items(), strict=True):
-        draw_lines(axis, series)
-        axis.set_ylabel(label)
-    axes[-1].set_xlabel("time (s)")
-    figure.legend(
-        *axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=2, handlelength=1.4
-    )
+def legend_above(figure: Figure, axis: Axes, columns: int = 2) -> None:
+    """One legend above all axes, of the curves in one of them."""
+    curves = axis.get_legend_handles_labels()
+    figure.legend(*curves, loc="outside upper left", ncols=columns, handlelength=1.4)
 
 
 def save_figure(

@@ -21,11 +21,7 @@ _LARGEST_SVG = 400_000
 # Inches: on a phone's 360 px, text of 10 points is then 12 px high.
 _NARROW = 4.0
 
-_SIGNATURES = (
-    (b"\x89PNG\r\n\x1a\n", "image/png"),
-    (b"\xff\xd8\xff", "image/jpeg"),
-    (b"GIF8", "image/gif"),
-)
+_SIGNATURES = {b"\x89PNG\r\n\x1a\n": "image/png", b"GIF8": "image/gif"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +49,7 @@ def load_media(source: Figure | Media | bytes | str | Path) -> Media:
 
     Raises:
         OSError: The file cannot be read.
-        ValueError: It is none of PNG, JPEG, GIF, SVG.
+        ValueError: It is none of PNG, GIF.
     """
     if isinstance(source, Media):
         return source
@@ -63,13 +59,11 @@ def load_media(source: Figure | Media | bytes | str | Path) -> Media:
             return Media(svg, "image/svg+xml", adaptive=True)
         return Media(to_png(source), "image/png")
     data = source if isinstance(source, bytes) else Path(source).read_bytes()
-    name = "the picture" if isinstance(source, bytes) else str(source)
-    for signature, kind in _SIGNATURES:
+    for signature, kind in _SIGNATURES.items():
         if data.startswith(signature):
             return Media(data, kind)
-    if b"<svg" in data[:2000]:
-        return Media(data, "image/svg+xml")
-    raise ValueError(f"{name} is none of PNG, JPEG, GIF, SVG")
+    name = "the picture" if isinstance(source, bytes) else str(source)
+    raise ValueError(f"{name} is none of PNG, GIF")
 
 
 def narrowed(source: object) -> Media | None:

@@ -1,4 +1,4 @@
-"""Templates: HTML files in ``templates/``, one for each section, filled in by Jinja2."""
+"""Templates: files in ``templates/``, HTML for each section and Markdown, filled in by Jinja2."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _CODE = re.compile(r"`([^`]+)`")
 
 
 def render(template: str, **values: Any) -> Markup:
-    """Fill in one template of ``templates/``; everything that is not ``Markup`` is escaped.
+    """Fill in one template of ``templates/``; in HTML all but ``Markup`` is escaped.
 
     Raises:
         jinja2.UndefinedError: The template uses a value that is not given.
@@ -99,7 +99,7 @@ def _float(value: float, digits: int) -> str:
 def _environment() -> jinja2.Environment:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("studies.reporting"),
-        autoescape=True,
+        autoescape=lambda name: str(name).endswith(".html"),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

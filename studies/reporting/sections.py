@@ -1,15 +1,19 @@
-"""The building blocks of a report: frozen dataclasses, each with the template of its name."""
+"""A report and its building blocks: frozen dataclasses, each with the template of its name.
+
+``Report("Pendulum", "One update.", [Verdict("It works.", tone="good")]).write(path)``
+"""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import pandas as pd
 from matplotlib.figure import Figure as MatplotlibFigure
 
+from simgap_files import atomic_write_text
 from studies.reporting.media import Media, load_media, narrowed, still
 from studies.reporting.render import render
 
@@ -67,7 +71,7 @@ class Picture(Section):
     """What a still and a moving picture share.
 
     Args:
-        source: A matplotlib figure, or the bytes or path of a PNG, SVG, JPEG or GIF.
+        source: A matplotlib figure, or the bytes or path of a PNG or GIF.
         alt: What it shows, for those who cannot see it: the finding, not "a plot".
         caption: Text under it; markup as in ``Prose``.
     """
@@ -81,6 +85,10 @@ class Picture(Section):
         """``source``, ready to be put into the page."""
         return load_media(self.source)
 
+    def small(self) -> Self:
+        """The same for a place beside others; by default there is one size."""
+        return self
+
 
 @dataclasses.dataclass(frozen=True)
 class Figure(Picture):
@@ -93,7 +101,7 @@ class Figure(Picture):
         """A matplotlib figure of one column laid out anew for screens up to 640 px wide."""
         return narrowed(self.source)
 
-    def small(self) -> Figure:
+    def small(self) -> Self:
         """The same with its narrow picture at any width."""
         return dataclasses.replace(self, source=self.narrow_picture or self.picture)
 
@@ -120,10 +128,6 @@ class Animation(Picture):
     def still(self) -> Media | None:
         """The middle frame."""
         return still(self.picture)
-
-    def small(self) -> Animation:
-        """Itself: an animation has one size."""
-        return self
 
 
 @dataclasses.dataclass(frozen=True)
@@ -180,13 +184,11 @@ class KeyValues(Section):
     Args:
         items: Value by name, in order; a unit belongs into the value's text.
         style: ``"tiles"`` for up to about six headline numbers, ``"list"`` for settings.
-        digits: Significant digits of floats.
     """
 
     template: ClassVar[str] = "key_values.html"
     items: Mapping[str, Cell]
     style: Literal["list", "tiles"] = "list"
-    digits: int = 3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -200,3 +202,36 @@ class Code(Section):
 
 def _is_number(cell: Cell) -> bool:
     return isinstance(cell, float | int) and not isinstance(cell, bool)
+
+
+@dataclasses.dataclass(frozen=True)
+class Report:
+    """One page, read top down: put the verdict first.
+
+    The page carries its pictures and its style inside and, by its content security policy,
+    cannot load anything else. It follows the reader's light or dark scheme and fits a phone.
+
+    Args:
+        title: What was studied; also the name of the browser's tab.
+        subtitle: One sentence under the title.
+        sections: In reading order; those with a heading appear in the list of contents.
+        footer: How the page was made (command, versions), in small print.
+    """
+
+    title: str
+    subtitle: str = ""
+    sections: Sequence[Section] = ()
+    footer: str = ""
+
+    def html(self) -> str:
+        """The page as text; the same report gives the same text."""
+        bodies = [
+            (f"section-{number}", section.heading, section.html())
+            for number, section in enumerate(self.sections, start=1)
+        ]
+        return str(render("report.html", report=self, bodies=bodies))
+
+    def write(self, path: str | Path) -> Path:
+        """Write the page to ``path``, whole or not at all, and return the path."""
+        atomic_write_text(path, self.html())
+        return Path(path)

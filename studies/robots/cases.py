@@ -6,6 +6,7 @@ import dataclasses
 import time
 import zlib
 from collections.abc import Iterator
+from typing import Any, Literal
 
 import numpy as np
 
@@ -20,6 +21,10 @@ SIZE, NOISE, AHEAD = 30.0, 5e-4, 0.3
 #: Strength of what is hidden in a robot that strikes the ground, as a share of its usual size: past
 #: an impact forecasts part for the least change, so that deviations say nothing of sizes.
 SHARE = 0.15
+#: Verdicts that name something.
+NAMES = ("confirmed", "ambiguous", "minor")
+
+Kind = Literal["none", "single", "pair"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,57 +42,24 @@ class Case:
     seed: int
 
 
-@dataclasses.dataclass(frozen=True)
-class Answer:
-    """What find_gap said of a case.
-
-    Attributes:
-        case: The case.
-        sizes: What was hidden.
-        named: Labels that it named, strongest first, with kind and numbers.
-        right: Whether the names are those hidden, or cannot be told from them by any motion, or
-            leave the form within its family undecided; with several hidden, whether all of them
-            are among the first as many names.
-        by_family: Whether that rests on a form that was left undecided.
-        confirmed_wrong: Names confirmed that are neither.
-        remainder: Whether it says that something is left.
-        processor: Seconds of processor time.
-    """
-
-    case: Case
-    sizes: dict[str, float]
-    named: tuple[tuple[str, str, dict[str, tuple[float, float, float]]], ...]
-    right: bool
-    by_family: bool
-    confirmed_wrong: tuple[str, ...]
-    remainder: bool
-    processor: float
-
-
 def nominal(robot: str) -> MujocoSimulator:
     """A shipped model as a simulator."""
     return MujocoSimulator(str(MODELS / f"{robot}.xml"))
 
 
-def cases(robot: str, kind: str, seeds: range) -> Iterator[Case]:
-    """Cases of a kind: ``"none"``, ``"single"`` (each effect of the library) or ``"pair"``."""
-    simulator = nominal(robot)
-    names = [str(effect) for effect in simulator.offered_effects()]
-    if kind == "none":
-        for seed in seeds:
+def cases(robot: str, kind: Kind, seeds: range) -> Iterator[Case]:
+    """Cases of a kind: nothing, each effect of the library, or a friction and a payload."""
+    names = [str(effect) for effect in nominal(robot).offered_effects()]
+    for seed in seeds:
+        if kind == "none":
             yield Case(robot, (), seed)
-    elif kind == "single":
-        for seed in seeds:
-            for name in names:
-                yield Case(robot, (name,), seed)
-    elif kind == "pair":
-        friction = [name for name in names if name.startswith("frictionloss")]
-        masses = [name for name in names if name.startswith("mass")]
-        for seed in seeds:
+        elif kind == "single":
+            yield from (Case(robot, (name,), seed) for name in names)
+        else:
             rng = np.random.default_rng([7, seed])
-            yield Case(robot, (str(rng.choice(friction)), str(rng.choice(masses))), seed)
-    else:
-        raise ValueError(f"there is no kind {kind!r}: none, single or pair")
+            friction = rng.choice([name for name in names if name.startswith("frictionloss")])
+            mass = rng.choice([name for name in names if name.startswith("mass")])
+            yield Case(robot, (str(friction), str(mass)), seed)
 
 
 def strengths(case: Case) -> dict[str, float]:
@@ -146,32 +118,44 @@ def _deviation(
     return float(np.median(np.abs(two - one).max(axis=(1, 2))))
 
 
-def ask(case: Case, minutes: float) -> Answer:
-    """Measure the robot and let find_gap answer."""
+def ask(case: Case) -> dict[str, Any]:
+    """Measure the robot and let find_gap answer.
+
+    Returns:
+        Plain values: ``case``; ``sizes``, what was hidden; ``named``, the labels that it named,
+        strongest first, with kind and numbers; ``right``, whether the names are those hidden, or
+        cannot be told from them by any motion, or leave the form within its family undecided (of
+        several hidden all are among the first as many names); ``by_family``, whether that rests on
+        an undecided form; ``confirmed_wrong``, names confirmed that are neither; ``remainder``,
+        whether it says that something is left; ``processor``, seconds of processor time.
+    """
     sizes = strengths(case)
     runs = 8 if case.robot == "hopper" else 4
     logs = measure(case.robot, sizes, seed=case.seed, runs=runs)
     simulator = nominal(case.robot)
     begin = time.process_time()
-    result = find_gap(simulator, logs, minutes=minutes)
+    result = find_gap(simulator, logs)
     processor = time.process_time() - begin
-    named, forms = [], {}
-    for verdict in result.verdicts:
-        if verdict.effect and verdict.kind in ("confirmed", "ambiguous", "minor"):
-            numbers = {k: (n.value, n.low, n.high) for k, n in verdict.parameters.items()}
-            named.append((verdict.label, verdict.kind, numbers))
-            forms[verdict.label] = {verdict.label, *verdict.form}
+    chosen = [v for v in result.verdicts if v.effect and v.kind in NAMES]
+    forms = {verdict.label: {verdict.label, *verdict.form} for verdict in chosen}
     twins = exact_twins(simulator)
     alike = [twins.get(name, frozenset({name})) for name in case.hidden]
-    first = [label for label, _, _ in named][: len(alike)]
+    first = [verdict.label for verdict in chosen][: len(alike)]
     strictly = all(any(label in group for label in first) for group in alike)
     found = all(any(forms[label] & group for label in first) for group in alike)
-    right = found if alike else not named
-    known = set().union(*alike) if alike else set()
-    wrong = tuple(
-        label for label, kind, _ in named if kind == "confirmed" and not forms[label] & known
-    )
-    remainder = any(verdict.kind == "unexplained" for verdict in result.verdicts)
-    return Answer(
-        case, sizes, tuple(named), right, right and not strictly, wrong, remainder, processor
-    )
+    right = found if alike else not chosen
+    known = frozenset().union(*alike)
+    sure = [verdict.label for verdict in chosen if verdict.kind == "confirmed"]
+    return {
+        "case": dataclasses.asdict(case),
+        "sizes": sizes,
+        "named": [
+            (v.label, v.kind, {k: (n.value, n.low, n.high) for k, n in v.parameters.items()})
+            for v in chosen
+        ],
+        "right": right,
+        "by_family": right and not strictly,
+        "confirmed_wrong": [label for label in sure if not forms[label] & known],
+        "remainder": any(verdict.kind == "unexplained" for verdict in result.verdicts),
+        "processor": processor,
+    }

@@ -108,35 +108,29 @@ class Truth:
             return
         what, _, place = name.rpartition(" of ") if " of " in name else (name, "", "")
         kind, _, element = place.partition(" ")
-        if kind == "joint":
-            d = self._dof(element)
-            fields = {
-                "damping": model.dof_damping,
-                "frictionloss": model.dof_frictionloss,
-                "armature": model.dof_armature,
-            }
-            if what == "quadratic damping":
-                model.dof_dampingpoly[d, 0] += size
-            else:
-                fields[what][d] += size
-        elif kind == "body":
+        shares = {
+            "gain of all actuators": model.actuator_gainprm[:, :3],
+            "damping of all joints": model.dof_damping,
+            "friction of all contacts": model.geom_friction[:, 0],
+        }
+        if kind == "joint" and what == "quadratic damping":
+            model.dof_dampingpoly[self._dof(element), 0] += size
+        elif kind == "joint":
+            getattr(model, f"dof_{what}")[self._dof(element)] += size
+        elif kind == "body" and what == "mass":
             b = model.body(element).id
-            if what == "mass":
-                model.body_inertia[b] *= 1 + size / model.body_mass[b]
-                model.body_mass[b] += size
-            else:
-                model.body_ipos[b, "xyz".index(what[-1])] += size
+            model.body_inertia[b] *= 1 + size / model.body_mass[b]
+            model.body_mass[b] += size
+        elif kind == "body":
+            model.body_ipos[model.body(element).id, "xyz".index(what[-1])] += size
         elif kind == "actuator":
             a = model.actuator(element).id
             model.actuator_gainprm[a, :3] *= 1 + size
             model.actuator_biasprm[a, :3] *= 1 + size
-        elif name == "gain of all actuators":
-            model.actuator_gainprm[:, :3] *= 1 + size
-            model.actuator_biasprm[:, :3] *= 1 + size
-        elif name == "damping of all joints":
-            model.dof_damping *= 1 + size
-        elif name == "friction of all contacts":
-            model.geom_friction[:, 0] *= 1 + size
+        elif name in shares:
+            shares[name] *= 1 + size
+            if "gain" in name:
+                model.actuator_biasprm[:, :3] *= 1 + size
         elif what.startswith("gravity "):
             model.opt.gravity["xyz".index(what[-1])] += size
         else:

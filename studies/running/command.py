@@ -68,11 +68,8 @@ class Parser(jsonargparse.ArgumentParser):
 
     def parse_object(self, cfg_obj: Any, *rest: Any, **options: Any) -> Any:
         """As usual; a robot's model file may stand where a simulator is expected."""
-        for key in ("simulator", "corrected"):
-            value = cfg_obj.get(key) if isinstance(cfg_obj, Mapping) else None
-            if isinstance(value, str):
-                cfg_obj = {**cfg_obj, key: _settings(value) or value}
-        return super().parse_object(cfg_obj, *rest, **options)
+        given = _with_models(cfg_obj) if isinstance(cfg_obj, Mapping) else cfg_obj
+        return super().parse_object(given, *rest, **options)
 
     def parse_string(self, content: str, path: Any = "", *rest: Any, **options: Any) -> Any:
         """As usual; a robot's model file, also one beside the config, may be the simulator."""
@@ -82,16 +79,10 @@ class Parser(jsonargparse.ArgumentParser):
             raise ValueError(f"{path} is no YAML: {simgap_yaml.problem(error)}") from None
         # What a config names is the user's own choice, as what stands on the command line is.
         with trusting(named_packages(given)):
-            if path and names_model(given):
-                given = located(given, str(path))
-                content = yaml.safe_dump(given)
-            for key in ("simulator", "corrected") if isinstance(given, dict) else ():
-                value = given.get(key)
-                if isinstance(value, str):
-                    beside = Path(str(path)).parent / value
-                    if settings := _settings(beside if path and beside.is_file() else value):
-                        given = {**given, key: settings}
-                        content = yaml.safe_dump(given)
+            found = located(given, str(path)) if path and names_model(given) else given
+            if isinstance(found, dict):
+                found = _with_models(found, Path(str(path)).parent if path else None)
+        content = content if found == given else yaml.safe_dump(found)
         return super().parse_string(content, path, *rest, **options)
 
     def plain(self, given: Any) -> dict[str, Any]:
@@ -125,6 +116,18 @@ def _with_lists(arguments: Sequence[str], lists: Container[str]) -> list[str]:
             begun = [] if found[-1] == after else [found.pop().strip("[]")]
             text = f"[{', '.join([*begun, text])}]"
         found.append(text)
+    return found
+
+
+def _with_models(given: Mapping[str, Any], folder: Path | None = None) -> dict[str, Any]:
+    """Settings with a simulator where a robot's model file, maybe in a folder, stood for one."""
+    found = dict(given)
+    for option in _SIMULATORS:
+        key = option.removeprefix("--")
+        value = found.get(key)
+        if isinstance(value, str):
+            beside = folder / value if folder else Path(value)
+            found[key] = _settings(beside if beside.is_file() else value) or value
     return found
 
 

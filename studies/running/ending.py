@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import functools
+import importlib
 import os
 import signal
 import sys
@@ -116,6 +117,11 @@ def on_purpose(error: Exception) -> bool:
         return True
     last = frames[-1]
     return not _ours(Path(last.filename)) or (last.line or "").lstrip().startswith("raise")
+
+
+def run_as_imported(module: str) -> None:
+    """Run the command of a module by its name, so that worker processes find the same classes."""
+    importlib.import_module(module).main()
 
 
 def users_code(error: BaseException) -> str:

@@ -19,9 +19,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from jsonargparse.typing import PositiveInt
+
 from simgap_files import atomic_write_text, read_sealed, write_sealed
-from studies.running.curves import Curves
-from studies.running.progress import Progress, Several
+from studies.running.progress import Curves, Progress, Several
 from studies.running.watching import STATUS, StatusFile, TrialsView
 from studies.running.workers import Backend, Config, workers
 
@@ -36,15 +37,15 @@ _log = logging.getLogger("simgap")
 class Execution:
     """How trials are run; nothing here changes what they compute.
 
-    Attributes:
-        backend: ``"local"``, ``"dask"`` or ``"ray"``.
-        jobs: Local processes.
-        scheduler: Address of a cluster's scheduler.
-        tensorboard: Folder for training curves.
+    Args:
+        backend: Where many trials run: in local processes or on a cluster (docs/scaling.md).
+        jobs: Local processes for many trials.
+        scheduler: Address of the cluster's scheduler, such as tcp://host:8786.
+        tensorboard: Folder for training curves; tensorboard --logdir shows them.
     """
 
     backend: Backend = "local"
-    jobs: int = 1
+    jobs: PositiveInt = 1
     scheduler: str | None = None
     tensorboard: Path | None = None
 
@@ -112,18 +113,15 @@ def read_trials(root: Path) -> tuple[list[dict[str, Any]], Failures]:
     """What the trials of a study left, without running anything.
 
     Args:
-        root: The study's folder. ``study.json`` there names the trials that count; of a folder
-            that was written before there was one, ``results.json`` holds them.
+        root: The study's folder; ``study.json`` there names the trials that count.
 
     Returns:
         The results of all finished trials in the order of the plan, and the tracebacks of
         those that failed by folder.
 
     Raises:
-        FileNotFoundError: Neither file is there.
+        FileNotFoundError: There is no such file.
     """
-    if not (root / PLAN).exists():
-        return read_sealed(root / RESULTS)["trials"], {}
     folders = [root / name for name in read_sealed(root / PLAN)["trials"]]
     results = [read_sealed(folder / RESULTS) for folder in folders if _finished(folder)]
     failures = {

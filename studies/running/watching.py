@@ -19,8 +19,7 @@ from typing import Any
 from tqdm import tqdm
 
 from simgap_files import atomic_write_json, read_json
-from studies.running.progress import Advance
-from studies.running.stream import stderr
+from studies.running.progress import Advance, Numbers, stderr
 
 STATUS = "status.json"
 WRITE_EVERY = 10.0  # seconds; hundreds of trials share a file system
@@ -40,7 +39,7 @@ class StatusFile:
         """A step of ``total`` units; written at its start and every ten seconds."""
         self._write(title, 0, total, "")
 
-        def advance(done: int, note: str = "", values: Mapping[str, float] | None = None) -> None:
+        def advance(done: int, note: str = "", values: Numbers = None) -> None:
             if time.monotonic() - self._written >= WRITE_EVERY:
                 self._write(title, done, total, note)
 
@@ -121,16 +120,14 @@ class TrialsView:
                 self._show_lines(now)
 
     def _show_lines(self, now: Mapping[Path, Mapping[str, Any]]) -> None:
-        shown = list(now.items())[:SHOWN]
-        while len(self._lines) < len(shown):
+        texts = []
+        for folder, status in list(now.items())[:SHOWN]:
+            share = f" {100 * status['done'] // status['total']} %" if status["total"] else ""
+            texts.append(f"{folder.name}: {status['step']}{share} {status['note']}")
+        for place in range(len(self._lines) + 1, len(texts) + 1):
             self._lines.append(
-                tqdm(file=sys.stderr, position=len(self._lines) + 1, leave=False,
-                     bar_format="  {desc}")
-            )  # fmt: skip
-        for k, line in enumerate(self._lines):
-            text = ""
-            if k < len(shown):
-                folder, status = shown[k]
-                share = f" {100 * status['done'] // status['total']} %" if status["total"] else ""
-                text = f"{folder.name}: {status['step']}{share} {status['note']}"
+                tqdm(file=sys.stderr, position=place, leave=False, bar_format="  {desc}")
+            )
+        texts += [""] * (len(self._lines) - len(texts))
+        for line, text in zip(self._lines, texts, strict=True):
             line.set_description_str(text)

@@ -9,7 +9,8 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from studies.reporting.figures import draw_lines, new_figure, save_figure, styled
+from studies.reporting.figures import draw_lines, legend_above, new_figure, save_figure, styled
+from studies.reporting.markdown import filled
 
 TEST = "test_fit_at_scale"
 # Most seconds for 100 000 rows.
@@ -24,38 +25,26 @@ _COLUMNS = {
 }
 
 
-def fits(records: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """The benchmark's records as a table: ``estimator``, ``points`` and what was measured."""
-    found = [record for record in records if record["test"] == TEST]
-    return pd.DataFrame(found, columns=["estimator", "points", *_COLUMNS])
+def fits(records: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """The benchmark's records."""
+    return [record for record in records if record["test"] == TEST]
 
 
-def table_rows(records: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[str]]]:
-    """Head and rows of a Markdown table, by estimator and size."""
-    rows = [
-        [
-            row["estimator"],
-            f"{row['points']}",
-            f"{row['fit_seconds']:.3g}",
-            f"{row['processor_seconds']:.3g}",
-            f"{row['peak_megabytes']:.0f}",
-            f"{row['held_out_error']:.3g}",
-        ]
-        for row in fits(records).to_dict("records")
-    ]
-    return ["estimator", "points", *_COLUMNS.values()], rows
+def table(records: Sequence[Mapping[str, Any]]) -> str:
+    """What fits cost, by estimator and size, in Markdown."""
+    forms = dict.fromkeys(_COLUMNS, ".3g") | {"peak_megabytes": ".0f"}
+    columns = {title: f"{{{name}:{forms[name]}}}" for name, title in _COLUMNS.items()}
+    return filled(fits(records), {"estimator": "{estimator}", "points": "{points}", **columns})
 
 
 def targets(records: Sequence[Mapping[str, Any]]) -> Iterable[tuple[str, float, str, float]]:
     """What, measured, format and the most that is wanted: time, and error against fewer rows."""
-    table = fits(records).set_index(["estimator", "points"])
+    by_size = {(record["estimator"], record["points"]): record for record in fits(records)}
     for name, most in MOST_SECONDS.items():
-        if (name, LARGE) not in table.index:
-            continue
-        large: Any = table.loc[(name, LARGE)]
-        yield f"{name}: fit of {LARGE} Leo-sized points, s", large["fit_seconds"], ".1f", most
-        if (name, MIDDLE) in table.index:
-            middle: Any = table.loc[(name, MIDDLE)]
+        large, middle = (by_size.get((name, size)) for size in (LARGE, MIDDLE))
+        if large:
+            yield f"{name}: fit of {LARGE} Leo-sized points, s", large["fit_seconds"], ".1f", most
+        if large and middle:
             what = f"the same: held-out error, against that at {MIDDLE}"
             yield what, large["held_out_error"], ".3g", middle["held_out_error"]
 
@@ -71,24 +60,16 @@ def write_figure(records: Sequence[Mapping[str, Any]], path: Path) -> Figure | N
     Returns:
         The figure, or nothing if no fit was measured.
     """
-    table = fits(records)
+    table = pd.DataFrame(fits(records), columns=["estimator", "points", *_COLUMNS])
     if table.empty:
         return None
     figure, axes = new_figure(3, 1, height=7.0, share_x=True)
-    for axis, column in zip(
-        axes[:, 0], ("fit_seconds", "peak_megabytes", "held_out_error"), strict=True
-    ):
-        draw_lines(
-            axis,
-            {
-                str(name): (part["points"], part[column])
-                for name, part in table.groupby("estimator", sort=False)
-            },
-        )
+    shown = ("fit_seconds", "peak_megabytes", "held_out_error")
+    for axis, column in zip(axes[:, 0], shown, strict=True):
+        parts = table.groupby("estimator", sort=False)
+        draw_lines(axis, {str(name): (part["points"], part[column]) for name, part in parts})
         axis.set(xscale="log", yscale="log", ylabel=_COLUMNS[column])
     axes[2, 0].set_xlabel("points")
-    figure.legend(
-        *axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=3, handlelength=1.4
-    )
+    legend_above(figure, axes[0, 0], 3)
     save_figure(figure, path, table)
     return figure

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from studies.reporting.markdown import markdown
+from studies.reporting.markdown import filled, markdown
 from studies.timing import fit_scaling
 
 PEERS = {"GaussianProcess": "GaussianProcessRegressor", "DropoutNet": "MLPRegressor"}
@@ -18,7 +18,7 @@ SCALING = "## Cost of a fit against size"
 LEAST_TIMES_DDPG = 2.5
 LEAST_SHARE_OF_PRODUCTS = 0.85
 LEAST_TIMES_GP = 10.0
-MOST_ONE_ROW = 0.2e-3
+MOST_ONE_ROW = 0.2  # ms
 LEAST_CONTROL_STEPS = 8000.0
 MOST_ANSWER = {"Pendulum": 60.0, "PendulumEquation": 20.0, "two joints": 180.0}
 
@@ -71,13 +71,34 @@ def tables(data: Mapping[str, Any]) -> str:
         ("Machine", _machine(data)),
         ("What the project asks of itself", _targets(found)),
         ("DDPG", _ddpg(found)),
-        ("Fitting", _fits(found)),
-        (SCALING.removeprefix("## "), markdown(*fit_scaling.table_rows(found))),
-        ("Predicting", _predictions(found)),
+        ("Fitting", _beside_peers(found, "test_fit_time", "points", "s", 1.0)),
+        (SCALING.removeprefix("## "), fit_scaling.table(found)),
+        ("Predicting", _beside_peers(found, "test_prediction_latency", "rows", "ms", 1e3)),
         ("Simulators", _simulators(found)),
         ("find_gap, from logs to verdicts", _answers(found)),
     ]
     return "\n\n".join(f"## {title}\n\n{text}" for title, text in parts if text) + "\n"
+
+
+def mujoco_tables(measured: Mapping[str, Sequence[Record]]) -> dict[str, str]:
+    """What ``tests/benchmarks/mujoco_models.py`` measured, as tables by the same names."""
+    speeds = {
+        "model": "{robot}",
+        "rows that differ": "{ours:,.0f}",
+        "rows alike": "{alike:,.0f}",
+        "`mujoco.rollout`": "{bare:,.0f}",
+        "share": "{share:.2f}",
+    }
+    rivals = {
+        "hidden": "{hidden}",
+        "": "{who}",
+        "named: change (95 % interval)": "{named}",
+        "false names": "{false}",
+        "held-out error": "{error:.2f} mrad (nominal {nominal:.2f})",
+        "s": "{seconds:.0f}",
+    }
+    columns = {"speeds": speeds, "rivals": rivals}
+    return {name: filled(measured[name], columns[name]) for name in columns}
 
 
 def _machine(data: Mapping[str, Any]) -> str:
@@ -107,25 +128,28 @@ def _targets(found: Sequence[Record]) -> str:
         verdict = "yes" if met else f"no: {value / limit:.2f} times that"
         rows.append([what, format(value, form), f"{sign} {limit:{form}}", verdict])
 
-    for record in _of(found, "test_learn_against_stable_baselines3"):
-        what = f"DDPG, {record['env']}: times stable-baselines3's updates per second"
-        add(what, record["times_stable_baselines3"], ".2f", LEAST_TIMES_DDPG)
-    for record in _of(found, "test_update_against_its_products"):
-        what = f"DDPG, {record['env']}: share of an update that is its matrix products"
-        add(what, record["share_of_products"], ".2f", LEAST_SHARE_OF_PRODUCTS)
+    asked = (
+        ("test_learn_against_stable_baselines3", "times stable-baselines3's updates per second",
+         "times_stable_baselines3", LEAST_TIMES_DDPG),
+        ("test_update_against_its_products", "share of an update that is its matrix products",
+         "share_of_products", LEAST_SHARE_OF_PRODUCTS),
+    )  # fmt: skip
+    for test, what, figure, least in asked:
+        for record in _of(found, test):
+            add(f"DDPG, {record['env']}: {what}", record[figure], ".2f", least)
     own = _one(found, "test_fit_time", estimator="GaussianProcess", points=3750)
     peer = _one(found, "test_fit_time", estimator=PEERS["GaussianProcess"], points=3750)
     if own and peer:
         what = "Gaussian process, fit at 3750 points: times faster than scikit-learn's"
         add(what, peer["seconds"] / own["seconds"], ".1f", LEAST_TIMES_GP)
-        what = "the same: held-out error"
-        add(what, own["held_out_error"], ".3g", peer["held_out_error"], at_least=False)
+        error, most = own["held_out_error"], peer["held_out_error"]
+        add("the same: held-out error", error, ".3g", most, at_least=False)
     for what, value, form, most in fit_scaling.targets(found):
         add(what, value, form, most, at_least=False)
     for name in OURS:
         if own := _one(found, "test_prediction_latency", estimator=name, rows=1):
-            what = f"{name}: prediction of one row, ms"
-            add(what, 1e3 * own["seconds"], ".3f", 1e3 * MOST_ONE_ROW, at_least=False)
+            took = 1e3 * own["seconds"]
+            add(f"{name}: prediction of one row, ms", took, ".3f", MOST_ONE_ROW, at_least=False)
     for system, most in MOST_ANSWER.items():
         seconds = [r["processor_seconds"] for r in found if r.get("system") == system]
         if seconds:
@@ -138,54 +162,29 @@ def _targets(found: Sequence[Record]) -> str:
 
 
 def _ddpg(found: Sequence[Record]) -> str:
-    learn = [
-        [
-            record["env"],
-            f"{record['steps_per_second']:.0f}",
-            f"{record['stable_baselines3_steps_per_second']:.0f}",
-            f"**{record['times_stable_baselines3']:.2f}**",
-        ]
-        for record in _of(found, "test_learn_against_stable_baselines3")
+    learn = {
+        "sizes": "{env}",
+        "ours, steps/s": "{steps_per_second:.0f}",
+        "stable-baselines3, steps/s": "{stable_baselines3_steps_per_second:.0f}",
+        "times": "**{times_stable_baselines3:.2f}**",
+    }
+    update = {
+        "sizes": "{env}",
+        "updates/s alone": "{updates_per_second:.0f}",
+        "share of its own matrix products": "{share_of_products:.2f}",
+        "sgemm peak, Gflop/s": "{matrix_peak_gflop_per_second:.0f}",
+        "share of peak": "**{share_of_peak:.2f}**",
+    }
+    act = {"sizes": "{env}", "one action, µs": "{microseconds:.0f}"}
+    parts = [
+        filled(_of(found, "test_learn_against_stable_baselines3"), learn),
+        filled(_of(found, "test_update_against_its_products"), update),
+        filled(_of(found, "test_act_one_row"), act),
     ]
-    update = [
-        [
-            record["env"],
-            f"{record['updates_per_second']:.0f}",
-            f"{record['share_of_products']:.2f}",
-            f"{record['matrix_peak_gflop_per_second']:.0f}",
-            f"**{record['share_of_peak']:.2f}**",
-        ]
-        for record in _of(found, "test_update_against_its_products")
-    ]
-    act = [
-        [record["env"], f"{record['microseconds']:.0f}"]
-        for record in _of(found, "test_act_one_row")
-    ]
-    return _join(
-        markdown(["sizes", "ours, steps/s", "stable-baselines3, steps/s", "times"], learn),
-        markdown(
-            [
-                "sizes",
-                "updates/s alone",
-                "share of its own matrix products",
-                "sgemm peak, Gflop/s",
-                "share of peak",
-            ],
-            update,
-        ),
-        markdown(["sizes", "one action, µs"], act),
-    )
+    return "\n\n".join(filter(None, parts))
 
 
-def _fits(found: Sequence[Record]) -> str:
-    return _beside_peers(found, "test_fit_time", "points", ("s", 1.0))
-
-
-def _predictions(found: Sequence[Record]) -> str:
-    return _beside_peers(found, "test_prediction_latency", "rows", ("ms", 1e3))
-
-
-def _beside_peers(found: Sequence[Record], test: str, size: str, unit: tuple[str, float]) -> str:
+def _beside_peers(found: Sequence[Record], test: str, size: str, unit: str, times: float) -> str:
     rows = []
     sizes = sorted({record[size] for record in _of(found, test)})
     for name in OURS:
@@ -195,46 +194,42 @@ def _beside_peers(found: Sequence[Record], test: str, size: str, unit: tuple[str
                 continue
             peer = _one(found, test, estimator=PEERS.get(name), **{size: n})
             ratio = f"**{peer['seconds'] / own['seconds']:.3g}**" if peer else NOTHING
-            ours, theirs = _timed(own, unit[1]), _timed(peer, unit[1])
+            ours, theirs = _timed(own, times), _timed(peer, times)
             rows.append([name, str(n), *ours, PEERS.get(name, "no peer"), *theirs, ratio])
-    head = ["ours", size, unit[0], "held-out error", "peer", unit[0], "held-out error", "times"]
+    head = ["ours", size, unit, "held-out error", "peer", unit, "held-out error", "times"]
     return markdown(head, rows)
 
 
-def _timed(record: Record | None, unit: float) -> list[str]:
+def _timed(record: Record | None, times: float) -> list[str]:
     if record is None:
         return [NOTHING, NOTHING]
-    return [f"{unit * record['seconds']:.3g}", f"{record['held_out_error']:.2g}"]
+    return [f"{times * record['seconds']:.3g}", f"{record['held_out_error']:.2g}"]
 
 
 def _simulators(found: Sequence[Record]) -> str:
     speeds = [*_of(found, "test_simulator_speed"), *_of(found, "test_environment_speed")]
-    rows = [
-        [
-            record["simulator"],
-            str(record["rows"]),
-            f"{record['control_steps_per_second']:.0f}",
-            f"{record['gymnasium_steps_per_second']:.0f}",
-            f"**{record['times_gymnasium']:.3g}**",
-            f"{record['error_angle']:.1g}" if "error_angle" in record else NOTHING,
-            f"{record['error_rate']:.1g}" if "error_rate" in record else NOTHING,
-        ]
-        for record in speeds
-    ]
-    head = ["simulator", "rows", "control steps/s", "Gymnasium Pendulum-v1, steps/s", "times"]
-    return markdown([*head, "one-step error, rad", "rad/s"], rows)
+    columns = {
+        "simulator": "{simulator}",
+        "rows": "{rows}",
+        "control steps/s": "{control_steps_per_second:.0f}",
+        "Gymnasium Pendulum-v1, steps/s": "{gymnasium_steps_per_second:.0f}",
+        "times": "**{times_gymnasium:.3g}**",
+        "one-step error, rad": "{error_angle:.1g}",
+        "rad/s": "{error_rate:.1g}",
+    }
+    return filled(speeds, columns)
 
 
 def _answers(found: Sequence[Record]) -> str:
     asked = [*_of(found, "test_find_gap_time"), *_of(found, "test_find_gap_time_of_an_arm")]
-    rows = [
-        [
-            record["system"], str(record["rows"]), record["hidden"],
-            f"{record['kind']}: {record['named']}", f"{record['processor_seconds']:.1f}",
-        ]
-        for record in asked
-    ]  # fmt: skip
-    return markdown(["simulator", "rows", "hidden", "first verdict", "processor s"], rows)
+    columns = {
+        "simulator": "{system}",
+        "rows": "{rows}",
+        "hidden": "{hidden}",
+        "first verdict": "{kind}: {named}",
+        "processor s": "{processor_seconds:.1f}",
+    }
+    return filled(asked, columns)
 
 
 def _of(found: Sequence[Record], test: str) -> list[Record]:
@@ -242,13 +237,5 @@ def _of(found: Sequence[Record], test: str) -> list[Record]:
 
 
 def _one(found: Sequence[Record], test: str, **values: Any) -> Record | None:
-    matching = (
-        record
-        for record in _of(found, test)
-        if all(record.get(key) == value for key, value in values.items())
-    )
+    matching = (record for record in _of(found, test) if values.items() <= record.items())
     return next(matching, None)
-
-
-def _join(*parts: str) -> str:
-    return "\n\n".join(part for part in parts if part)

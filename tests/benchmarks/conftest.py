@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import time
 from collections.abc import Iterator
@@ -21,9 +22,10 @@ START = time.perf_counter()
 @pytest.fixture(scope="session", autouse=True)
 def one_thread_for_all() -> Iterator[None]:
     # The libraries must be loaded to be limited.
-    import scipy.linalg  # noqa: F401
-    import sklearn.utils  # noqa: F401
     import torch
+
+    for name in ("scipy.linalg", "sklearn.utils"):
+        importlib.import_module(name)
 
     threads = torch.get_num_threads()
     torch.set_num_threads(1)

@@ -187,7 +187,7 @@ class DoublePendulum(EquationOfMotion):
         Channel("upper torque", "N m", "input", scale=5.0),
         Channel("lower torque", "N m", "input", scale=2.0),
     )
-    parameters = {  # noqa: RUF012
+    parameters = {
         "upper_mass": Parameter(1.0, "kg", "mass at the end of the upper rod", low=0.1),
         "lower_mass": Parameter(0.6, "kg", "mass at the end of the lower rod", low=0.1),
     }

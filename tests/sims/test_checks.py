@@ -111,7 +111,7 @@ class Falling(EquationOfMotion):
         Channel("speed", "m/s", "rate", rate_of="height"),
     )
     action_channels = ()
-    parameters = {"gravity": Parameter(9.81, "m/s^2", "acceleration of gravity")}  # noqa: RUF012
+    parameters = {"gravity": Parameter(9.81, "m/s^2", "acceleration of gravity")}
 
     def acceleration(self, q, v, u, force, p):
         return (force[:, 0] - p.gravity)[:, None]

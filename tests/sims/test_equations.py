@@ -36,7 +36,7 @@ class CartPole(EquationOfMotion):
         Channel("turning", "rad/s", "rate", rate_of="angle", scale=5.0),
     )
     action_channels = (Channel("push", "N", "input", scale=5.0, low=-10.0, high=10.0),)
-    parameters = {  # noqa: RUF012
+    parameters = {
         "cart": Parameter(CART, "kg", "mass of the cart", low=0.01),
         "bob": Parameter(POLE, "kg", "mass at the end of the rod", low=0.01),
     }

@@ -22,7 +22,7 @@ class Heater(FirstOrderSystem):
     dt = 2.0
     state_channels = (Channel("temperature", "K", "other", scale=20.0),)
     action_channels = (Channel("power", "W", "input", scale=10.0, low=0.0, high=20.0),)
-    parameters = {  # noqa: RUF012
+    parameters = {
         "capacity": Parameter(50.0, "J/K", "heat capacity", low=1.0),
         "loss": Parameter(0.5, "W/K", "heat loss", low=0.0),
     }
@@ -56,7 +56,7 @@ class Wheel(FirstOrderSystem):
     dt = 0.1
     state_channels = (Channel("speed", "rad/s", "rate", scale=10.0),)
     action_channels = (Channel("drive", "V", "input", scale=5.0, low=-12.0, high=12.0),)
-    parameters = {  # noqa: RUF012
+    parameters = {
         "gain": Parameter(4.0, "rad/s^2/V", "acceleration per volt", low=0.01),
     }
 

@@ -236,12 +236,15 @@ def test_the_section_on_mujoco_models_and_the_rest_leave_each_other_alone(
 ):
     (tmp_path / "kept.json").write_text(json.dumps(measured))
     page = tmp_path / "page.md"
-    monkeypatch.setattr("studies.robots.speed.speeds", lambda: [])
+    speed = {"robot": "arm2", "ours": 1.0, "alike": 2.0, "bare": 4.0, "share": 0.25}
+    rival = {"who": "find_gap", "named": "-", "false": "none", "error": 1.0, "nominal": 2.0}
     for size in ("12", "34"):
-        rivals = f"| {size} |"
-        monkeypatch.setattr("studies.robots.beside.table", lambda tell, said=rivals: said)
+        rivals = [rival | {"hidden": f"mass {size}", "seconds": 5.0}]
+        found = {"speeds": [speed], "rivals": rivals}
+        monkeypatch.setattr(benchmarks, "measure_mujoco", lambda found=found: found)
         main(["--mujoco", "--output", str(page)])
         main(["--read", str(tmp_path / "kept.json"), "--output", str(page)])
         text = page.read_text()
         assert text.count("# MuJoCo models") == text.count("# How it was measured") == 1
-        assert rivals in text and ("12" in text.partition("# MuJoCo")[2]) == (size == "12")
+        assert f"| mass {size} | find_gap |" in text and "| arm2 | 1 | 2 | 4 | 0.25 |" in text
+        assert ("mass 12" in text.partition("# MuJoCo")[2]) == (size == "12")

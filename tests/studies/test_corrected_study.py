@@ -10,7 +10,7 @@ from sims.loading import corrected_settings, simulator_settings
 from sims.pendulum import Pendulum
 from sims.tasks import SwingUp
 from studies import pendulum_gap
-from studies.learning.settings import build_parser
+from studies.learning.trial import build_parser
 
 
 def test_the_difference_study_takes_a_corrected_simulator(tmp_path):

@@ -21,8 +21,8 @@ from studies.learning.budget import Budget
 from studies.learning.kept import OnDisk
 from studies.learning.loop import learn_by_difference, run_loop
 from studies.learning.outcome import Learnt
-from studies.learning.settings import trial_label
 from studies.learning.steps import Steps
+from studies.learning.trial import trial_label
 from studies.running.progress import Silent
 
 BUDGET = Budget(
@@ -255,7 +255,7 @@ def test_an_argument_of_another_kind_is_one_line(name, given, says):
 
 def test_without_an_update_there_is_no_model():
     with pytest.raises(ValueError, match="no update was made"):
-        Learnt.of(SYSTEM).model  # noqa: B018
+        Learnt(SYSTEM.description()).model  # noqa: B018
 
 
 def test_systems_of_one_file_have_folders_of_their_own():

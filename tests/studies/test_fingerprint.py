@@ -20,8 +20,7 @@ from sims.tasks import SwingUp
 from studies import learn
 from studies.learning.described import modules_in, settings_of
 from studies.learning.fingerprint import fingerprint, unchanged
-from studies.learning.settings import build_parser, resolve
-from studies.learning.trial import code_of_trial
+from studies.learning.trial import build_parser, code_of_trial, resolve
 
 ROOT = Path(__file__).parents[2]
 # As in a notebook: its code is in no file.

@@ -25,8 +25,8 @@ from studies.gap.answer import headline, notes
 from studies.gap.lead import lead
 from studies.gap.summary import summary
 from studies.gap.verdicts import banners
-from studies.reporting import Prose
-from studies.reporting import Verdict as Banner
+from studies.reporting.sections import Prose
+from studies.reporting.sections import Verdict as Banner
 
 MASS = Verdict(
     "confirmed", "mass", "mass", {"change": Number(0.035, 0.034, 0.036, "kg")},

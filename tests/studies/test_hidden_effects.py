@@ -13,10 +13,10 @@ from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies import report
 from studies.hidden.calibration import run_set, table
+from studies.hidden.counts import share
 from studies.hidden.data import Truth, make_logs
 from studies.hidden.grid import Block, HiddenStudy, trials_of
 from studies.hidden.play import integrate_play
-from studies.hidden.report import share
 from studies.hidden.rivals import one_step, regression
 from studies.hidden.scores import score_names
 from studies.hidden.strengths import HIDDEN, sizes, strength, truth

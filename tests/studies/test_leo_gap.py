@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from studies import leo_gap
+from studies.learnt.errors import by_group
 from studies.learnt.report import write_report
 from studies.learnt.statistics import mean
-from studies.learnt.words import grouped
-from studies.systems.leo import EVALUATION, GROUPS
+from studies.learnt.tables import tables_of
+from studies.systems.leo import EVALUATION
 
 TINY = [
     "--estimator", "residual.Linear",
@@ -55,10 +56,9 @@ def test_every_policy_is_walked_on_the_true_leo_from_several_starts(results):
 
 
 def test_accuracy_is_told_by_group(results):
-    (accuracy,) = results["accuracy"]
-    assert set(grouped(accuracy["visited"]["one_step"], GROUPS)) == {
-        "base", "joint angles", "base rates", "joint rates",
-    }  # fmt: skip
+    errors = by_group(tables_of([results])[1], "one_step", results["about"])
+    assert list(errors) == ["base", "joint angles", "base rates", "joint rates"]
+    assert errors.loc[0].notna().all()
 
 
 def test_the_report_shows_it_walking_and_carries_everything(folder):
@@ -82,8 +82,8 @@ def test_a_table_over_trials(results, tmp_path):
     page = (tmp_path / "report.html").read_text()
     for words in ("309 766", "Samples to a return", "Linear, update 1"):
         assert words in page
-    errors = grouped(results["accuracy"][0]["visited"]["one_step"], GROUPS)
-    assert "Where the difference model is right" in page and f"{errors['base']:.3g}"[:4] in page
+    base = by_group(tables_of([results])[1], "one_step", results["about"])["base"][0]
+    assert "Where the difference model is right" in page and f"{base:.3g}"[:4] in page
 
 
 def test_a_wrong_budget_is_one_line(capsys, tmp_path):

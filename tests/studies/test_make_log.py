@@ -1,8 +1,11 @@
 """Walks become logs that find_gap can read."""
 
+import json
+
 import numpy as np
 import pytest
 
+from policy import Algorithm
 from policy.ddpg import DDPG
 from residual.logs import read_logs
 from sims.environment import SimulatorEnv
@@ -38,3 +41,20 @@ def test_a_walk_needs_a_policy(tmp_path, capsys):
         make_log.main(["--system", "leo", "--output", str(tmp_path)])
     assert stopped.value.code == 2
     assert "--policy" in capsys.readouterr().err
+
+
+def test_a_policy_of_another_algorithm_walks_too(tmp_path, capsys):
+    options = {"policy_kwargs": {"net_arch": [8, 8]}}
+    env = SimulatorEnv(Leo(), Walking())
+    file = tmp_path / "sac.safetensors"
+    Algorithm("stable_baselines3.SAC", options=options).make(env, 0).save(file)
+    command = ["--system", "leo", "--policy", str(file), "--output", str(tmp_path / "walks")]
+    command += ["--walk.transitions", "60"]
+    named = [*command, "--learner", "stable_baselines3.SAC"]
+    for wrong, says in ((command, "--learner"), (named, "options that they were learnt with")):
+        with pytest.raises(SystemExit, match="2"):
+            make_log.main(wrong)
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1 and "sac.safetensors" in said and says in said
+    make_log.main([*named, "--learner_options", json.dumps(options)])
+    assert list((tmp_path / "walks").glob("walk-*.csv"))

@@ -11,8 +11,7 @@ from residual.trajectories import Trajectory
 from sims.effects import ActuatorLag, Delay, ViscousFriction
 from studies.judging.forecasts import plan, root_mean_squares
 from studies.judging.oracle import fit_effects
-from studies.real.judge import Judge, ask
-from studies.real.names import named
+from studies.real.judge import Judge, ask, named
 from studies.real.prepare import local_slope
 from studies.real.rigs import RIGS
 from studies.real.systems import Car, Drives, Heater

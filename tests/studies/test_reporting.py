@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from studies import reporting
 from studies.reporting import figures
+from studies.reporting import sections as reporting
 from studies.reporting.media import encode_gif, load_media
 from studies.reporting.render import inline, number, paragraphs
 

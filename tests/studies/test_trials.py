@@ -1,7 +1,6 @@
 """Many trials: nothing finished is lost or computed again, and failures stay visible."""
 
 import functools
-import json
 import os
 import signal
 from pathlib import Path
@@ -111,11 +110,6 @@ def test_trials_of_one_seed_start_apart():
     trials = {Path(f"{seed}{k}"): {"seed": seed} for seed in (0, 1) for k in "abc"}
     order = [str(path) for path in spread_seeds(trials)]
     assert order == ["0a", "1a", "0b", "1b", "0c", "1c"]
-
-
-def test_folders_from_before_there_was_a_plan_can_be_read(tmp_path):
-    (tmp_path / "results.json").write_text(json.dumps({"trials": [{"label": "old"}]}))
-    assert read_trials(tmp_path) == ([{"label": "old"}], {})
 
 
 def test_the_plan_names_the_study(tmp_path):

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.tasks import SwingUp
-from studies.systems.value_iteration import episode_return, value_iteration
+from studies.systems.pendulum import BEST
+from tests.studies.value_iteration import episode_return, value_iteration
 
 
 @pytest.fixture(scope="module")
@@ -27,3 +29,11 @@ def test_it_swings_the_pendulum_up_nearly_as_well_as_a_fine_grid(coarse):
     found = episode_return(coarse, PendulumEquation(), np.array([np.pi, 0.0]))
     # -317 on a 361 x 301 grid with 25 actions.
     assert -360 < found < -310
+
+
+@pytest.mark.parametrize("follows", BEST)
+def test_the_best_return_that_reports_tell_is_that_of_a_fine_grid(follows):
+    policy = value_iteration(PendulumEquation.true(inertia_follows_mass=follows), SwingUp())
+    true = Pendulum.true(inertia_follows_mass=follows)
+    found = episode_return(policy, true, np.array([np.pi, 0.0]))
+    assert found == pytest.approx(BEST[follows], abs=1.0)

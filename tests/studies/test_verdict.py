@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 
 from studies.learnt.figures import drawn_steps, episodes_figure
-from studies.learnt.pairs import above
 from studies.learnt.report import write_report
 from studies.learnt.sections import policies_once
+from studies.learnt.statistics import above
 from studies.learnt.tables import tables_of
 from studies.learnt.verdict import headline
 from studies.learnt.words import returns_by_start
@@ -58,7 +58,7 @@ def trial(learnt, control=None, seed=0, error=0.01, gap=0.2, target=None):
 
 def verdict(*trials):
     rows, errors = tables_of(trials)
-    found, tiles = headline(policies_once(rows), errors, trials[0]["about"], None)
+    found, tiles = headline(policies_once(rows), errors, trials[0]["about"])
     return found, tiles
 
 

@@ -3,8 +3,7 @@
 import pytest
 
 from simgap_files import read_json
-from studies.running.curves import Curves
-from studies.running.progress import Bars, Several
+from studies.running.progress import Bars, Curves, Several
 from studies.running.watching import StatusFile, TrialsView, running
 
 
@@ -69,7 +68,7 @@ def test_a_step_without_numbers_leaves_no_curve(tmp_path):
 
 def test_progress_in_a_file_is_lines(capsys, monkeypatch):
     now = iter(range(0, 10**6, 11))
-    monkeypatch.setattr("studies.running.stream.time.monotonic", lambda: next(now))
+    monkeypatch.setattr("studies.running.progress.time.monotonic", lambda: next(now))
     with Bars().task("train", 100) as tell:
         for k in range(100):
             tell(k + 1, f"return -{k}")

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from residual.trajectories import Trajectory
 from studies.hidden.dirty.truth import COORDINATES, INPUTS, Truth, simulate
@@ -58,22 +59,11 @@ class Sensors:
     input_noise: float | None = None
 
 
-def record(
+def _record(
     truth: Truth, sensors: Sensors, name: str, period: float, seconds: float, drive: float,
     rng: np.random.Generator, noise: np.random.Generator,
 ) -> Trajectory:  # fmt: skip
-    """One measured run.
-
-    Args:
-        truth: The system.
-        sensors: How it is measured.
-        name: Of the run.
-        period: Between samples in s.
-        seconds: Length of the run.
-        drive: Share of the actuators' reach that is used.
-        rng: Source of the drive.
-        noise: Source of all that the sensors add.
-    """
+    """One measured run: ``rng`` drives it, ``noise`` is the source of all that the sensors add."""
     count = int(seconds / period) + 1
     times = period * np.arange(count, dtype=float)
     if sensors.jitter:
@@ -81,10 +71,10 @@ def record(
             sensors.jitter * noise.standard_normal(count - 2), -0.4, 0.4
         )
     reach = [drive * most for most in REACH[truth.system]]
-    slow = 8.0 if truth.system == "oven" else 1.0
+    thermal = truth.system == "oven"
+    slow = 8.0 if thermal else 1.0
     commands: list[Callable[[float], float]] = []
     breaks: list[float] = []
-    thermal = truth.system == "oven"
     for most in reach:
         if sensors.input_noise is None:
             level, jumps = _levels(times, most, slow, thermal, rng)
@@ -156,20 +146,13 @@ def _read(
     """States in the order of the simulator's channels: each position before its rate."""
     sizes = np.array(SIZES[system])
     white = rng.standard_normal(motion.shape)
-    slow = np.empty_like(white)
-    slow[0] = white[0]
-    for k in range(1, len(slow)):
-        # A memory of five samples.
-        slow[k] = 0.82 * slow[k - 1] + math.sqrt(1 - 0.82**2) * white[k]
+    # A memory of five samples.
+    white[1:] *= math.sqrt(1 - 0.82**2)
+    slow = lfilter([1.0], [1.0, -0.82], white, axis=0)
     fresh = rng.standard_normal(motion.shape)
     mixed = math.sqrt(sensors.coloured) * slow + math.sqrt(1 - sensors.coloured) * fresh
     seen = motion + sensors.noise * sizes * mixed
-    if system == "oven":
-        if sensors.rounded:
-            step = sensors.rounded * sizes[0]
-            seen = step * np.round(seen / step)
-        return seen
-    c = motion.shape[1] // 2
+    c = 1 if system == "oven" else motion.shape[1] // 2
     q, v = seen[:, :c], seen[:, c:]
     if sensors.summed:
         # A sensor of the rate alone, which drifts as it is summed up.
@@ -178,6 +161,8 @@ def _read(
     if sensors.rounded:
         step = sensors.rounded * sizes[:c]
         q = step * np.round(q / step)
+    if system == "oven":
+        return q
     if not sensors.rates:
         v = np.full_like(v, np.nan)
     return np.stack([q, v], axis=2).reshape(len(times), 2 * c)
@@ -187,16 +172,22 @@ def records(
     truth: Truth, sensors: Sensors, layout: Layout, period: float, seconds: float,
     seed: Sequence[int],
 ) -> list[Trajectory]:  # fmt: skip
-    """A log: several runs driven harder and harder, one long run, or many short ones alike."""
+    """A log: several runs driven harder and harder, one long run, or many short ones alike.
+
+    Args:
+        truth: The system.
+        sensors: How it is measured.
+        layout: ``"ramp"``, ``"single"`` or ``"many"``.
+        period: Between samples in s.
+        seconds: Length of all runs together.
+        seed: Of drive and noise.
+    """
     drives: list[float] = {
-        "ramp": list(np.linspace(0.25, 1.0, 6)),
-        "single": [0.8],
-        "many": [0.8] * 12,
-    }[layout]
-    each = seconds / len(drives)
+        "ramp": np.linspace(0.25, 1.0, 6).tolist(), "single": [0.8], "many": [0.8] * 12
+    }[layout]  # fmt: skip
     found = []
     for number, share in enumerate(drives):
         rng, noise = np.random.default_rng([*seed, number]).spawn(2)
-        name = f"run {number + 1:02d}"
-        found.append(record(truth, sensors, name, period, each, share, rng, noise))
+        name, each = f"run {number + 1:02d}", seconds / len(drives)
+        found.append(_record(truth, sensors, name, period, each, share, rng, noise))
     return found

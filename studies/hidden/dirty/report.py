@@ -2,182 +2,143 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from simgap_files import atomic_write_text
-from studies.hidden.dirty.score import finite
-from studies.hidden.report import count, share
+from studies.hidden.counts import asked, told
 from studies.reporting.markdown import frame_markdown
 
 #: Held-out error over the oracle's that is asked for, and room for "never worse than nominal".
 RATIO, SAME = 1.3, 1.02
-Row = Mapping[str, Any]
+_OF_HIDDEN = ["first", "family", "among", "close", "clear", "covered", "covered_truth", "either"]
 
 
-def rows_of(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Settings and scores of every set in one flat row."""
-    return [{**result["config"], **result["answers"]["find_gap"]} for result in results]
+def judged(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """Settings and scores of every set in one row, with what is counted in columns of its own."""
+    rows = [{**result["config"], **result["answers"]["find_gap"]} for result in results]
+    known = ["oracle", "covered", "covered_truth"]  # if anything is hidden
+    data = pd.DataFrame(rows)
+    data = data.reindex(columns=[*data, *(name for name in known if name not in data)])
+    # In a file, infinity has become None.
+    errors = data[["nominal", "corrected", "oracle"]].astype(float).fillna(np.inf)
+    off = [set(names) for names in data["truly_off"]]
+    data = data.assign(
+        ratio=errors["corrected"] / errors["oracle"],
+        worsening=errors["corrected"] / errors["nominal"],
+        clear=errors["nominal"] >= 1.5 * errors["oracle"],
+        either=data["covered"].where(data["covered"].eq(True), data["covered_truth"]),
+        any_name=data["named"].map(bool),
+        any_sure=data["sure"].map(bool),
+        wrong=data["wrong_sure"].map(bool),
+        wrong_else=[bool(set(names) - o) for names, o in zip(data["wrong_sure"], off, strict=True)],
+        sure_else=[bool(set(names) - o) for names, o in zip(data["sure"], off, strict=True)],
+    )
+    data = data.assign(close=data["ratio"] <= RATIO, worse=data["worsening"] > SAME)
+    data[_OF_HIDDEN] = data[_OF_HIDDEN].astype(object).where(data["block"] == "hidden", None)
+    return data
 
 
-def _ratio(row: Row) -> float:
-    return finite(row["corrected"]) / finite(row["oracle"])
-
-
-def _close(row: Row) -> bool:
-    return _ratio(row) <= RATIO
-
-
-def _clear(row: Row) -> bool:
-    return finite(row["nominal"]) >= 1.5 * finite(row["oracle"])
-
-
-def _worse(row: Row) -> bool:
-    return finite(row["corrected"]) > SAME * finite(row["nominal"])
-
-
-def _hits(part: Sequence[Row], test: Callable[[Row], Any]) -> int:
-    return sum(bool(test(row)) for row in part)
-
-
-def _count(part: Sequence[Row], test: Callable[[Row], Any]) -> str:
-    return count(_hits(part, test), len(part))
-
-
-def headlines(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
+def headlines(data: pd.DataFrame) -> pd.DataFrame:
     """What is asked, how often it should be so, and how often it was."""
-    hidden = [r for r in rows if r["block"] == "hidden"]
-    dirt = [r for r in rows if r["block"] == "dirt only"]
-    removed = [r for r in rows if r["block"] == "removed"]
-    known = [r for r in hidden if r.get("covered") is not None]
-    found: list[tuple[str, str, str]] = []
-
-    def add(what: str, wanted: str, part: Sequence[Row], test: Callable[[Row], Any]) -> None:
-        if part:
-            found.append((what, wanted, share(_hits(part, test), len(part))))
-
-    add("hidden effect first", "", hidden, lambda r: r["first"])
-    add("or its family", "95 %", hidden, lambda r: r["family"])
-    add("the same, where the oracle takes a third off", "", [r for r in hidden if _clear(r)],
-        lambda r: r["family"])  # fmt: skip
-    add("or among the alternatives of the first", "", hidden, lambda r: r["among"])
-    add("nothing named", "", hidden, lambda r: not r["named"])
-    add("a confirmed wrong name", "at most 2 %", hidden, lambda r: r["wrong_sure"])
-    add("the same, parameters that are truly off left out", "", hidden,
-        lambda r: set(r["wrong_sure"]) - set(r["truly_off"]))  # fmt: skip
-    add("held-out error at most 1.3 times the oracle's", "95 %", hidden, _close)
-    add("95 % intervals with the oracle's strength", "85 %", known, lambda r: r["covered"])
-    add("with the true strength", "", known, lambda r: r.get("covered_truth"))
-    add("with one of the two", "", known, lambda r: r["covered"] or r.get("covered_truth"))
-    add("removed from the library: a confirmed wrong name", "at most 2 %", removed,
-        lambda r: r["wrong_sure"])  # fmt: skip
-    add("the same, parameters that are truly off left out", "", removed,
-        lambda r: set(r["wrong_sure"]) - set(r["truly_off"]))  # fmt: skip
-    add("removed: any name", "", removed, lambda r: r["named"])
-    add("dirt alone: a confirmed name", "at most 2 %", dirt, lambda r: r["sure"])
-    add("the same, parameters that are truly off left out", "", dirt,
-        lambda r: set(r["sure"]) - set(r["truly_off"]))  # fmt: skip
-    add("dirt alone: any name", "", dirt, lambda r: r["named"])
-    add("corrected worse than the nominal, held out", "0 %", rows, _worse)
-    seconds = sorted(float(r["seconds"]) for r in rows)
-    if seconds:
-        middle, most = seconds[len(seconds) // 2], seconds[-1]
-        found.append(("processor s, median and worst", "", f"{middle:.0f} and {most:.0f}"))
-    return found
+    hidden, dirt, removed = (
+        data[data["block"] == block] for block in ("hidden", "dirt only", "removed")
+    )
+    known = hidden[hidden["covered"].notna()]
+    but_off = "the same, parameters that are truly off left out"
+    rows = [
+        ("hidden effect first", "", hidden["first"]),
+        ("or its family", "95 %", hidden["family"]),
+        ("the same, where the oracle takes a third off", "",
+         hidden["family"][hidden["clear"].astype(bool)]),
+        ("or among the alternatives of the first", "", hidden["among"]),
+        ("nothing named", "", ~hidden["any_name"]),
+        ("a confirmed wrong name", "at most 2 %", hidden["wrong"]),
+        (but_off, "", hidden["wrong_else"]),
+        ("held-out error at most 1.3 times the oracle's", "95 %", hidden["close"]),
+        ("95 % intervals with the oracle's strength", "85 %", known["covered"]),
+        ("with the true strength", "", known["covered_truth"]),
+        ("with one of the two", "", known["either"]),
+        ("removed from the library: a confirmed wrong name", "at most 2 %", removed["wrong"]),
+        (but_off, "", removed["wrong_else"]),
+        ("removed: any name", "", removed["any_name"]),
+        ("dirt alone: a confirmed name", "at most 2 %", dirt["any_sure"]),
+        (but_off, "", dirt["sure_else"]),
+        ("dirt alone: any name", "", dirt["any_name"]),
+        ("corrected worse than the nominal, held out", "0 %", data["worse"]),
+    ]  # fmt: skip
+    return asked(rows, data["seconds"], "")
 
 
-def cells(rows: Sequence[Row]) -> pd.DataFrame:
+def cells(data: pd.DataFrame) -> pd.DataFrame:
     """One row for each block, system and layout."""
+    counted = {
+        "first": "first", "or family": "family", "among": "among", "named": "any_name",
+        "confirmed": "any_sure", "wrong confirmed": "wrong", "error <= 1.3": "close",
+        "cover": "covered", "worse": "worse",
+    }  # fmt: skip
     found = []
-    keys = sorted({(r["block"], r["system"], r["layout"]) for r in rows})
-    for block, system, layout in keys:
-        cell = (block, system, layout)
-        part = [r for r in rows if (r["block"], r["system"], r["layout"]) == cell]
-        inside = [r for r in part if r["block"] == "hidden"]
-        known = [r for r in inside if r.get("covered") is not None]
-        seconds = sorted(float(r["seconds"]) for r in part)
-        found.append(
-            {
-                "block": block, "system": system, "records": layout, "sets": len(part),
-                "first": _count(inside, lambda r: r["first"]),
-                "or family": _count(inside, lambda r: r["family"]),
-                "among": _count(inside, lambda r: r["among"]),
-                "named": _count(part, lambda r: r["named"]),
-                "confirmed": _count(part, lambda r: r["sure"]),
-                "wrong confirmed": _count(part, lambda r: r["wrong_sure"]),
-                "error <= 1.3": _count(inside, _close),
-                "cover": _count(known, lambda r: r["covered"]),
-                "worse": _count(part, _worse),
-                "s": round(seconds[len(seconds) // 2]),
-                "s most": round(seconds[-1]),
-            }
-        )  # fmt: skip
+    for (block, system, layout), part in data.groupby(["block", "system", "layout"]):
+        row = {"block": block, "system": system, "records": layout, "sets": len(part)}
+        row |= {title: told(part[column]) for title, column in counted.items()}
+        row |= {"s": round(part["seconds"].median()), "s most": round(part["seconds"].max())}
+        found.append(row)
     return pd.DataFrame(found)
 
 
-def by_effect(rows: Sequence[Row]) -> pd.DataFrame:
+def by_effect(data: pd.DataFrame) -> pd.DataFrame:
     """One row for each hidden effect."""
     found = []
-    for system, label in sorted({(r["system"], r["hidden"]) for r in rows if r["hidden"]}):
-        part = [r for r in rows if (r["system"], r["hidden"]) == (system, label)]
-        inside = [r for r in part if r["block"] == "hidden"]
-        if not inside:
-            continue
-        said = [r["named"][0] if r["named"] else "nothing" for r in inside if not r["family"]]
+    for (system, label), part in data[data["block"] == "hidden"].groupby(["system", "hidden"]):
+        missed = part["named"][~part["family"].astype(bool)]
         found.append(
             {
-                "system": system, "hidden": label, "sets": len(inside),
-                "or family": _count(inside, lambda r: r["family"]),
-                "error <= 1.3": _count(inside, _close),
-                "called": ", ".join(said),
+                "system": system, "hidden": label, "sets": len(part),
+                "or family": told(part["family"]), "error <= 1.3": told(part["close"]),
+                "called": ", ".join(names[0] if names else "nothing" for names in missed),
             }
         )  # fmt: skip
     return pd.DataFrame(found)
 
 
-def misses(rows: Sequence[Row]) -> list[str]:
+def misses(data: pd.DataFrame) -> list[str]:
     """Every miss in words, one line each."""
     lines = []
-    for row in rows:
+    for row in data.to_dict("records"):
         what = f"{row['block']}, {row['system']}, {row['layout']}, seed {row['seed']}"
         what += f": {row['hidden']}" if row["hidden"] else ""
-        told = ", ".join(row["named"]) or "nothing"
-        if row["block"] == "hidden" and not row["family"]:
-            lines.append(f"{what} was called {told}")
+        named = ", ".join(row["named"]) or "nothing"
+        if row["family"] is False:
+            lines.append(f"{what} was called {named}")
         if row["wrong_sure"]:
-            wrong = [
-                f"{name} (truly off)" if name in row["truly_off"] else name
-                for name in row["wrong_sure"]
-            ]
+            off = row["truly_off"]
+            wrong = [f"{n} (truly off)" if n in off else n for n in row["wrong_sure"]]
             lines.append(f"{what}: confirmed {', '.join(wrong)}")
-        if row["block"] == "hidden" and not _close(row):
-            lines.append(f"{what}: {_ratio(row):.2f} times the oracle's error (named {told})")
-        if _worse(row):
-            times = finite(row["corrected"]) / finite(row["nominal"])
-            lines.append(
-                f"{what}: corrected {times:.2f} times as bad as the nominal (named {told})"
-            )
+        if row["close"] is False:
+            lines.append(f"{what}: {row['ratio']:.2f} times the oracle's error (named {named})")
+        if row["worse"]:
+            times = f"{row['worsening']:.2f} times as bad as the nominal"
+            lines.append(f"{what}: corrected {times} (named {named})")
     return lines
 
 
 def summary(results: Sequence[Mapping[str, Any]]) -> str:
     """A few lines for the terminal."""
-    table = pd.DataFrame(headlines(rows_of(results)), columns=["what", "wanted", "found"])
-    return table.to_string(index=False)
+    return headlines(judged(results)).to_string(index=False)
 
 
 def write_dirty(results: Sequence[Mapping[str, Any]], output: Path) -> None:
     """Write dirty.md with all tables, and dirty.csv with one row for each set."""
-    rows = rows_of(results)
-    frame = pd.DataFrame(rows).drop(columns=["says", "findings"])
-    atomic_write_text(output / "dirty.csv", frame.to_csv(index=False))
-    told = pd.DataFrame(headlines(rows), columns=["what", "wanted", "found"])
+    data = judged(results)
+    plain = data.drop(columns=["says", "findings"])
+    atomic_write_text(output / "dirty.csv", plain.to_csv(index=False))
     parts = [
-        f"# Dirty world: {len(rows)} sets\n", frame_markdown(told), "\n## Every cell\n",
-        frame_markdown(cells(rows)), "\n## By effect\n", frame_markdown(by_effect(rows)),
-        "\n## Misses\n", "".join(f"- {line}\n" for line in misses(rows)) or "none\n",
+        f"# Dirty world: {len(data)} sets\n", frame_markdown(headlines(data)), "\n## Every cell\n",
+        frame_markdown(cells(data)), "\n## By effect\n", frame_markdown(by_effect(data)),
+        "\n## Misses\n", "".join(f"- {line}\n" for line in misses(data)) or "none\n",
     ]  # fmt: skip
     atomic_write_text(output / "dirty.md", "\n".join(parts))

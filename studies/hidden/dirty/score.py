@@ -6,8 +6,6 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from residual.gap import GapResult, find_gap
 from residual.gap.result import Verdict
 from residual.trajectories import Trajectory
@@ -46,18 +44,16 @@ def run_dirty(config: Mapping[str, Any]) -> dict[str, Any]:
         measured_input=measured,
         horizon=made.horizon,
     )
-    seconds = time.process_time() - begin
-    row = {
+    return {
         "rows": sum(len(run) for run in made.logs),
         "period_s": made.simulator.dt,
         "strength": made.truth.strength,
-        "seconds": seconds,
+        "seconds": time.process_time() - begin,
         "findings": list(result.quality),
         "says": [verdict.says for verdict in result.verdicts],
+        **names(result, made, twins),
+        **errors(result, made),
     }
-    row |= names(result, made, twins)
-    row |= errors(result, made)
-    return row
 
 
 def errors(result: GapResult, made: Dirty) -> dict[str, Any]:
@@ -75,14 +71,13 @@ def errors(result: GapResult, made: Dirty) -> dict[str, Any]:
     row["oracle"] = relative_error(repaired, held)
     (field,) = found.strengths()
     row["oracle_strength"] = float(getattr(found, field))
-    covered = None
+    row["covered"] = None
     for verdict in result.verdicts:
         if verdict.label == made.label and verdict.kind in ("confirmed", "ambiguous"):
             number = verdict.parameters[field]
-            covered = bool(number.low <= row["oracle_strength"] <= number.high)
+            row["covered"] = bool(number.low <= row["oracle_strength"] <= number.high)
             row["covered_truth"] = bool(number.low <= made.truth.strength <= number.high)
             break
-    row["covered"] = covered
     return row
 
 
@@ -100,24 +95,26 @@ def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, An
     """What was named first and what with confidence, held against what was hidden."""
     offered = {str(effect): effect for effect in library(made.simulator)}
     chosen = [v for v in result.verdicts if v.effect and v.kind in ("confirmed", "ambiguous")]
+    named = [v.label for v in chosen]
     sure = [v.label for v in chosen if v.kind == "confirmed"]
     row: dict[str, Any] = {
-        "named": [v.label for v in chosen],
+        "named": named,
         "sure": sure,
         "kinds": [v.kind for v in result.verdicts],
+        "truly_off": [verdict.label for verdict in chosen if truly_off(verdict, made)],
     }
-    row["truly_off"] = [verdict.label for verdict in chosen if truly_off(verdict, made)]
     if not made.label:
-        return row | {"first": None, "family": None, "among": None, "wrong_sure": list(sure)}
+        return row | {"first": None, "family": None, "among": None, "wrong_sure": sure}
     right = twins | _family(made.label, made.simulator, offered)
-    first = chosen[0].label if chosen else ""
-    among = {first, *(chosen[0].alternatives if chosen else ())}
-    row["first"] = first in twins
-    row["family"] = first in right
-    row["among"] = bool(among & right)
-    right |= together(made.label, made.simulator, row["named"])
-    row["wrong_sure"] = [name for name in sure if name not in right]
-    return row
+    first = "".join(named[:1])
+    alternatives = chosen[0].alternatives if chosen else ()
+    meant = right | together(made.label, made.simulator, named)
+    return row | {
+        "first": first in twins,
+        "family": first in right,
+        "among": not right.isdisjoint([first, *alternatives]),
+        "wrong_sure": [name for name in sure if name not in meant],
+    }
 
 
 def truly_off(verdict: Verdict, made: Dirty) -> bool:
@@ -154,8 +151,3 @@ def _family(label: str, simulator: HostSimulator, offered: Mapping[str, Effect])
         for name, effect in offered.items()
         if family and effect.family_in(simulator) == family and effect.where == hidden.where
     )
-
-
-def finite(value: Any) -> float:
-    """A number from a result file, where infinity has become None."""
-    return np.inf if value is None else float(value)

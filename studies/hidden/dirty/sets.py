@@ -104,8 +104,8 @@ def make_set(config: Mapping[str, Any]) -> Dirty:
     if name:
         sign = rng.choice([-1.0, 1.0]) if name in ("constant_load", "sensor_offset") else 1.0
         usual = sign * HIDDEN[system][config["hidden"]]
-        strength = _sized(plain, sensors, simulator, name, where, usual, period, config)
-        truth = dataclasses.replace(plain, effect=name, where=where, strength=strength)
+        truth = dataclasses.replace(plain, effect=name, where=where, strength=usual)
+        truth = _sized(plain, truth, sensors, simulator, config)
     logs = records(truth, sensors, layout, period, seconds, (seed, 2))
     held = records(truth, sensors, layout, period, 0.5 * seconds, (seed, 3))
     return Dirty(logs, held, simulator, str(config["hidden"]), truth, sensors, HORIZON[system])
@@ -144,27 +144,30 @@ def _dirt(system: str, period: float, rng: np.random.Generator) -> tuple[Truth, 
 
 
 def _sized(
-    plain: Truth, sensors: Sensors, simulator: HostSimulator, name: str, where: str, usual: float,
-    period: float, config: Mapping[str, Any],
-) -> float:  # fmt: skip
-    """The strength at which the nominal's forecasts are ``size`` times as bad as without it."""
-    seconds = min(0.5 * SECONDS[plain.system], 2000 * period)
+    plain: Truth,
+    truth: Truth,
+    sensors: Sensors,
+    simulator: HostSimulator,
+    config: Mapping[str, Any],
+) -> Truth:
+    """So strong that the nominal's forecasts are ``size`` times as bad as with the dirt alone."""
+    seconds = min(0.5 * SECONDS[plain.system], 2000 * simulator.dt)
 
     def error(truth: Truth) -> float:
-        runs = records(truth, sensors, "ramp", period, seconds, (int(config["seed"]), 4))
+        seed = (int(config["seed"]), 4)
+        runs = records(truth, sensors, "ramp", simulator.dt, seconds, seed)
         horizon = HORIZON[plain.system]
         groups = plan(simulator, runs, horizon, LEAD * horizon, most=40)
         return relative_error(simulator, groups)
 
-    floor = error(plain)
-    strength, wanted = usual, float(config["size"])
+    floor, wanted = error(plain), float(config["size"])
+    most = _most(plain, truth.effect, truth.strength)
     for _ in range(3):
-        found = error(dataclasses.replace(plain, effect=name, where=where, strength=strength))
-        excess = max(found**2 - floor**2, (0.05 * floor) ** 2) ** 0.5
+        excess = max(error(truth) ** 2 - floor**2, (0.05 * floor) ** 2) ** 0.5
         factor = floor * (wanted**2 - 1) ** 0.5 / excess
-        strength *= float(np.clip(factor, 0.25, 4.0))
-        strength = float(np.clip(strength, -_most(plain, name, usual), _most(plain, name, usual)))
-    return strength
+        strength = truth.strength * float(np.clip(factor, 0.25, 4.0))
+        truth = dataclasses.replace(truth, strength=float(np.clip(strength, -most, most)))
+    return truth
 
 
 def _most(plain: Truth, name: str, usual: float) -> float:

@@ -35,7 +35,7 @@ class Arm(EquationOfMotion):
     name = "arm"
     state_channels = _angle("shoulder")
     action_channels = (Channel("torque", "N m", "input", scale=3.0),)
-    parameters = {  # noqa: RUF012
+    parameters = {
         "mass": Parameter(1.0, "kg", "mass at the end of the link", low=0.01),
         "length": Parameter(0.5, "m", "length of the link", low=0.01),
         "inertia": Parameter(0.05, "kg m^2", "inertia of the drive", low=0.0),
@@ -57,7 +57,7 @@ class TwoLinkArm(EquationOfMotion):
         Channel("shoulder torque", "N m", "input", scale=5.0),
         Channel("elbow torque", "N m", "input", scale=2.0),
     )
-    parameters = {  # noqa: RUF012
+    parameters = {
         "upper_mass": Parameter(1.0, "kg", "mass at the elbow", low=0.01),
         "lower_mass": Parameter(0.5, "kg", "mass at the hand", low=0.01),
         "upper_length": Parameter(0.4, "m", "shoulder to elbow", low=0.01),
@@ -87,7 +87,7 @@ class HangingCart(EquationOfMotion):
         *_angle("hinge"),
     )
     action_channels = (Channel("push", "N", "input", scale=4.0),)
-    parameters = {  # noqa: RUF012
+    parameters = {
         "cart_mass": Parameter(1.0, "kg", "mass of the cart", low=0.01),
         "pole_mass": Parameter(0.2, "kg", "mass at the end of the pole", low=0.001),
         "length": Parameter(0.4, "m", "length of the pole", low=0.01),
@@ -110,7 +110,7 @@ class Oven(FirstOrderSystem):
     name = "oven"
     state_channels = (Channel("temperature", "K", "other", scale=30.0),)
     action_channels = (Channel("power", "W", "input", scale=20.0),)
-    parameters = {  # noqa: RUF012
+    parameters = {
         "gain": Parameter(2.0, "K/W", "warming for one W", low=0.0),
         "time_constant": Parameter(12.0, "s", "time constant", low=0.1),
         "ambient": Parameter(295.0, "K", "temperature without heating"),

@@ -17,34 +17,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import LSODA
 
+from studies.hidden.dirty.systems import SYSTEMS
+
 Array = NDArray[np.float64]
 Input = Callable[[float], float]
 G = 9.81
+NOMINAL = {name: kind() for name, kind in SYSTEMS.items()}
 
 #: Jumps closer than this in s are one.
 _TINY = 1e-7
-#: Nominal parameters, by system.
-PARAMETERS: Mapping[str, Mapping[str, float]] = {
-    "arm": {"mass": 1.0, "length": 0.5, "inertia": 0.05},
-    "two-link arm": {
-        "upper_mass": 1.0, "lower_mass": 0.5, "upper_length": 0.4, "lower_length": 0.3,
-    },
-    "cart": {"cart_mass": 1.0, "pole_mass": 0.2, "length": 0.4, "stiffness": 8.0},
-    "oven": {"gain": 2.0, "time_constant": 12.0, "ambient": 295.0},
-}  # fmt: skip
-#: Coordinates and inputs, by system.
-COORDINATES = {
-    "arm": ("shoulder",),
-    "two-link arm": ("shoulder", "elbow"),
-    "cart": ("cart", "hinge"),
-    "oven": ("temperature",),
+#: Nominal parameters, coordinates and inputs, by system; not how any of them moves it.
+PARAMETERS = {
+    name: {key: float(parameter.value) for key, parameter in made.parameters.items()}
+    for name, made in NOMINAL.items()
 }
-INPUTS = {
-    "arm": ("torque",),
-    "two-link arm": ("shoulder torque", "elbow torque"),
-    "cart": ("push",),
-    "oven": ("power",),
-}
+COORDINATES = {name: [joint.name for joint in made.joints] for name, made in NOMINAL.items()}
+INPUTS = {name: [c.name for c in made.action_channels] for name, made in NOMINAL.items()}
 #: Inertia that a flexible part hangs on, roughly.
 INERTIA = {"arm": 0.3, "two-link arm": 0.25, "cart": 1.2, "oven": 1.0}
 
@@ -119,17 +107,8 @@ def accelerations(
     return [aa, (m11 * r2 - couple * r1) / det - aa]
 
 
-def command_path(truth: Truth, commands: Sequence[Input]) -> list[Input]:
-    """What reaches the actuators, but for a lag."""
-    names = INPUTS[truth.system]
-    found = []
-    for name, command in zip(names, commands, strict=True):
-        own = truth.where == name
-        found.append(_shaped(truth.effect, truth.strength, command) if own else command)
-    return found
-
-
 def _shaped(effect: str, s: float, command: Input) -> Input:
+    """What reaches an actuator, but for a lag."""
     if effect == "actuator_gain":
         return lambda t: (1 + s) * command(t)
     if effect == "actuator_bias":
@@ -160,7 +139,10 @@ def simulate(
     """
     system, p = truth.system, truth.parameters()
     c, thermal = len(start), truth.system == "oven"
-    paths = command_path(truth, commands)
+    paths = [
+        _shaped(truth.effect, truth.strength, command) if truth.where == name else command
+        for name, command in zip(INPUTS[system], commands, strict=True)
+    ]
     lagged = INPUTS[system].index(truth.where) if truth.effect == "actuator_lag" else -1
     at = COORDINATES[system].index(truth.where) if truth.where in COORDINATES[system] else -1
     mass = truth.flexible * INERTIA[system]

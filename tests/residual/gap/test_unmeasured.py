@@ -22,7 +22,7 @@ class Tanks(FirstOrderSystem):
         Channel("lower", "m", "other", scale=5.0),
     )
     action_channels = (Channel("pump", "V", "input", scale=5.0, low=0.0, high=10.0),)
-    parameters = {"outlet": Parameter(0.05, "m^0.5/s", "of the lower tank", low=1e-4)}  # noqa: RUF012
+    parameters = {"outlet": Parameter(0.05, "m^0.5/s", "of the lower tank", low=1e-4)}
 
     def derivative(self, x, u, p):
         upper, lower = np.sqrt(np.maximum(x, 0.0)).T
@@ -57,7 +57,7 @@ class Swing(EquationOfMotion):
         Channel("rate", "rad/s", "rate", rate_of="angle", scale=3.0),
     )
     action_channels = ()
-    parameters = {"length": Parameter(0.5, "m", "to the bob", low=0.01)}  # noqa: RUF012
+    parameters = {"length": Parameter(0.5, "m", "to the bob", low=0.01)}
 
     def acceleration(self, q, v, u, force, p):
         return np.stack([-9.81 / p.length * np.sin(q[:, 0]) + force[:, 0]], axis=1)

@@ -81,7 +81,9 @@ class Toy:
         self.unfit, self.refused, self.nearly = set(), {}, set()
         self.candidates = [
             SimpleNamespace(
-                effect=e, label=str(e), knobs=(SimpleNamespace(field="change", strength=True),)
+                effect=e,
+                label=str(e),
+                knobs=(SimpleNamespace(field="change", strength=True, low=-1.0, high=1.0),),
             )
             for e in EFFECTS
         ]

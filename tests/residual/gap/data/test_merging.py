@@ -50,7 +50,7 @@ class Body(FirstOrderSystem):
     dt = 1.0
     state_channels = (Channel("amount", "mg", "other", scale=10.0),)
     action_channels = (Channel("dose", "mg/s", "input", scale=10.0),)
-    parameters = {"leaving": Parameter(0.01, "1/s", "share that leaves", low=0.001)}  # noqa: RUF012
+    parameters = {"leaving": Parameter(0.01, "1/s", "share that leaves", low=0.001)}
 
     def derivative(self, x, u, p):
         return (u[:, 0] - p.leaving * x[:, 0])[:, None]

@@ -23,7 +23,7 @@ class Rod(EquationOfMotion):
         Channel("rate", "rad/s", "rate", rate_of="angle", scale=1.0),
     )
     action_channels = ()
-    parameters = {  # noqa: RUF012
+    parameters = {
         "length": Parameter(0.129, "m", "length", low=0.01),
         "mass": Parameter(0.024, "kg", "mass", low=1e-3),
     }
@@ -37,7 +37,10 @@ class Rod(EquationOfMotion):
 def swing(start, length=0.122, offset=0.004, seconds=4.2, seed=0):
     """A shorter rod, an encoder whose zero is off and which knows 0.0015 rad, no other sensor."""
     times = np.arange(round(seconds / DT)) * DT
-    slope = lambda _, x: [x[1], -1.5 * 9.81 / length * np.sin(x[0]) - 0.1 * x[1]]  # noqa: E731
+
+    def slope(_, x):
+        return [x[1], -1.5 * 9.81 / length * np.sin(x[0]) - 0.1 * x[1]]
+
     found = solve_ivp(slope, (0, times[-1]), [start, 0.0], t_eval=times, rtol=1e-9, atol=1e-11)
     states = np.full((len(times), 2), np.nan)
     states[:, 0] = np.round((found.y[0] + offset) / 0.0015) * 0.0015
