@@ -9,8 +9,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-import simgap_arrays
-from simgap_arrays import FileError
+from simgap_files import arrays as sealed
+from simgap_files.arrays import FileError
 
 
 def write_arrays(
@@ -24,7 +24,7 @@ def write_arrays(
         arrays: By name.
         metadata: Values that JSON knows, by name.
     """
-    simgap_arrays.write_arrays(path, {"format": form, **metadata}, arrays)
+    sealed.write_arrays(path, {"format": form, **metadata}, arrays)
 
 
 def read_arrays(path: str | Path, form: str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -39,7 +39,7 @@ def read_arrays(path: str | Path, form: str) -> tuple[dict[str, Any], dict[str, 
         OtherForm: It holds something else.
         ValueError: It is damaged, or not of this project.
     """
-    metadata, arrays = simgap_arrays.read_arrays(path)
+    metadata, arrays = sealed.read_arrays(path)
     if metadata.get("format") != form:
         raise OtherForm(
             f"{path} has format {metadata.get('format')!r}, expected {form!r}: agents are read by "

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simgap_arrays import FileError
-from simgap_npz import check_unpacked
+from simgap_files.arrays import FileError
+from simgap_files.npz import check_unpacked
 
 #: Ours that an ensemble or a pipeline may hold; each is plain numbers and arrays.
 _OURS = (

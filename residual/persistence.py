@@ -21,7 +21,7 @@ from sklearn.utils.validation import check_is_fitted
 from residual.difference import DifferenceModel
 from residual.estimator import Estimator
 from residual.foreign import dumped, loaded
-from simgap_arrays import FileError, read_arrays, write_arrays
+from simgap_files.arrays import FileError, read_arrays, write_arrays
 from sims.simulator import Channel, Simulator
 
 _CLASSES = {

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simgap_arrays import FileError
-from simgap_npz import read_npz, write_npz
+from simgap_files.arrays import FileError
+from simgap_files.npz import read_npz, write_npz
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from typing import Any
 import jsonargparse
 import yaml
 
-import simgap_yaml
+from simgap_files import safe_yaml
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
@@ -248,7 +248,7 @@ def not_found(source: str | Mapping[str, Any]) -> str:
         if not Path(source).is_file():
             return "there is no such file"
         try:
-            settings = simgap_yaml.read(source)
+            settings = safe_yaml.read(source)
         except ValueError as error:
             return str(error)
     for path in _class_paths(settings):

@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-import simgap_yaml
+from simgap_files import safe_yaml
 from sims.model_files import located
 
 OURS = ("sims", "policy", "residual", "studies", "simgap")
@@ -50,7 +50,7 @@ def check_file(path: str | Path) -> Any:
         ValueError: It does, is no YAML, or names a model that is not there; the message says what
             to do.
     """
-    settings = located(simgap_yaml.read(path), path)
+    settings = located(safe_yaml.read(path), path)
     strange = foreign(settings)
     if strange:
         raise ValueError(
@@ -91,7 +91,7 @@ def named_packages(settings: Any) -> set[str]:
 def _foreign_text(text: str) -> str:
     # Settings may stand in text too: jsonargparse reads them as YAML.
     with contextlib.suppress(yaml.YAMLError):
-        inside = simgap_yaml.load(text)
+        inside = safe_yaml.load(text)
         if isinstance(inside, Mapping | list):
             return foreign(inside)
     if text.lower().endswith(_SETTINGS):

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from simgap_files import atomic_write_text, read_json
+from simgap_files.atomic import atomic_write_text, read_json
 from studies.reporting.render import render
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded

@@ -31,7 +31,7 @@ import threadpoolctl
 from jsonargparse.typing import PositiveInt
 
 from residual.gap import find_gap
-from simgap_files import read_sealed, write_sealed
+from simgap_files.atomic import read_sealed, write_sealed
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import make_logs

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from simgap_files import atomic_write_json, atomic_write_text
+from simgap_files.atomic import atomic_write_json, atomic_write_text
 from studies.real.judge import Judged, ask
 from studies.real.rigs import RIGS
 from studies.reporting.markdown import frame_markdown

@@ -17,7 +17,7 @@ from typing import Any
 
 from jinja2 import UndefinedError
 
-from simgap_files import read_sealed
+from simgap_files.atomic import read_sealed
 from studies.learning import command
 from studies.running.command import Parser
 from studies.running.ending import fail, guarded

@@ -13,7 +13,7 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from residual.logs.table import LogError, Table, shortened
-from simgap_npz import check_unpacked, read_npz
+from simgap_files.npz import check_unpacked, read_npz
 
 TEXT, PARQUET, NPZ = (".csv", ".txt", ".tsv", ".dat", ".log"), (".parquet", ".pq"), (".npz",)
 

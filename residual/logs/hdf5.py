@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.logs.table import LogError, Table, shortened
-from simgap_arrays import FileError
-from simgap_npz import check_unpacked
+from simgap_files.arrays import FileError
+from simgap_files.npz import check_unpacked
 
 EPISODE = "episode"
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from residual.logs.clocks import Signal
 from residual.logs.table import LogError, shortened
-from simgap_npz import check_unpacked
+from simgap_files.npz import check_unpacked
 
 #: Decoders by the encoding of a channel's messages, and the package of each.
 DECODERS = {

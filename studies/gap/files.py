@@ -15,7 +15,7 @@ import yaml
 
 from residual.gap import GapResult
 from residual.logs import Finding
-from simgap_files import atomic_write_text, flush_to_disk, write_sealed
+from simgap_files.atomic import atomic_write_text, flush_to_disk, write_sealed
 from sims.loading import corrected_settings
 from sims.model_files import relative
 from studies.gap.forecasts import bars, rollouts, set_aside, tiles, where

@@ -28,7 +28,7 @@ from residual.gap.model.candidates import candidates
 from residual.gap.preparation.horizon import usual_horizon
 from residual.gap.preparation.prepare import prepare
 from residual.gap.search.sets import Search
-from simgap_files import atomic_write_text
+from simgap_files.atomic import atomic_write_text
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs

@@ -11,7 +11,7 @@ import pandas as pd
 import yaml
 from matplotlib.figure import Figure as Drawing
 
-from simgap_files import atomic_write_text
+from simgap_files.atomic import atomic_write_text
 from studies.hidden.counts import asked, count, told
 from studies.hidden.strengths import HIDDEN
 from studies.reporting.figures import new_figure, save_figure, styled

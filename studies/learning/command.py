@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from simgap_files import atomic_write_text, read_sealed, remove_partial_files, write_sealed
+from simgap_files.atomic import atomic_write_text, read_sealed, remove_partial_files, write_sealed
 from studies.learning.study import Study
 from studies.learning.trial import (
     ALIASES,

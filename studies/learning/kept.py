@@ -20,7 +20,7 @@ from typing import Any, Protocol, TypeVar
 
 import filelock
 
-from simgap_files import flush_to_disk
+from simgap_files.atomic import flush_to_disk
 from studies.learning.sources import code_of
 
 _RECORD = "step.json"

@@ -18,9 +18,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-_OURS = (
-    "sims", "policy", "residual", "studies", "simgap", "simgap_arrays", "simgap_files", "simgap_npz"
-)  # fmt: skip
+_OURS = ("sims", "policy", "residual", "studies", "simgap", "simgap_files")
 _LIBRARIES = tuple(
     str(Path(folder).resolve())
     for folder in {sysconfig.get_path(kind) for kind in ("stdlib", "purelib", "platlib")}

@@ -18,7 +18,7 @@ from residual.corrected import CorrectedSimulator
 from residual.difference import DifferenceModel
 from residual.measured import fit_measured
 from residual.trajectories import Transitions
-from simgap_files import jsonable
+from simgap_files.atomic import jsonable
 from sims.episodes import refuse_ended_at_once
 from sims.rates import refuse_unrelated_rates
 from sims.simulator import Simulator

@@ -18,7 +18,7 @@ from policy.selection import Point, learn_and_select
 from residual.corrected import CorrectedSimulator
 from residual.trajectories import Transitions
 from residual.uncertainty_penalty import PenalisedTask
-from simgap_npz import read_npz, write_npz
+from simgap_files.npz import read_npz, write_npz
 from sims.simulator import Array, Simulator
 from sims.system import USUAL_STARTS, System
 from studies.learning.streams import stream

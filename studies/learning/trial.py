@@ -14,7 +14,7 @@ import torch
 from jsonargparse.typing import NonNegativeFloat
 
 from residual.persistence import is_ours, save
-from simgap_npz import write_npz
+from simgap_files.npz import write_npz
 from studies.learning.described import modules_in, settings_of
 from studies.learning.fingerprint import fingerprint
 from studies.learning.kept import OnDisk

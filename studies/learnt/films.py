@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from simgap_files import atomic_write_bytes
+from simgap_files.atomic import atomic_write_bytes
 from sims.render import renderer_for
 from sims.simulator import Simulator
 from studies.learnt.report import read_episodes

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from simgap_npz import read_npz
+from simgap_files.npz import read_npz
 from studies.learnt.figures import (
     Drawn,
     budgets_figure,

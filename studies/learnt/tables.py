@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from simgap_files import atomic_path, atomic_write_text, write_sealed
+from simgap_files.atomic import atomic_path, atomic_write_text, write_sealed
 from studies.learnt.words import measures_of, returns_by_start
 
 #: The column with a policy's returns on the true system by where they began.

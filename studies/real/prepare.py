@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from simgap_files import atomic_write_text
+from simgap_files.atomic import atomic_write_text
 
 Array = NDArray[np.float64]
 

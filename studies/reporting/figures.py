@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from simgap_files import atomic_path, atomic_write_text
+from simgap_files.atomic import atomic_path, atomic_write_text
 
 INK, MUTED, GRID = "#24292f", "#6e7781", "#d8dee4"
 

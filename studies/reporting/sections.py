@@ -13,7 +13,7 @@ from typing import ClassVar, Literal, Self
 import pandas as pd
 from matplotlib.figure import Figure as MatplotlibFigure
 
-from simgap_files import atomic_write_text
+from simgap_files.atomic import atomic_write_text
 from studies.reporting.media import Media, load_media, narrowed, still
 from studies.reporting.render import render
 

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 import jsonargparse
 import yaml
 
-import simgap_yaml
+from simgap_files import safe_yaml
 from sims.loading import in_file, not_found
 from sims.model_files import located, model_settings, names_model
 from sims.trust import check_file, named_packages, trusting
@@ -74,9 +74,9 @@ class Parser(jsonargparse.ArgumentParser):
     def parse_string(self, content: str, path: Any = "", *rest: Any, **options: Any) -> Any:
         """As usual; a robot's model file, also one beside the config, may be the simulator."""
         try:
-            given = simgap_yaml.load(content)
+            given = safe_yaml.load(content)
         except yaml.YAMLError as error:
-            raise ValueError(f"{path} is no YAML: {simgap_yaml.problem(error)}") from None
+            raise ValueError(f"{path} is no YAML: {safe_yaml.problem(error)}") from None
         # What a config names is the user's own choice, as what stands on the command line is.
         with trusting(named_packages(given)):
             found = located(given, str(path)) if path and names_model(given) else given
@@ -147,7 +147,7 @@ def _check_given(name: str, value: str) -> None:
     lacking = ""
     if value.endswith((".yaml", ".yml")):
         try:
-            simgap_yaml.read(value)
+            safe_yaml.read(value)
         except ValueError as error:
             raise ValueError(f"{name} {error}") from None
     elif name in _CLASSES:

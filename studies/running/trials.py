@@ -21,7 +21,7 @@ from typing import Any
 
 from jsonargparse.typing import PositiveInt
 
-from simgap_files import atomic_write_text, read_sealed, write_sealed
+from simgap_files.atomic import atomic_write_text, read_sealed, write_sealed
 from studies.running.progress import Curves, Progress, Several
 from studies.running.watching import STATUS, StatusFile, TrialsView
 from studies.running.workers import Backend, Config, workers

@@ -18,7 +18,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from simgap_files import atomic_write_json, read_json
+from simgap_files.atomic import atomic_write_json, read_json
 from studies.running.progress import Advance, Numbers, stderr
 
 STATUS = "status.json"

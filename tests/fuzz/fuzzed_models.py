@@ -24,8 +24,8 @@ from residual.dropout_net import DropoutNet
 from residual.gaussian_process import GaussianProcess
 from residual.linear import Linear
 from residual.trajectories import Transitions
-from simgap_arrays import read_arrays, write_arrays
-from simgap_npz import read_npz, write_npz
+from simgap_files.arrays import read_arrays, write_arrays
+from simgap_files.npz import read_npz, write_npz
 from sims.pendulum_equation import PendulumEquation
 
 MEGABYTES = 64

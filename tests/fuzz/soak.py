@@ -29,7 +29,7 @@ from damage import damaged
 from fuzzed_results import TINY
 from one_log import one_log
 
-from simgap_files import read_sealed
+from simgap_files.atomic import read_sealed
 from studies import find_gap
 
 GRID = TINY + "grid:\n- seed: [0, 1, 2]\n"

@@ -16,9 +16,9 @@ from mcap.writer import CompressionType, Writer
 from safetensors.numpy import save
 
 import residual
-import simgap_yaml
 from residual.logs import LogError, read_logs
 from residual.trajectories import Transitions
+from simgap_files import safe_yaml
 from sims.loading import load_simulator
 from sims.pendulum_equation import PendulumEquation
 
@@ -128,7 +128,7 @@ def test_a_model_whose_header_declares_more_than_there_is(tmp_path):
 )  # fmt: skip
 def test_settings_that_unfold_without_end_are_refused(text, tmp_path):
     with pytest.raises(yaml.YAMLError):
-        simgap_yaml.load(text)
+        safe_yaml.load(text)
     (tmp_path / "a.yaml").write_text(text)
     with pytest.raises(ValueError, match=r"a\.yaml"):
         load_simulator(tmp_path / "a.yaml")
@@ -138,7 +138,7 @@ def test_an_estimator_of_another_library_that_would_fill_the_memory(tmp_path):
     pytest.importorskip("skops")
     from sklearn.linear_model import Ridge
 
-    from simgap_arrays import FileError, read_arrays, write_arrays
+    from simgap_files.arrays import FileError, read_arrays, write_arrays
 
     X = np.random.default_rng(0).normal(size=(20, 2))
     residual.save(Ridge().fit(X, X), tmp_path / "ridge")

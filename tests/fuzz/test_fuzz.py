@@ -15,7 +15,7 @@ from safetensors.numpy import load_file, save_file
 import residual
 from policy import DDPG, load_policy
 from residual.logs import LogError, read_logs
-from simgap_arrays import read_arrays, write_arrays
+from simgap_files.arrays import read_arrays, write_arrays
 from sims.pendulum_equation import PendulumEquation
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # what broken numbers make numpy warn of

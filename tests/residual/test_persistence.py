@@ -17,7 +17,7 @@ from residual.gaussian_process import GaussianProcess
 from residual.linear import Linear
 from residual.persistence import load, save
 from residual.trajectories import Transitions
-from simgap_arrays import read_arrays, write_arrays
+from simgap_files.arrays import read_arrays, write_arrays
 from sims.pendulum import Pendulum
 
 OURS = [

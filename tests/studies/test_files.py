@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from simgap_files import (
+from simgap_files.atomic import (
     atomic_path,
     atomic_write_bytes,
     atomic_write_json,

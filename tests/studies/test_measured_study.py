@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from residual.trajectories import Transitions
-from simgap_npz import write_npz
+from simgap_files.npz import write_npz
 from studies import pendulum_gap
 
 TINY = [

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from simgap_files import read_json
+from simgap_files.atomic import read_json
 from studies.running.progress import Silent
 from studies.running.trials import (
     Execution,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simgap_files import read_json
+from simgap_files.atomic import read_json
 from studies.running.progress import Bars, Curves, Several
 from studies.running.watching import StatusFile, TrialsView, running
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from simgap_files import atomic_write_text
+from simgap_files.atomic import atomic_write_text
 from studies.hidden.counts import asked, told
 from studies.reporting.markdown import frame_markdown
 

@@ -18,8 +18,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from simgap_arrays import FileError
-from simgap_files import atomic_path
+from simgap_files.arrays import FileError
+from simgap_files.atomic import atomic_path
 
 VERSION = 2
 #: What may always be unpacked, in bytes; more only if the file is not much smaller than that.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from safetensors import safe_open
 from safetensors.numpy import save
 
-from simgap_files import atomic_write_bytes
+from simgap_files.atomic import atomic_write_bytes
 
 VERSION = 2
 _KEY = "simgap"
