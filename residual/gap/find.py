@@ -94,7 +94,7 @@ def find_gap(
 
         tell("confirming")
         asked = matters(found, tolerance)
-        answer, on_time = inquiry.confirmed(prepared, found, asked, parameter_tolerance)
+        prepared, answer, said = inquiry.confirmed(log, prepared, found, asked, parameter_tolerance)
         clock.lap("confirm")
 
         if conventions is not None:  # it is asked first, so that nothing is certain before
@@ -107,6 +107,6 @@ def find_gap(
             )
             apart = judged_apart(answer, prepared, others, table)
         clock.lap("forecast")
-    quality = [*log.findings, *log.left_out, *on_hold, *on_time]
+    quality = [*log.findings, *log.left_out, *on_hold, *said]
     result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)
     return dataclasses.replace(result, conventions=conventions)

@@ -9,6 +9,7 @@ from typing import Any
 
 from residual.gap.answer.answer import Answer, confirm
 from residual.gap.answer.free_parameters import better, worth_freeing
+from residual.gap.answer.lone import Stretch, explains_the_rest, lone_stretch
 from residual.gap.confirmation.aliases import aliases, representatives
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
@@ -225,20 +226,29 @@ class Inquiry:
         return prepared, found, [says]
 
     def confirmed(
-        self, prepared: Prepared, found: Explanation, matters: bool, tolerance: float
-    ) -> tuple[Answer, list[str]]:
+        self, log: Log, prepared: Prepared, found: Explanation, matters: bool, tolerance: float
+    ) -> tuple[Prepared, Answer, list[str]]:
         """How sure what was found is, also with parameters free within their tolerance.
 
         Args:
+            log: What was recorded.
             prepared: With the windows that were searched.
             found: What was chosen.
             matters: False if the gap does not, so that nothing is named.
             tolerance: How well the simulator's parameters are known, as a share of each.
+
+        Returns:
+            The windows that the answer is of, the answer, and what is to be said of it.
         """
         groups, until = self.offered.groups, self.clock.confirm_until
         answer = confirm(found, groups, matters, tolerance, until)
-        beside = worth_freeing(answer, tolerance) if matters else []
         says = []
+        stretch = lone_stretch(answer) if matters else None
+        if stretch is not None:
+            elsewhere = self.elsewhere(stretch, log, found, tolerance)
+            says.append(stretch.says(left_out=elsewhere is not None))
+            prepared, answer = elsewhere or (prepared, answer)
+        beside = worth_freeing(answer, tolerance) if matters else []
         if beside and time.process_time() > self.clock.over:
             says.append(
                 "parameters within their tolerance may hide what is missing, or explain some of "
@@ -246,8 +256,22 @@ class Inquiry:
             )
         elif beside:
             self.tell("once more with parameters free within their tolerance")
-            again = self.explained(found.search.simulator, prepared, beside, found.search)
+            search = answer.found.search
+            again = self.explained(search.simulator, prepared, beside, search)
             second = confirm(again, groups, matters, tolerance, until)
             answer = second if better(second, answer) else answer
         claims = with_twins(answer.found.search, answer.key, answer.claims)
-        return dataclasses.replace(answer, claims=claims), says
+        return prepared, dataclasses.replace(answer, claims=claims), says
+
+    def elsewhere(
+        self, stretch: Stretch, log: Log, found: Explanation, tolerance: float
+    ) -> tuple[Prepared, Answer] | None:
+        """Windows and answer without a stretch of the log, if something is named so, in time."""
+        if time.process_time() > self.clock.search_until:
+            return None
+        self.tell("once more without a stretch that nothing explains")
+        simulator = found.search.simulator
+        ready = prepare(simulator, stretch.cut_from(log.runs), log.horizon)
+        again = self.explained(simulator, ready)
+        answer = confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
+        return (ready, answer) if explains_the_rest(answer) else None

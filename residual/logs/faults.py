@@ -17,6 +17,9 @@ Mask = NDArray[np.bool_]
 # A sample is wild if it leaves its neighbours, and comes back, by so many times what nearly all
 # changes between samples reach.
 WILD = 8.0
+# Or if the path through its neighbours is smooth: it leaves that by so many times what samples
+# usually do, and its neighbours by so many times what those differ from the next ones.
+_OFF_PATH, _ALONE = 20.0, 3.0
 # More of them than this share are noise with heavy tails, no accidents.
 RARE = 0.01
 # But none reaches out of nine tenths of all samples by so many times their range, in up to so many.
@@ -42,17 +45,22 @@ def wild_samples(runs: Sequence[Array]) -> list[Mask]:
     Returns:
         True where a sample is wild; nowhere if there are too many for accidents.
     """
-    usual, step = _usual_change(runs), rounding(runs)
+    usual, step, off = _usual_change(runs), rounding(runs), _usual_departure(runs)
     found = []
     for values in runs:
         mask = np.zeros(len(values), bool)
         if len(values) > 2:
-            before, after = np.diff(values)[:-1], np.diff(values)[1:]
+            moves = np.diff(values)
+            before, after = moves[:-1], moves[1:]
             least = np.minimum(np.abs(before), np.abs(after))
+            # What the neighbours differ from theirs; at the ends that is not known.
+            around = np.abs(np.concatenate([[np.inf], moves, [np.inf]]))
+            near = np.fmax(around[:-3], around[3:])
             with np.errstate(invalid="ignore"):
+                alone = (least > _ALONE * near) & (least > _OFF_PATH * max(off, step))
                 mask[1:-1] = (
                     (before * after < 0)
-                    & (least > WILD * max(usual, step))
+                    & ((least > WILD * max(usual, step)) | alone)
                     & (np.abs(before + after) < 0.3 * least)
                 )
         found.append(mask)
@@ -210,6 +218,14 @@ def _usual_change(runs: Sequence[Array]) -> float:
     # Short runs: one accident makes two of the largest changes.
     usual = 5.0 * float(np.quantile(changes, 0.9))
     return min(high, usual) if usual > 0 else high
+
+
+def _usual_departure(runs: Sequence[Array]) -> float:
+    """By how much samples usually leave the middle of their neighbours, rest left out."""
+    parts = [np.abs(np.diff(values, 2)) / 2 for values in runs if len(values) > 2]
+    departures = np.concatenate(parts or [np.zeros(0)])
+    departures = departures[departures > 0]
+    return float(np.median(departures)) / 0.6745 if departures.size else np.inf
 
 
 def stretches(mask: Mask) -> list[tuple[int, int]]:

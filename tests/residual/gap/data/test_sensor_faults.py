@@ -30,6 +30,27 @@ def test_a_wild_sample_is_taken_out_and_told(row, size, column):
     np.testing.assert_array_equal(done.trajectories[0].states[kept], bad.states[kept])
 
 
+@given(row=st.integers(5, 390), size=st.sampled_from([-1.0, 1.0]))
+@settings(max_examples=20, deadline=None)
+def test_a_spike_on_a_smooth_path_is_wild_even_if_motion_is_faster_elsewhere(row, size):
+    """1 rad is less than eight times what the rate of a spin moves an angle in a sample."""
+    run = noisy()
+    spin = np.linspace(0, 40, 200)
+    calm = np.array(run.states[:, 0])
+    calm[row] += size
+    wild = wild_samples([calm, spin])
+    assert np.flatnonzero(wild[0]).tolist() == [row]
+    assert not wild[1].any()
+
+
+@given(speed=st.floats(0.02, 2.0), row=st.integers(20, 380))
+@settings(max_examples=20, deadline=None)
+def test_a_bounce_between_two_samples_is_no_wild_sample(speed, row):
+    """It comes back, but as fast as it went."""
+    path = speed * np.abs(np.arange(400.0) - row) + 1e-3 * np.random.default_rng(0).normal(size=400)
+    assert not any(mask.any() for mask in wild_samples([path]))
+
+
 @given(row=st.integers(3, 380), count=st.integers(1, 9))
 @settings(max_examples=40, deadline=None)
 def test_zeros_amid_motion_are_drop_outs(row, count):

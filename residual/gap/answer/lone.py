@@ -1,0 +1,100 @@
+"""A stretch of a log that holds most of the error and that nothing explains: a hand, a knock.
+
+Sums of squares let one block outweigh all others. What happened in it is then all that is asked
+about, and if no effect hosts it, nothing is named, however clear the rest of the log is. One block
+is no evidence, neither for an effect nor against all of them: so it is told, and the rest is asked.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from residual.gap.answer.answer import Answer
+from residual.gap.data.blocks import ENOUGH
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.search.choice import takes_off
+from residual.trajectories import Trajectory
+
+#: Share of the nominal simulator's squared error, all joints averaged, that lies in one block.
+MOST = 0.5
+#: Part of its error in that block up to which a set explains it.
+HARDLY = 0.7
+
+
+@dataclasses.dataclass(frozen=True)
+class Stretch:
+    """Where it is.
+
+    Attributes:
+        run: Name of the run.
+        begin, end: Its first and last row, in s since the start of the log.
+        share: Its part of the nominal simulator's squared error.
+    """
+
+    run: str
+    begin: float
+    end: float
+    share: float
+
+    def says(self, left_out: bool) -> str:
+        """A sentence for the user."""
+        told = (
+            f"{self.share:.0%} of the squared error lies in one stretch, {self.run} from "
+            f"{self.begin:.4g} to {self.end:.4g} s, and nothing that was tried explains it: was "
+            "it held, knocked or reset there?"
+        )
+        if left_out:
+            return f"{told} It was left out of everything that is said"
+        return f"{told} Look there, or leave it out"
+
+    def cut_from(self, runs: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
+        """The runs without it: what comes before and after are runs of their own."""
+        kept: list[Trajectory] = []
+        for run in runs:
+            inside = (run.times >= self.begin) & (run.times <= self.end)
+            if run.name != self.run or not inside.any():
+                kept.append(run)
+                continue
+            first, last = np.flatnonzero(inside)[[0, -1]]
+            for a, b in ((0, int(first)), (int(last) + 1, len(run.times))):
+                if b - a > 1:
+                    times, states = run.times[a:b], run.states[a:b]
+                    kept.append(Trajectory(run.name, times, states, run.actions[a : b - 1]))
+        return tuple(kept)
+
+
+def lone_stretch(answer: Answer) -> Stretch | None:
+    """The block that holds most of the error, if what was named leaves it nearly as it was.
+
+    Args:
+        answer: What was found with all of the log.
+    """
+    search = answer.found.search
+    fitter = search.fitter
+    if not isinstance(fitter, SmoothFitter) or len(fitter.blocks) <= ENOUGH:
+        return None
+    nominal = search.before.squares
+    stakes = search.currency.by_block(nominal).mean(axis=1)
+    block = int(np.argmax(stakes))
+    if stakes[block] <= MOST * stakes.sum():
+        return None
+    left = search.currency.by_block(search.validated[answer.key].squares).mean(axis=1)
+    if left[block] < HARDLY * stakes[block]:
+        return None
+    windows, samples = fitter.blocks.windows, fitter.samples
+    own = fitter.blocks.block == block
+    rows = windows.index[own][windows.inside[own]]
+    run = samples.names[int(windows.run[own][0])]
+    begin, end = samples.times[rows.min()], samples.times[rows.max()]
+    return Stretch(run, float(begin), float(end), float(stakes[block] / stakes.sum()))
+
+
+def explains_the_rest(second: Answer) -> bool:
+    """Whether something was named without the stretch, and forecasts the rest materially better."""
+    search = second.found.search
+    before, after = search.before.squares, search.validated[second.key].squares
+    gained, error = search.currency.difference(before, after)
+    return bool(second.key) and gained > error and takes_off(search.currency, before, after)
