@@ -50,8 +50,8 @@ class JointEffect(Effect):
         if joint.rate is None and self.mechanical:
             raise ValueError(
                 f"{self.name} needs a joint with a rate; {joint.name!r} is the state of a "
-                "first-order system, which hosts a constant_load only; a speed is a channel of "
-                'kind="rate"'
+                "first-order system, which hosts constant_load and proportional_loss only; a speed "
+                'is a channel of kind="rate"'
             )
         speed = joint.position == joint.rate
         if speed and self.mechanical and not self.follows_rate:
@@ -149,6 +149,35 @@ class ConstantLoad(JointEffect):
     def force(self, q: Value, v: Value) -> Value:
         """The load, whatever the state."""
         return self.load + 0.0 * q
+
+
+@dataclasses.dataclass(frozen=True)
+class ProportionalLoss(JointEffect):
+    """Loss of what is there, on the state x of a first-order system: ``-rate x``.
+
+    A leak, an outflow, a decay, heat that goes to surroundings at zero. Together with a constant
+    load it draws to any other value. On a speed it is ``ViscousFriction``.
+    """
+
+    rate: Value = number(low=0.0, force=1, position=-1)
+
+    name: ClassVar[str] = "proportional_loss"
+    sentence: ClassVar[str] = "A loss in proportion to what is there: a leak, a decay."
+    needs: ClassVar[str] = "small and large values"
+    mechanical: ClassVar[bool] = False
+
+    def force(self, q: Value, v: Value) -> Value:
+        """Rate of change by the loss; the state of a first-order system counts as a rate."""
+        return -self.rate * v
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """See ``JointEffect.measures``; a joint that moves has viscous friction for it."""
+        if any(joint.name == self.joint and joint.rate is not None for joint in simulator.joints):
+            raise ValueError(
+                f"{self.name} needs the state of a first-order system, and {self.joint!r} moves: "
+                "there it is viscous_friction"
+            )
+        return super().measures(simulator)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -28,6 +28,7 @@ from sims.effects.joint import (
     ConstantLoad,
     CubicSpring,
     LinearSpring,
+    ProportionalLoss,
     QuadraticDrag,
     ViscousFriction,
 )
@@ -46,6 +47,7 @@ JOINT_EFFECTS: tuple[type[Effect], ...] = (
     LinearSpring,
     CubicSpring,
     ConstantLoad,
+    ProportionalLoss,
     Cogging,
     Backlash,
 )

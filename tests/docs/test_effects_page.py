@@ -7,15 +7,25 @@ import pytest
 
 from sims import effects
 from sims.effects import Effect, library
+from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel
 
 PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
 PLACES = {"joint": "joint", "actuator": "input", "channel": "measured channel"}
 
 
+class Tank(FirstOrderSystem):
+    state_channels = (Channel("level", "m", "other"),)
+    action_channels = (Channel("pump", "V", "input"),)
+
+    def derivative(self, x, u, p):
+        return u
+
+
 def row(effect: Effect) -> str:
     """The effect's row of the table; units are those of a joint that turns, driven by a voltage."""
-    known = effect.quantities(PendulumEquation())
+    known = effect.quantities(Tank() if effect.name == "proportional_loss" else PendulumEquation())
     numbers = ", ".join(f"`{name}` {quantity.unit}" for name, quantity in known.items())
     place = PLACES[next(iter(inspect.signature(type(effect)).parameters))]
     family = effect.family + (f", {effect.subfamily}" if effect.subfamily else "")
@@ -24,7 +34,8 @@ def row(effect: Effect) -> str:
 
 
 # One of each; on another channel an offset has another unit.
-LIBRARY = {e.name: e for e in reversed(library(PendulumEquation())) if e.enters != "parameter"}
+HOSTED = (*library(PendulumEquation()), *library(Tank()))
+LIBRARY = {e.name: e for e in reversed(HOSTED) if e.enters != "parameter"}
 
 
 @pytest.mark.parametrize("effect", LIBRARY.values(), ids=str)

@@ -9,6 +9,7 @@ from sims.effects import (
     ConstantLoad,
     CoulombFriction,
     LinearSpring,
+    ProportionalLoss,
     ViscousFriction,
     library,
 )
@@ -39,11 +40,24 @@ def test_first_order_system_follows_its_closed_form():
     assert after == pytest.approx(expected, abs=1e-9)
 
 
+def test_a_loss_in_proportion_decays_and_draws_to_where_a_load_says():
+    tank = Heater(effects=[ProportionalLoss("temperature", 0.02)])
+    after = tank.step([[0.0], [30.0]], [[0.0], [0.0]])
+    assert after == pytest.approx(np.array([[0.0], [30.0]]) * np.exp(-2.0 * 0.03), abs=1e-9)
+    drawn = tank.with_effects(
+        [ProportionalLoss("temperature", 0.02), ConstantLoad("temperature", 0.3)]
+    )
+    assert drawn.step([[10.0]], [[0.0]]) == pytest.approx(10.0, abs=1e-9)
+    with pytest.raises(ValueError, match="viscous_friction"):
+        Wheel(effects=[ProportionalLoss("speed", 0.02)])
+
+
 def test_first_order_system_keeps_the_contract_and_hosts_what_makes_sense():
     findings = check_simulator(Heater())
     assert all(finding.ok for finding in findings), "\n".join(map(str, findings))
     names = {str(effect) for effect in library(Heater())}
     assert {"constant_load@temperature", "delay@power", "sensor_scale@temperature"} <= names
+    assert "proportional_loss@temperature" in names
     assert {"capacity", "loss"} <= names
     assert not any("friction" in name or "spring" in name for name in names)
     with pytest.raises(ValueError, match="first-order"):

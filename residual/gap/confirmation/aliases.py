@@ -74,15 +74,26 @@ def numbers(effect: Effect, simulator: HostSimulator) -> int:
 def representatives(
     simulator: HostSimulator, offered: Sequence[Effect], groups: Mapping[str, tuple[str, ...]]
 ) -> list[Effect]:
-    """The offered effects without those that the first of their twins stands for."""
+    """The offered effects without those that the first of their twins stands for.
+
+    One that goes either way stands for one that does not: damping that a simulator has too much of
+    is no friction, which cannot be negative.
+    """
     width = {str(effect): numbers(effect, simulator) for effect in offered}
+    either = {str(effect): goes_either_way(effect, simulator) for effect in offered}
     kept = []
     for effect in offered:
         name = str(effect)
         equal = [n for n in groups.get(name, (name,)) if width[n] == width[name]]
-        if equal[0] == name:
+        if next((n for n in equal if either[n]), equal[0]) == name:
             kept.append(effect)
     return kept
+
+
+def goes_either_way(effect: Effect, simulator: HostSimulator) -> bool:
+    """Whether all strengths of an effect may be negative, too."""
+    known = effect.quantities(simulator).values()
+    return all(quantity.low < 0 for quantity in known if quantity.role == "strength")
 
 
 def hidden(

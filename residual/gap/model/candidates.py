@@ -152,7 +152,9 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     assert isinstance(there, JointEffect)
     size = effect.measures(simulator)["position"][1] if joint.rate else 1.0
     places = size * np.array([-0.7, 0.0, 0.4, 1.0])
-    return bool(np.ptp(there.force(places, np.zeros(4))) > 0)
+    # The state of a first-order system counts as a rate.
+    rates = np.zeros(4) if joint.rate else places
+    return bool(np.ptp(there.force(places, rates)) > 0)
 
 
 def _full(channel: Channel, reach: float) -> float:

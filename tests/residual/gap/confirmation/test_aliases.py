@@ -1,0 +1,82 @@
+"""Which of several effects that move alike is looked for, and what is found by it."""
+
+import numpy as np
+import pytest
+
+from residual.gap import find_gap
+from residual.gap.confirmation.aliases import aliases, representatives
+from residual.trajectories import Trajectory
+from sims.effects.library import library
+from sims.equations import FirstOrderSystem
+from sims.simulator import Channel, Parameter
+
+
+class Wheel(FirstOrderSystem):
+    """A driven wheel that its bearing brakes."""
+
+    dt = 0.1
+    state_channels = (Channel("speed", "rad/s", "rate", scale=10.0),)
+    action_channels = (Channel("drive", "V", "input", scale=5.0, low=-12.0, high=12.0),)
+    parameters = {
+        "gain": Parameter(4.0, "rad/s^2/V", "acceleration per volt", low=0.01),
+        "damping": Parameter(1.0, "1/s", "damping of the bearing", low=0.0),
+    }
+
+    def derivative(self, x, u, p):
+        return (p.gain * u[:, 0] - p.damping * x[:, 0])[:, None]
+
+
+class Tank(FirstOrderSystem):
+    """A tank that a pump fills."""
+
+    dt = 2.0
+    state_channels = (Channel("level", "cm", "other", scale=20.0),)
+    action_channels = (Channel("pump", "V", "input", scale=5.0, low=0.0, high=12.0),)
+    parameters = {"gain": Parameter(0.4, "cm/s/V", "inflow", low=0.01)}
+
+    def derivative(self, x, u, p):
+        return (p.gain * u[:, 0])[:, None]
+
+
+def logs(system, exact, low):
+    """Four records with noise, by the closed form of one control period, ``exact(x, u)``."""
+    found = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        inputs = np.repeat(rng.uniform(low, 10.0, 30), 10)
+        states = [0.0]
+        for u in inputs:
+            states.append(exact(states[-1], u))
+        seen = np.array(states) + 0.05 * rng.standard_normal(len(states))
+        times = system.dt * np.arange(len(states))
+        found.append(Trajectory(f"run {seed}", times, seen[:, None], inputs[:, None]))
+    return found
+
+
+def relaxing(gain, rate, dt):
+    return lambda x, u: gain * u / rate + (x - gain * u / rate) * np.exp(-rate * dt)
+
+
+def test_what_goes_either_way_stands_for_what_does_not():
+    wheel = Wheel()
+    offered = library(wheel)
+    groups, _ = aliases(wheel, offered)
+    kept = {str(effect) for effect in representatives(wheel, offered, groups)}
+    assert "viscous_friction@speed" in groups["damping"]
+    assert "damping" in kept and "viscous_friction@speed" not in kept
+
+
+@pytest.mark.parametrize("damping", [0.5, 1.6])
+def test_damping_that_is_too_large_is_found_as_one_that_is_too_small(damping):
+    result = find_gap(Wheel(), logs(Wheel(), relaxing(4.0, damping, 0.1), -10.0))
+    (verdict,) = [v for v in result.verdicts if v.effect]
+    assert (verdict.kind, verdict.label) == ("confirmed", "damping")
+    assert verdict.parameters["change"].value == pytest.approx(damping - 1.0, abs=0.01)
+    assert "viscous_friction@speed" in verdict.same_motion
+
+
+def test_a_leak_is_a_loss_in_proportion():
+    result = find_gap(Tank(), logs(Tank(), relaxing(0.4, 0.05, 2.0), 0.0))
+    (verdict,) = [v for v in result.verdicts if v.effect]
+    assert (verdict.kind, verdict.label) == ("confirmed", "proportional_loss@level")
+    assert verdict.parameters["rate"].value == pytest.approx(0.05, rel=0.01)
