@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.search.currency import Currency
-from residual.gap.search.known import departures
+from residual.gap.search.known import departures, parameters
 from residual.gap.search.sets import Key, Search
 from residual.gap.search.significance import score
 
@@ -35,6 +35,8 @@ NEAR = 1.5
 #: Loss over that of another set from which on a fit is no match, and the part of all blocks that
 #: the other set may forecast worse.
 NO_MATCH, ASTRAY = 9.0, 0.25
+#: Difference of the losses of sets that move exactly alike, as a share.
+ROUNDING = 1e-4
 #: Differences of relative errors below this are none, nor such below a part of the best error.
 SAME, ALIKE = 0.01, 0.1
 
@@ -130,7 +132,7 @@ def _fits_far_better(search: Search, key: Key, among: list[Key]) -> Key:
 def _better_fit(search: Search, keys: list[Key]) -> Key:
     """The set that forecasts best, or one that is as good within chance, of sizes that surprise
     less, and fits better; of sets that no data tell apart the one with the least to be otherwise
-    than was known."""
+    than was known, and of those that move exactly alike the one in the simulator's own terms."""
     best = min(keys, key=search.error)
     near = [k for k in keys if _does_as_well(search, k, best)] or [best]
     fewest = min(search.surprises(k) for k in near)
@@ -139,7 +141,14 @@ def _better_fit(search: Search, keys: list[Key]) -> Key:
     )
     most = search.tried[near[0]].merit + search.fitter.tie(search.tried[()])
     alike = [k for k in near if search.tried[k].merit <= most]
-    return min(alike, key=lambda k: departures(search, k))
+    least = min(alike, key=lambda k: departures(search, k))
+    same = [
+        k
+        for k in alike
+        if search.tried[k].merit <= (1 + ROUNDING) * search.tried[least].merit
+        and departures(search, k) <= departures(search, least)
+    ]
+    return max(same, key=lambda k: parameters(search, k))
 
 
 def _does_as_well(search: Search, key: Key, best: Key) -> bool:

@@ -37,6 +37,11 @@ def departures(search: Search, key: Key) -> float:
     return sum(_departure(search, effect) for effect in own)
 
 
+def parameters(search: Search, key: Key) -> int:
+    """How many members of a set are parameters that the simulator declares."""
+    return sum(isinstance(search.candidates[i].effect, ParameterChange) for i in key)
+
+
 def _departure(search: Search, effect: Effect) -> float:
     if not isinstance(effect, ParameterChange):
         return 1.0

@@ -69,6 +69,13 @@ def test_of_what_no_data_tell_apart_the_least_is_otherwise_than_was_known():
     assert choose(Toy(sets, merits, mass=0.33 * known)).key == (1, 3)
 
 
+def test_of_what_moves_exactly_alike_the_simulators_own_parameter_is_named():
+    known = PendulumEquation().parameters["mass"].value
+    sets = {(0, 3): 0.2, (1, 3): 0.2}
+    for merits in ({(0, 3): 20.0001, (1, 3): 20.0}, {(0, 3): 20.0, (1, 3): 20.0001}):
+        assert choose(Toy(sets, merits, mass=0.33 * known)).key == (0, 3)
+
+
 def test_what_would_be_surprisingly_large_comes_after_what_does_as_well():
     merits = {(0,): 50.0, (3,): 20.0}
     assert choose(Toy({(0,): 0.200, (3,): 0.201}, merits, surprising={3})).key == (0,)
