@@ -22,7 +22,7 @@ Kind = Literal[
 #: well, or there was no time to ask that, it is a time shorter than half a sample, its interval
 #: holds zero, or an effect of another kind does as well.
 Doubt = Literal[
-    "not_needed", "unsteady", "numerics", "at_bound", "may_be_at_bound", "calibration", "slight",
+    "not_needed", "unsteady", "numerics", "at_bound", "calibration", "slight",
     "no_time", "clock", "gross", "conventions", "may_be_zero", "share_may_be_zero", "rivals",
 ]  # fmt: skip
 

@@ -37,7 +37,6 @@ DOUBTS: dict[Doubt, str] = {
     "unsteady": "its size differs between parts of the data",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
-    "may_be_at_bound": "its interval ends at its bound, as if it wanted to be larger",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
     "conventions": "it has to be seen first whether the log counts as the simulator does",
     "gross": "a sensor is seldom wrong by a fifth of all that it showed, and something that the "

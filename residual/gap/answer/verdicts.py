@@ -47,18 +47,6 @@ def hardly_known(search: Search, claim: Claim) -> bool:
     return bool(told) and max(min(n.low / n.value, n.high / n.value) for n in told) < NEARLY_NONE
 
 
-def may_be_at_bound(search: Search, claim: Claim) -> bool:
-    """Whether the interval of a strength is cut off by its bound, other than none at all: how large
-    it wants to be is not known then, and a law that wants more than it can is often another one."""
-    strengths = [knob for knob in search.candidates[claim.number].knobs if knob.strength]
-    told = [(knob, claim.numbers[knob.field]) for knob in strengths if knob.field in claim.numbers]
-    return any(
-        n.high >= knob.high or (n.low <= knob.low and knob.low != 0)
-        for knob, n in told
-        if not n.at_bound
-    )
-
-
 def _strengths(search: Search, claim: Claim) -> list[Number]:
     """The numbers of an effect without which it is absent."""
     knobs = search.candidates[claim.number].knobs
@@ -97,8 +85,7 @@ def effect_verdict(
     claim = claim.less(stand_ins)
     effect = search.candidates[claim.number].effect
     vanishes = may_vanish(search, claim) or hardly_known(search, claim)
-    ends = may_be_at_bound(search, claim)
-    sure = claim.sure and blocks >= TOO_FEW and not (vanishes or ends)
+    sure = claim.sure and blocks >= TOO_FEW and not vanishes
     kind: Kind = "confirmed" if sure else "ambiguous"
     family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""
     numbers = ", ".join(
@@ -147,8 +134,6 @@ def effect_verdict(
         says.append("its size changes with the integration step or the input's hold")
     if claim.bounded:
         says.append("its size is at its bound")
-    if ends:
-        says.append("its size may be at its bound")
     if vanishes:
         says.append("its size may be zero")
     if not claim.gains:
@@ -159,18 +144,17 @@ def effect_verdict(
         kind, effect.name, effect.where, claim.numbers,
         tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
         "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
-        doubts(claim, vanishes, ends), shape=given, meant=claim.meant, beside=claim.beside,
+        doubts(claim, vanishes), shape=given, meant=claim.meant, beside=claim.beside,
     )  # fmt: skip
 
 
-def doubts(claim: Claim, vanishes: bool, ends: bool) -> tuple[Doubt, ...]:
+def doubts(claim: Claim, vanishes: bool) -> tuple[Doubt, ...]:
     """Why an effect is not certain."""
     why: dict[Doubt, bool] = {
         "not_needed": not claim.needed,
         "unsteady": not claim.steady,
         "numerics": not claim.sound,
         "at_bound": claim.bounded,
-        "may_be_at_bound": ends,
         "calibration": claim.calibration and not claim.slight,
         "slight": claim.slight,
         "no_time": claim.unasked,

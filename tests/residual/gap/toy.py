@@ -81,9 +81,7 @@ class Toy:
         self.unfit, self.refused, self.nearly = set(), {}, set()
         self.candidates = [
             SimpleNamespace(
-                effect=e,
-                label=str(e),
-                knobs=(SimpleNamespace(field="change", strength=True, low=-1.0, high=1.0),),
+                effect=e, label=str(e), knobs=(SimpleNamespace(field="change", strength=True),)
             )
             for e in EFFECTS
         ]

@@ -193,16 +193,6 @@ def test_only_what_leaves_no_doubt_is_confirmed():
     assert (alike.kind, alike.alternatives) == ("ambiguous", ("constant_load@pivot",))
 
 
-@pytest.mark.parametrize(("end", "kind"), [(0.9, "confirmed"), (1.0, "ambiguous")])
-def test_an_interval_that_its_bound_cuts_off_is_no_certain_size(end, kind):
-    toy = Toy({(0,): 0.3})
-    (knob,) = toy.candidates[0].knobs
-    up_to = claim(numbers={"change": Number(0.5 * knob.high, 0.1 * knob.high, end * knob.high, "")})
-    verdict = effect_verdict(toy, up_to, 20)
-    assert verdict.kind == kind
-    assert ("may_be_at_bound" in verdict.doubts) is (kind == "ambiguous")
-
-
 def test_rivals_of_one_family_leave_the_family_confirmed():
     verdict = effect_verdict(Toy({(1,): 0.3}), claim(1, form=("coulomb_friction@pivot",)), 20)
     assert (verdict.kind, verdict.family) == ("confirmed", "dissipation")
