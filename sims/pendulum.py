@@ -207,4 +207,5 @@ def _halves(inputs: Array) -> Array:
     if inputs.ndim == 3:
         return np.repeat(inputs[:, :, 0], 2, axis=1)
     mean, quarter = inputs[:, :, 0, 0], 0.25 * inputs[:, :, 0, 1]
-    return np.stack([mean - quarter, mean + quarter], axis=2).reshape(len(mean), -1)
+    ends = np.stack([mean - quarter, mean + quarter], axis=2)
+    return ends.reshape(len(mean), 2 * mean.shape[1])

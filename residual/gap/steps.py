@@ -10,7 +10,7 @@ from typing import Any
 from residual.gap.answer.answer import Answer, confirm
 from residual.gap.answer.free_parameters import better, worth_freeing
 from residual.gap.answer.lone import Stretch, explains_the_rest, lone_stretch
-from residual.gap.confirmation.aliases import aliases, representatives
+from residual.gap.confirmation.aliases import aliases, less_of, representatives
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
 from residual.gap.confirmation.twins import exact_twins, with_twins
@@ -132,12 +132,14 @@ class Offered:
     Attributes:
         by_label: All of them.
         kept: One of each group that no motion tells apart.
+        less: Parameters of which there may be too much, where what is kept cannot be negative.
         groups: Those groups by label.
         sets: Sets of which one is exactly made of the others.
     """
 
     by_label: Mapping[str, Effect]
     kept: Sequence[Effect]
+    less: Sequence[Effect]
     groups: dict[str, tuple[str, ...]]
     sets: Sequence[tuple[str, ...]]
 
@@ -154,7 +156,8 @@ class Offered:
             offered = tuple(effect for effect in offered if not effect.upstream_of_sensor)
         groups, sets = aliases(log.simulator, offered, log.runs)
         kept = representatives(log.simulator, offered, groups)
-        return cls({str(effect): effect for effect in offered}, kept, groups, sets)
+        less = less_of(log.simulator, offered, groups)
+        return cls({str(effect): effect for effect in offered}, kept, less, groups, sets)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -180,7 +183,9 @@ class Inquiry:
     ) -> Explanation:
         """The effects that explain a log, see ``explain``."""
         free = {candidate.label for candidate in beside}
-        pool = ready.pool(candidates(simulator, self.offered.kept, ready.fitter.samples))
+        samples = ready.fitter.samples
+        less = [one.taking_away() for one in candidates(simulator, self.offered.less, samples)]
+        pool = ready.pool([*candidates(simulator, self.offered.kept, samples), *less])
         pool = [candidate for candidate in pool if candidate.label not in free]
         others = {label: e for label, e in self.offered.by_label.items() if label not in free}
         twins = exact_twins(simulator, ready.fitter.samples, self.offered.groups, others)

@@ -144,3 +144,10 @@ def test_fast_spinning_stays_accurate():
     states, actions = np.array([[0.3, 55.0], [2.0, -40.0]]), np.array([[3.0], [-3.0]])
     error = Pendulum.true().step(states, actions) - reference(states, actions[:, 0], 0.090, 1.91e-4)
     assert np.abs(error).max() < 1e-3
+
+
+def test_no_rows_are_no_error():
+    pendulum = Pendulum()
+    held, running = np.zeros((0, 4, 1)), np.zeros((0, 4, 1, 2))
+    for inputs in (held, running):
+        assert pendulum.integrate(np.zeros((0, 2)), inputs, np.zeros(0)).shape == (0, 2)

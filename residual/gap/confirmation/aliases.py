@@ -12,6 +12,7 @@ from residual.gap.result import Blind
 from residual.trajectories import Trajectory
 from sims.effects.aliases import exact_aliases, probes
 from sims.effects.base import Effect
+from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
 from sims.simulator import Array
 
@@ -74,23 +75,38 @@ def numbers(effect: Effect, simulator: HostSimulator) -> int:
 def representatives(
     simulator: HostSimulator, offered: Sequence[Effect], groups: Mapping[str, tuple[str, ...]]
 ) -> list[Effect]:
-    """The offered effects without those that the first of their twins stands for.
+    """The offered effects without those that the first of their twins stands for."""
+    first = _first_twins(simulator, offered, groups)
+    return [effect for effect in offered if first[str(effect)] == str(effect)]
 
-    One that goes either way stands for one that does not: damping that a simulator has too much of
-    is no friction, which cannot be negative.
-    """
-    width = {str(effect): numbers(effect, simulator) for effect in offered}
-    either = {str(effect): goes_either_way(effect, simulator) for effect in offered}
-    kept = []
+
+def less_of(
+    simulator: HostSimulator, offered: Sequence[Effect], groups: Mapping[str, tuple[str, ...]]
+) -> list[Effect]:
+    """Parameters of which a simulator may have too much, while the twin that stands for them cannot
+    be negative: damping that is too large is no friction."""
+    first = _first_twins(simulator, offered, groups)
+    either = {str(effect): _goes_either_way(effect, simulator) for effect in offered}
+    found: dict[str, Effect] = {}
     for effect in offered:
         name = str(effect)
-        equal = [n for n in groups.get(name, (name,)) if width[n] == width[name]]
-        if next((n for n in equal if either[n]), equal[0]) == name:
-            kept.append(effect)
-    return kept
+        if isinstance(effect, ParameterChange) and either[name] and not either[first[name]]:
+            found.setdefault(first[name], effect)
+    return list(found.values())
 
 
-def goes_either_way(effect: Effect, simulator: HostSimulator) -> bool:
+def _first_twins(
+    simulator: HostSimulator, offered: Sequence[Effect], groups: Mapping[str, tuple[str, ...]]
+) -> dict[str, str]:
+    """Of each offered effect the first of its twins with as many numbers, by label."""
+    width = {str(effect): numbers(effect, simulator) for effect in offered}
+    return {
+        name: next(n for n in groups.get(name, (name,)) if width[n] == width[name])
+        for name in width
+    }
+
+
+def _goes_either_way(effect: Effect, simulator: HostSimulator) -> bool:
     """Whether all strengths of an effect may be negative, too."""
     known = effect.quantities(simulator).values()
     return all(quantity.low < 0 for quantity in known if quantity.role == "strength")
@@ -110,7 +126,7 @@ def hidden(
     smallest: dict[int, tuple[float, str, float]] = {}
     for variant in around.variants:
         candidate = pool[variant.candidate]
-        if candidate.fixed_level or variant.candidate in chosen:
+        if candidate.fixed_level or candidate.less or variant.candidate in chosen:
             continue
         for row, column in enumerate(variant.columns):
             knob = next(i for i in np.flatnonzero(variant.linear) if variant.trial.values[row, i])

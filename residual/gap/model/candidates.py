@@ -96,6 +96,17 @@ class Candidate:
         return not any(k.strength for k in self.knobs)
 
     @property
+    def less(self) -> bool:
+        """True if it only takes away what the simulator has too much of."""
+        return all(knob.high <= 0 for knob in self.knobs)
+
+    def taking_away(self) -> Candidate:
+        """The same with numbers that are not positive."""
+        knobs = tuple(dataclasses.replace(knob, high=0.0) for knob in self.knobs)
+        trials = tuple(Trial(-np.abs(t.values), np.ones_like(t.one_sided)) for t in self.trials)
+        return dataclasses.replace(self, knobs=knobs, trials=trials, bold=None)
+
+    @property
     def linear(self) -> NDArray[np.bool_]:
         """Which knobs scale with the coefficient of a signature column."""
         return np.array([knob.strength for knob in self.knobs])
