@@ -10,7 +10,12 @@ from typing import Any
 from residual.gap.answer.answer import Answer, confirm
 from residual.gap.answer.free_parameters import better, worth_freeing
 from residual.gap.answer.lone import Stretch, explains_the_rest, lone_stretch
-from residual.gap.confirmation.aliases import aliases, less_of, representatives
+from residual.gap.confirmation.aliases import (
+    aliases,
+    beyond_parameters,
+    less_of,
+    representatives,
+)
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
 from residual.gap.confirmation.twins import exact_twins, with_twins
@@ -154,6 +159,7 @@ class Offered:
         offered = chosen_effects(log.simulator, [LIBRARY] if effects is None else list(effects))
         if measured_input:
             offered = tuple(effect for effect in offered if not effect.upstream_of_sensor)
+        offered = beyond_parameters(log.simulator, offered)
         groups, sets = aliases(log.simulator, offered, log.runs)
         kept = representatives(log.simulator, offered, groups)
         less = less_of(log.simulator, offered, groups)

@@ -72,8 +72,8 @@ def exact_aliases(
             random states are as large as channels' scales, and equations may change beyond.
     """
     plain = simulator.with_effects(())
-    columns, blurs = _linear(plain, *probes(plain, rng or np.random.default_rng(0)))
-    there = _linear(plain, *seen) if seen is not None else ({}, {})
+    columns, blurs = linear_columns(plain, *probes(plain, rng or np.random.default_rng(0)))
+    there = linear_columns(plain, *seen) if seen is not None else ({}, {})
 
     def alike_there(names: Sequence[str]) -> bool:
         return not all(name in there[0] for name in names) or _dependent(names, *there)
@@ -114,37 +114,6 @@ def exact_twins(simulator: HostSimulator) -> dict[str, frozenset[str]]:
     return {name: frozenset(twins) for twins in pairs for name in twins}
 
 
-def near_combinations(
-    simulator: HostSimulator,
-    names: Sequence[str],
-    share: float = 0.03,
-    rng: np.random.Generator | None = None,
-) -> tuple[str, ...]:
-    """Single effects that some effects imitate together, all but a small share of the motion.
-
-    A pendulum's mass, for example, is its inertia and its motor's resistance but for the
-    damping of the bearing, which is little beside the motor's.
-
-    Args:
-        simulator: A host, with or without effects.
-        names: The effects that act together, ``name@where``.
-        share: Part of the motion that may differ.
-        rng: As for ``exact_aliases``, like the effects that are compared.
-    """
-    plain = simulator.with_effects(())
-    columns, _ = _linear(plain, *probes(plain, rng or np.random.default_rng(0)))
-    if not all(name in columns for name in names):
-        return ()
-    size = min(len(column) for column in columns.values())
-    matrix = np.stack([columns[name][:size] for name in names], axis=1)
-    found = []
-    for name, column in columns.items():
-        rest = column - matrix @ np.linalg.lstsq(matrix, column, rcond=None)[0]
-        if name not in names and np.linalg.norm(rest) < share:
-            found.append(name)
-    return tuple(found)
-
-
 def probes(simulator: HostSimulator, rng: np.random.Generator) -> tuple[Array, Array]:
     """Random states (96, n_s) and inputs (96, n_a) where a small change has a small effect."""
     states = simulator.smooth_states(96, rng)
@@ -181,7 +150,7 @@ def _read_after(
     return after
 
 
-def _linear(
+def linear_columns(
     plain: HostSimulator, states: Array, inputs: Array
 ) -> tuple[dict[str, Array], dict[str, float]]:
     """Change of the motion per strength of every effect that is linear in one, of unit length."""

@@ -10,8 +10,11 @@ from residual.gap.fitting.screening import Signatures
 from residual.gap.model.candidates import Candidate
 from residual.gap.result import Blind
 from residual.trajectories import Trajectory
+from sims.effects.actuator import ActuatorGain
 from sims.effects.aliases import exact_aliases, probes
 from sims.effects.base import Effect
+from sims.effects.combinations import made_by
+from sims.effects.joint import ConstantLoad, ProportionalLoss
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
 from sims.simulator import Array
@@ -70,6 +73,19 @@ def _rows_of(simulator: HostSimulator, runs: Sequence[Trajectory]) -> tuple[Arra
 def numbers(effect: Effect, simulator: HostSimulator) -> int:
     """How many numbers of an effect are fitted."""
     return sum(quantity.fitted for quantity in effect.quantities(simulator).values())
+
+
+def beyond_parameters(simulator: HostSimulator, offered: Sequence[Effect]) -> tuple[Effect, ...]:
+    """The offered effects without losses that the simulator's own parameters make already.
+
+    With gains and loads, a time constant and a temperature of the surroundings make any loss in
+    proportion: a law for it would only be another name for them.
+    """
+    if not any(isinstance(effect, ProportionalLoss) for effect in offered):
+        return tuple(offered)
+    own = [str(e) for e in offered if isinstance(e, ParameterChange | ActuatorGain | ConstantLoad)]
+    made = made_by(simulator, own)
+    return tuple(e for e in offered if not (isinstance(e, ProportionalLoss) and str(e) in made))
 
 
 def representatives(

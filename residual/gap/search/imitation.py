@@ -9,7 +9,7 @@ from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
 from residual.gap.search.sets import Key, Search
 from residual.gap.search.significance import score, size
-from sims.effects.aliases import near_combinations
+from sims.effects.combinations import near_combinations
 from sims.effects.library import library
 
 

@@ -8,7 +8,7 @@ import pytest
 from residual.gap.answer.table import no_better
 from residual.gap.answer.verdicts import dependent, nameable
 from residual.gap.result import Number
-from sims.effects.aliases import near_combinations
+from sims.effects.combinations import near_combinations
 from sims.pendulum_equation import PendulumEquation
 
 SETS = (

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from residual.gap import find_gap
-from residual.gap.confirmation.aliases import aliases, less_of, representatives
+from residual.gap.confirmation.aliases import (
+    aliases,
+    beyond_parameters,
+    less_of,
+    representatives,
+)
 from residual.trajectories import Trajectory
 from sims.effects.library import library
 from sims.equations import FirstOrderSystem
@@ -81,3 +86,25 @@ def test_a_leak_is_a_loss_in_proportion():
     (verdict,) = [v for v in result.verdicts if v.effect]
     assert (verdict.kind, verdict.label) == ("confirmed", "proportional_loss@level")
     assert verdict.parameters["rate"].value == pytest.approx(0.05, rel=0.01)
+
+
+class Oven(FirstOrderSystem):
+    """Heated, and cooled by the room."""
+
+    dt = 2.0
+    state_channels = (Channel("temperature", "K", "other", scale=300.0),)
+    action_channels = (Channel("power", "W", "input", scale=10.0, low=0.0, high=20.0),)
+    parameters = {
+        "gain": Parameter(3.0, "K/W", "heating", low=0.01),
+        "time_constant": Parameter(60.0, "s", "time constant", low=1.0),
+        "room": Parameter(295.0, "K", "temperature of the room"),
+    }
+
+    def derivative(self, x, u, p):
+        return ((p.room + p.gain * u[:, 0] - x[:, 0]) / p.time_constant)[:, None]
+
+
+def test_a_loss_that_parameters_make_is_no_law_of_its_own():
+    for system, there in ((Oven(), False), (Tank(), True)):
+        names = {effect.name for effect in beyond_parameters(system, library(system))}
+        assert ("proportional_loss" in names) is there
