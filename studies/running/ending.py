@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import _thread
 import atexit
+import contextlib
 import functools
 import importlib
 import os
@@ -10,10 +12,11 @@ import signal
 import sys
 import sysconfig
 import tempfile
+import threading
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -48,6 +51,27 @@ def fail(message: str) -> NoReturn:
     raise SystemExit(2)
 
 
+@contextlib.contextmanager
+def passing_on_interrupts() -> Iterator[None]:
+    """Within, a Ctrl-C that lands in a library's callback is passed on, not printed and lost.
+
+    Pymunk frees its bodies in callbacks, out of which no exception can come.
+    """
+    usual = sys.unraisablehook
+
+    def pass_on(told: Any) -> None:
+        if told.exc_type is KeyboardInterrupt:
+            threading.Timer(0.05, _thread.interrupt_main).start()
+        else:
+            usual(told)
+
+    sys.unraisablehook = pass_on
+    try:
+        yield
+    finally:
+        sys.unraisablehook = usual
+
+
 def guarded(
     resumes: bool = True,
 ) -> Callable[[Callable[[Sequence[str] | None], None]], Callable[..., None]]:
@@ -70,7 +94,7 @@ def guarded(
             debug = DEBUG in given or os.environ.get(DEBUG_VARIABLE, "") not in ("", "0")
             try:
                 rest, trusted = _trusted([argument for argument in given if argument != DEBUG])
-                with trusting(trusted):
+                with trusting(trusted), passing_on_interrupts():
                     main(rest)
             except KeyboardInterrupt:
                 if debug:

@@ -11,6 +11,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import cffi
 import numpy as np
 import pytest
 from hypothesis import given
@@ -22,7 +23,13 @@ from studies import learn
 from studies.learning.trial import build_parser
 from studies.pendulum_gap import STUDY
 from studies.running import ending
-from studies.running.ending import check_output, fail, guarded, on_purpose
+from studies.running.ending import (
+    check_output,
+    fail,
+    guarded,
+    on_purpose,
+    passing_on_interrupts,
+)
 from studies.running.grids import expand_grid
 
 BASE = {"seed": 0, "budget": {"true_samples": 3750, "iterations": 2}, "estimator": {}}
@@ -271,3 +278,16 @@ def test_a_system_file_that_is_no_python_is_the_users(tmp_path, monkeypatch, cap
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and f"{tmp_path / 'unclosed.py'}, line 3" in said
     assert "never closed" in said and not (tmp_path / "out").exists()
+
+
+def test_control_c_in_a_callback_is_passed_on(capsys):
+    ffi = cffi.FFI()
+
+    def free(_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), passing_on_interrupts():
+        freed = ffi.gc(ffi.new("int*"), free)
+        del freed
+        time.sleep(10)
+    assert capsys.readouterr().err == ""
