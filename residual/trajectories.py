@@ -140,6 +140,15 @@ class Trajectory:
                 "less, each held from one sample to the next"
             )
 
+    def piece(self, start: int, stop: int, name: str | None = None) -> Trajectory:
+        """The samples from ``start`` to before ``stop``, under this or another name."""
+        return Trajectory(
+            self.name if name is None else name,
+            self.times[start:stop],
+            self.states[start:stop],
+            self.actions[start : stop - 1],
+        )
+
     @property
     def durations(self) -> Array:
         """Time from each sample to the next, in s, shape (T,)."""

@@ -61,8 +61,7 @@ class Stretch:
             first, last = np.flatnonzero(inside)[[0, -1]]
             for a, b in ((0, int(first)), (int(last) + 1, len(run.times))):
                 if b - a > 1:
-                    times, states = run.times[a:b], run.states[a:b]
-                    kept.append(Trajectory(run.name, times, states, run.actions[a : b - 1]))
+                    kept.append(run.piece(a, b))
         return tuple(kept)
 
 

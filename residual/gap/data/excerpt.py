@@ -36,7 +36,7 @@ def excerpt(
         return tuple(runs), []
     length = STRETCH * stride
     pieces = [
-        Trajectory(run.name, run.times[a : b + 1], run.states[a : b + 1], run.actions[a:b])
+        run.piece(a, b + 1)
         for run in runs
         for a in range(0, len(run), length)
         for b in (min(a + length, len(run)),)

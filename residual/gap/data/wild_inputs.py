@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 from collections.abc import Sequence
 
@@ -98,12 +97,5 @@ def _pieces(run: Trajectory, gone: Mask) -> list[Trajectory]:
     edges = [0, *(np.flatnonzero(gone) + 1).tolist(), len(run.times)]
     spans = [(a, b) for a, b in itertools.pairwise(edges) if b - a >= SHORTEST]
     return [
-        dataclasses.replace(
-            run,
-            name=f"{run.name} part {number}",
-            times=run.times[a:b],
-            states=run.states[a:b],
-            actions=run.actions[a : b - 1],
-        )
-        for number, (a, b) in enumerate(spans, start=1)
+        run.piece(a, b, f"{run.name} part {number}") for number, (a, b) in enumerate(spans, start=1)
     ]
