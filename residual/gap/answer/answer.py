@@ -16,7 +16,6 @@ from residual.gap.answer.verdicts import (
     calibrated_verdict,
     dependent,
     effect_verdict,
-    may_vanish,
     minor_verdict,
     nameable,
     no_gap_verdict,
@@ -27,6 +26,7 @@ from residual.gap.confirmation.aliases import hidden
 from residual.gap.confirmation.certainty import claims, in_plain_form, share
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.numerics import other_numerics, with_enough_substeps
+from residual.gap.confirmation.size import may_vanish
 from residual.gap.confirmation.tolerance import allow_for_parameters
 from residual.gap.fitting.forecasts import fitted_floor, main_channel, noise_floor
 from residual.gap.fitting.smooth import SmoothFitter

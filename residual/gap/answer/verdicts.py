@@ -8,6 +8,7 @@ import numpy as np
 
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
 from residual.gap.confirmation.claim import Claim
+from residual.gap.confirmation.size import may_be_none, may_vanish
 from residual.gap.fitting.contract import Left
 from residual.gap.result import Blind, Doubt, Gap, Kind, Number, Span, Verdict
 from residual.gap.search.sets import Key, Search
@@ -15,8 +16,6 @@ from residual.gap.search.sets import Key, Search
 #: Families of which an effect may be one and still be worth a name, if forecasts do not clearly
 #: need it. What they do need makes a better simulator, whichever of many it is.
 UNNEEDED = 3
-#: Part of a strength below which an effect hardly acts.
-NEARLY_NONE = 0.1
 #: Part of what a parameter may change by that is a change.
 MOVED = 1e-3
 
@@ -31,27 +30,6 @@ def nameable(search: Search, claim: Claim, blocks: int, adequate: bool) -> bool:
     few = claim.needed or len(families(search, claim)) <= UNNEEDED
     there = claim.by_fit or not may_vanish(search, claim)
     return few and blocks >= TOO_FEW and there
-
-
-def may_vanish(search: Search, claim: Claim) -> bool:
-    """Whether none of an effect's strengths is known to be other than zero."""
-    numbers = _strengths(search, claim)
-    return bool(numbers) and all(
-        n.low <= 0 <= n.high and (not n.at_bound or n.value == 0) for n in numbers
-    )
-
-
-def hardly_known(search: Search, claim: Claim) -> bool:
-    """Whether every strength of an effect may be less than a part of what was found."""
-    told = [n for n in _strengths(search, claim) if n.value and not n.at_bound]
-    return bool(told) and max(min(n.low / n.value, n.high / n.value) for n in told) < NEARLY_NONE
-
-
-def _strengths(search: Search, claim: Claim) -> list[Number]:
-    """The numbers of an effect without which it is absent."""
-    knobs = search.candidates[claim.number].knobs
-    fields = [knob.field for knob in knobs if knob.strength]
-    return [claim.numbers[field] for field in fields if field in claim.numbers]
 
 
 def families(search: Search, claim: Claim) -> set[str]:
@@ -84,7 +62,7 @@ def effect_verdict(
     """
     claim = claim.less(stand_ins)
     effect = search.candidates[claim.number].effect
-    vanishes = may_vanish(search, claim) or hardly_known(search, claim)
+    vanishes = may_be_none(search, claim)
     sure = claim.sure and blocks >= TOO_FEW and not vanishes
     kind: Kind = "confirmed" if sure else "ambiguous"
     family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""
