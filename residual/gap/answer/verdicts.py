@@ -62,7 +62,7 @@ def effect_verdict(
     """
     claim = claim.less(stand_ins)
     effect = search.candidates[claim.number].effect
-    vanishes = may_be_none(search, claim)
+    vanishes = may_vanish(search, claim) if claim.there else may_be_none(search, claim)
     sure = claim.sure and blocks >= TOO_FEW and not vanishes
     kind: Kind = "confirmed" if sure else "ambiguous"
     family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""

@@ -42,6 +42,7 @@ class Claim:
         gross: Whether it is a sensor further off than sensors are, beside a remainder.
         by_fit: Whether a fit to all data leaves three times as much without it: forecasts of single
             blocks may go astray all the same, where motion hangs on a hair.
+        there: Whether nothing comes near without it, parameters free, so that it has a size.
         meant: Numbers of its twins in its place.
         beside: Its own numbers beside twins of the others, where they differ.
     """
@@ -64,6 +65,7 @@ class Claim:
     gross: bool = False
     counted: bool = False
     by_fit: bool = False
+    there: bool = False
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
 

@@ -7,9 +7,8 @@ import dataclasses
 import numpy as np
 
 from residual.gap.confirmation.claim import Claim
-from residual.gap.result import Number
-from residual.gap.search.sets import Search
 from residual.gap.model.candidates import Knob
+from residual.gap.search.sets import Search
 
 #: Part of a strength below which an effect hardly acts.
 NEARLY_NONE = 0.1
@@ -25,14 +24,15 @@ def may_vanish(search: Search, claim: Claim) -> bool:
 
 def may_be_none(search: Search, claim: Claim) -> bool:
     """Whether every strength of an effect may be zero, or less than a part of what was found."""
+    if may_vanish(search, claim):
+        return True
     numbers = [claim.numbers[knob.field] for knob in strengths(search, claim)]
     told = [n for n in numbers if n.value and not n.at_bound]
-    hardly = bool(told) and max(min(n.low / n.value, n.high / n.value) for n in told) < NEARLY_NONE
-    return hardly or may_vanish(search, claim)
+    return bool(told) and max(min(n.low / n.value, n.high / n.value) for n in told) < NEARLY_NONE
 
 
 def with_size(search: Search, claim: Claim) -> Claim:
-    """An effect that is there for certain, its strength with an interval that leaves out zero.
+    """The claim, without zero in its interval if the effect is there for certain.
 
     What only a ratio of numbers is well known of, such as friction over a gain where inertia hardly
     matters, has a standard deviation as large as itself. Its size is then a matter of factors: the
@@ -40,21 +40,32 @@ def with_size(search: Search, claim: Claim) -> Claim:
     their intervals stay.
     """
     only = strengths(search, claim)
-    if len(only) != 1 or not claim.numbers[only[0].field].value:
+    uncertain = claim.there and may_be_none(search, claim)
+    if not uncertain or len(only) != 1 or not claim.numbers[only[0].field].value:
         return claim
     (knob,) = only
     number = claim.numbers[knob.field]
     low, high = by_factors(number.value, number.low, number.high, knob)
+    if min(low / number.value, high / number.value) < NEARLY_NONE:
+        return claim
     exact = number.if_exact and by_factors(number.value, *number.if_exact, knob)
     number = dataclasses.replace(number, low=low, high=high, if_exact=exact)
     return dataclasses.replace(claim, numbers={**claim.numbers, knob.field: number})
 
 
 def by_factors(value: float, low: float, high: float, knob: Knob) -> tuple[float, float]:
-    """An interval about a value on a logarithmic scale, as wide there as it was on a linear one."""
-    factor = float(np.exp(max(high - value, value - low) / abs(value)))
-    least, most = sorted((value / factor, value * factor))
-    return max(least, knob.low), min(most, knob.high)
+    """An interval about a value, each side as far on a logarithmic scale as on a linear one.
+
+    A side that a bound cuts off goes as far as the other.
+    """
+    below, above = value - low, high - value
+    if low <= knob.low:
+        below = max(below, above)
+    if high >= knob.high:
+        above = max(below, above)
+    with np.errstate(over="ignore"):
+        sides = value * np.exp(np.array([-below, above]) / value)
+    return max(float(sides.min()), knob.low), min(float(sides.max()), knob.high)
 
 
 def strengths(search: Search, claim: Claim) -> list[Knob]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from residual.gap.confirmation.certainty import CLEARLY, tie, where_it_matters
 from residual.gap.confirmation.certainty import HOPELESS as NO_MATCH
 from residual.gap.confirmation.claim import Claim
-from residual.gap.confirmation.size import may_be_none, with_size
+from residual.gap.confirmation.size import with_size
 from residual.gap.confirmation.widening import widened
 from residual.gap.fitting.bounded import bounded_step
 from residual.gap.fitting.contract import UNCONVERGED, Fit
@@ -107,6 +107,7 @@ def allow_for_parameters(
             ]
             claim = dataclasses.replace(claim, rivals=tuple(dict.fromkeys(rivals)))
         told.append(claim)
+
     def certainly_there(claim: Claim) -> bool:
         """Whether nothing comes near without an effect, parameters free."""
         without = all_but(key, claim.number)
@@ -119,12 +120,11 @@ def allow_for_parameters(
     half = 1.96 * deviations(beside.fit, search.fitter.blocks)
     final = []
     for claim in widened(search, key, told, beside.fit, adequate):
-        there = bool(may_be_none(search, claim)) and certainly_there(claim)
-        claim = with_size(search, claim) if there else claim
+        claim = with_size(search, dataclasses.replace(claim, there=certainly_there(claim)))
         own = np.flatnonzero(beside.fit.model.owner == key.index(claim.number))
         sizes = own[search.candidates[claim.number].linear]
         lost = bool(sizes.size) and not (np.abs(beside.fit.theta) > half)[sizes].any()
-        if (lost and not there) or within(search, claim, tolerance):
+        if (lost and not claim.there) or within(search, claim, tolerance):
             claim = dataclasses.replace(claim, calibration=True, slight=False)
         final.append(claim)
     return final
