@@ -9,12 +9,13 @@ from typing import Any
 from residual.gap.answer.answer import judged_apart, matters, summed_up, told
 from residual.gap.data.examine import examine
 from residual.gap.data.excerpt import excerpt
+from residual.gap.inquiry import Clock, Inquiry, Offered
+from residual.gap.log import look, settle
 from residual.gap.model.workers import workers
 from residual.gap.preparation.conventions import otherwise
 from residual.gap.preparation.numerics import held_as, stride_for
 from residual.gap.result import GapResult
 from residual.gap.search.known import KNOWN
-from residual.gap.steps import Clock, Inquiry, Offered, look, settle
 from residual.trajectories import Trajectory
 from sims.contract import refuse_unsound
 from sims.effects.base import Effect
@@ -94,7 +95,8 @@ def find_gap(
 
         tell("confirming")
         asked = matters(found, tolerance)
-        prepared, answer, said = inquiry.confirmed(log, prepared, found, asked, parameter_tolerance)
+        known = inquiry.confirmed(log, prepared, found, asked, parameter_tolerance)
+        answer = known.answer
         clock.lap("confirm")
 
         if conventions is not None:  # it is asked first, so that nothing is certain before
@@ -105,8 +107,8 @@ def find_gap(
             others, _ = excerpt(
                 examine(simulator, held).trajectories, stride_for(held, log.horizon)
             )
-            apart = judged_apart(answer, prepared, others, table)
+            apart = judged_apart(answer, known.prepared, others, table)
         clock.lap("forecast")
-    quality = [*log.findings, *log.left_out, *on_hold, *said]
+    quality = [*log.findings, *log.left_out, *on_hold, *known.says]
     result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)
     return dataclasses.replace(result, conventions=conventions)

@@ -47,7 +47,7 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
         )
         offered = library(simulator)
         groups, _ = aliases(simulator, offered)
-        kept = representatives(simulator, offered, groups)
+        kept, _ = representatives(simulator, offered, groups)
         ready = prepare(simulator, logs, usual_horizon(simulator, logs))
         assert isinstance(ready.fitter, SmoothFitter)
         assert isinstance(ready.floor, Floor)

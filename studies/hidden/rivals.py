@@ -63,7 +63,8 @@ def columns(
 ) -> tuple[Array, tuple[str, ...]]:
     """Change of the rate over one step per effect and trial size, as acceleration, (n, c)."""
     groups, _ = aliases(simulator, offered)
-    pool = candidates(simulator, representatives(simulator, offered, groups), samples)
+    kept, _ = representatives(simulator, offered, groups)
+    pool = candidates(simulator, kept, samples)
     base = Model(simulator).advance(samples, nodes[None], np.zeros((1, 0)))[0]
     found, owner = [], []
     for candidate in pool:

@@ -90,36 +90,25 @@ def beyond_parameters(simulator: HostSimulator, offered: Sequence[Effect]) -> tu
 
 def representatives(
     simulator: HostSimulator, offered: Sequence[Effect], groups: Mapping[str, tuple[str, ...]]
-) -> list[Effect]:
-    """The offered effects without those that the first of their twins stands for."""
-    first = _first_twins(simulator, offered, groups)
-    return [effect for effect in offered if first[str(effect)] == str(effect)]
+) -> tuple[list[Effect], list[Effect]]:
+    """The offered effects without those that the first of their twins stands for.
 
-
-def less_of(
-    simulator: HostSimulator, offered: Sequence[Effect], groups: Mapping[str, tuple[str, ...]]
-) -> list[Effect]:
-    """Parameters of which a simulator may have too much, while the twin that stands for them cannot
-    be negative: damping that is too large is no friction."""
-    first = _first_twins(simulator, offered, groups)
+    Returns:
+        Those, and parameters of which a simulator may have too much while the twin that stands for
+        them cannot be negative: damping that is too large is no friction.
+    """
+    width = {str(effect): numbers(effect, simulator) for effect in offered}
     either = {str(effect): _goes_either_way(effect, simulator) for effect in offered}
-    found: dict[str, Effect] = {}
+    kept: list[Effect] = []
+    less: dict[str, Effect] = {}
     for effect in offered:
         name = str(effect)
-        if isinstance(effect, ParameterChange) and either[name] and not either[first[name]]:
-            found.setdefault(first[name], effect)
-    return list(found.values())
-
-
-def _first_twins(
-    simulator: HostSimulator, offered: Sequence[Effect], groups: Mapping[str, tuple[str, ...]]
-) -> dict[str, str]:
-    """Of each offered effect the first of its twins with as many numbers, by label."""
-    width = {str(effect): numbers(effect, simulator) for effect in offered}
-    return {
-        name: next(n for n in groups.get(name, (name,)) if width[n] == width[name])
-        for name in width
-    }
+        first = next(n for n in groups.get(name, (name,)) if width[n] == width[name])
+        if first == name:
+            kept.append(effect)
+        elif isinstance(effect, ParameterChange) and either[name] and not either[first]:
+            less.setdefault(first, effect)
+    return kept, list(less.values())
 
 
 def _goes_either_way(effect: Effect, simulator: HostSimulator) -> bool:

@@ -1,4 +1,4 @@
-"""The steps of the pipeline that find.py takes in a row: look, settle, search, confirm."""
+"""Search and confirmation: the steps that find.py takes once a log is looked at."""
 
 from __future__ import annotations
 
@@ -9,28 +9,22 @@ from typing import Any
 
 from residual.gap.answer.answer import Answer, confirm
 from residual.gap.answer.free_parameters import better, worth_freeing
-from residual.gap.answer.lone import Stretch, explains_the_rest, lone_stretch
+from residual.gap.answer.lone import explains_the_rest, lone_stretch
 from residual.gap.confirmation.aliases import (
     aliases,
     beyond_parameters,
-    less_of,
     representatives,
 )
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
 from residual.gap.confirmation.twins import exact_twins, with_twins
-from residual.gap.data.copies import copies
-from residual.gap.data.examine import examine
-from residual.gap.data.excerpt import excerpt
 from residual.gap.fitting.smooth import LEAD
+from residual.gap.log import Log
 from residual.gap.model.candidates import Candidate, candidates
-from residual.gap.preparation.horizon import usual_horizon
-from residual.gap.preparation.numerics import held_otherwise, how_held, stride_for
+from residual.gap.preparation.numerics import held_otherwise, how_held
 from residual.gap.preparation.prepare import Prepared, prepare
-from residual.gap.preparation.suited import beyond_noise, horizon_of_windows, needs_closer_rows
 from residual.gap.search.explain import Explanation, explain
 from residual.gap.search.sets import Search
-from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
@@ -55,79 +49,6 @@ class Clock:
         now = time.perf_counter()
         self.laps[step] = now - self._last
         self._last = now
-
-
-@dataclasses.dataclass(frozen=True)
-class Log:
-    """What was recorded, looked at.
-
-    Attributes:
-        simulator: The nominal one, for the motion that the log shows.
-        recorded: All runs, without what is faulty in them.
-        runs: Of those the stretches that are searched.
-        horizon: Length of forecasts in s.
-        findings: What was found about the data, in words.
-        left_out: What of the data is not searched, in words.
-    """
-
-    simulator: HostSimulator
-    recorded: Sequence[Trajectory]
-    runs: Sequence[Trajectory]
-    horizon: float
-    findings: list[str]
-    left_out: list[str]
-
-    def at(self, horizon: float) -> Log:
-        """The same for forecasts of another length, which want other rows."""
-        runs, left_out = excerpt(self.recorded, stride_for(self.recorded, horizon))
-        return dataclasses.replace(self, runs=runs, horizon=horizon, left_out=left_out)
-
-
-def look(
-    simulator: HostSimulator,
-    trajectories: Sequence[Trajectory],
-    held: Sequence[Trajectory],
-    horizon: float | None,
-    tell: Callable[[str], None],
-) -> Log:
-    """Find faults of the data, and how far forecasts go if the user does not say."""
-    examined = examine(simulator, trajectories)
-    simulator = simulator.for_motion([run.states for run in [*examined.trajectories, *held]])
-    findings = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
-    findings += [
-        f"{copy.name} is set aside, and holds the same samples as {first.name}, which is fitted: "
-        "what is said of records set aside is no test"
-        for copy, first in copies(held, trajectories)[:1]
-    ]
-    horizon = horizon or usual_horizon(simulator, examined.trajectories)
-    every = examined.trajectories
-    log = Log(simulator, every, every, horizon, findings, []).at(horizon)
-    for says in [*findings, *log.left_out]:
-        tell(says)
-    return log
-
-
-def settle(
-    simulator: HostSimulator, log: Log, by_user: bool, tell: Callable[[str], None]
-) -> tuple[Log, Prepared]:
-    """Windows, weights and numerics, from the nominal simulator alone.
-
-    Args:
-        simulator: The nominal one, with its inputs held as they shall be.
-        log: What was recorded.
-        by_user: Whether the user chose the horizon, so that it stays.
-        tell: Progress.
-    """
-    tell("fitting the nominal simulator")
-    prepared = prepare(simulator, log.runs, log.horizon)
-    if not by_user and not simulator.has_contacts:
-        if needs_closer_rows(log.runs, prepared):
-            log = log.at(horizon_of_windows(prepared))
-            tell(f"windows end early, where motion is unstable: rows for {log.horizon:.3g} s")
-            prepared = prepare(simulator, log.runs, log.horizon)
-        prepared = beyond_noise(simulator, log.runs, prepared)
-        log = dataclasses.replace(log, horizon=prepared.horizon)
-    return log, prepared
 
 
 @dataclasses.dataclass(frozen=True)
@@ -161,9 +82,27 @@ class Offered:
             offered = tuple(effect for effect in offered if not effect.upstream_of_sensor)
         offered = beyond_parameters(log.simulator, offered)
         groups, sets = aliases(log.simulator, offered, log.runs)
-        kept = representatives(log.simulator, offered, groups)
-        less = less_of(log.simulator, offered, groups)
+        kept, less = representatives(log.simulator, offered, groups)
         return cls({str(effect): effect for effect in offered}, kept, less, groups, sets)
+
+
+@dataclasses.dataclass(frozen=True)
+class Confirmed:
+    """What is known in the end.
+
+    Attributes:
+        prepared: The windows that the answer is of.
+        answer: What stays after confirmation.
+        says: What is to be said of how it was found.
+    """
+
+    prepared: Prepared
+    answer: Answer
+    says: tuple[str, ...]
+
+    def and_says(self, text: str) -> Confirmed:
+        """The same with one more thing to say."""
+        return dataclasses.replace(self, says=(*self.says, text))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -238,7 +177,7 @@ class Inquiry:
 
     def confirmed(
         self, log: Log, prepared: Prepared, found: Explanation, matters: bool, tolerance: float
-    ) -> tuple[Prepared, Answer, list[str]]:
+    ) -> Confirmed:
         """How sure what was found is, also with parameters free within their tolerance.
 
         Args:
@@ -247,42 +186,48 @@ class Inquiry:
             found: What was chosen.
             matters: False if the gap does not, so that nothing is named.
             tolerance: How well the simulator's parameters are known, as a share of each.
-
-        Returns:
-            The windows that the answer is of, the answer, and what is to be said of it.
         """
-        groups, until = self.offered.groups, self.clock.confirm_until
-        answer = confirm(found, groups, matters, tolerance, until)
-        says = []
-        stretch = lone_stretch(answer) if matters else None
-        if stretch is not None:
-            elsewhere = self.elsewhere(stretch, log, found, tolerance)
-            says.append(stretch.says(left_out=elsewhere is not None))
-            prepared, answer = elsewhere or (prepared, answer)
-        beside = worth_freeing(answer, tolerance) if matters else []
-        if beside and time.process_time() > self.clock.over:
-            says.append(
+        answer = confirm(found, self.offered.groups, matters, tolerance, self.clock.confirm_until)
+        known = Confirmed(prepared, answer, ())
+        if matters:
+            known = self.without_lone_stretch(log, known, tolerance)
+            known = self.with_parameters_free(known, tolerance)
+        answer = known.answer
+        claims = with_twins(answer.found.search, answer.key, answer.claims)
+        return dataclasses.replace(known, answer=dataclasses.replace(answer, claims=claims))
+
+    def with_parameters_free(self, known: Confirmed, tolerance: float) -> Confirmed:
+        """The same, or what is found with parameters free if they may hide something."""
+        answer, prepared = known.answer, known.prepared
+        beside = worth_freeing(answer, tolerance)
+        if not beside:
+            return known
+        if time.process_time() > self.clock.over:
+            return known.and_says(
                 "parameters within their tolerance may hide what is missing, or explain some of "
                 "what is left: there was no time to look, give more --minutes"
             )
-        elif beside:
-            self.tell("once more with parameters free within their tolerance")
-            search = answer.found.search
-            again = self.explained(search.simulator, prepared, beside, search)
-            second = confirm(again, groups, matters, tolerance, until)
-            answer = second if better(second, answer) else answer
-        claims = with_twins(answer.found.search, answer.key, answer.claims)
-        return prepared, dataclasses.replace(answer, claims=claims), says
+        self.tell("once more with parameters free within their tolerance")
+        search = answer.found.search
+        again = self.explained(search.simulator, prepared, beside, search)
+        second = confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
+        return dataclasses.replace(known, answer=second) if better(second, answer) else known
 
-    def elsewhere(
-        self, stretch: Stretch, log: Log, found: Explanation, tolerance: float
-    ) -> tuple[Prepared, Answer] | None:
-        """Windows and answer without a stretch of the log, if something is named so, in time."""
+    def without_lone_stretch(self, log: Log, known: Confirmed, tolerance: float) -> Confirmed:
+        """The same, or what is found without a stretch of the log that nothing explains.
+
+        Elsewhere is looked only in time, and counts only if something is named there.
+        """
+        stretch = lone_stretch(known.answer)
+        if stretch is None:
+            return known
         if time.process_time() > self.clock.search_until:
-            return None
+            return known.and_says(stretch.says(left_out=False))
         self.tell("once more without a stretch that nothing explains")
-        simulator = found.search.simulator
+        simulator = known.answer.found.search.simulator
         ready = prepare(simulator, stretch.cut_from(log.runs), log.horizon)
         again = self.explained(simulator, ready)
         answer = confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
-        return (ready, answer) if explains_the_rest(answer) else None
+        if not explains_the_rest(answer):
+            return known.and_says(stretch.says(left_out=False))
+        return Confirmed(ready, answer, (stretch.says(left_out=True),))

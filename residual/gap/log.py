@@ -1,0 +1,89 @@
+"""What was recorded: looked at for faults, and settled how it is compared with the simulator."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+from residual.gap.data.copies import copies
+from residual.gap.data.examine import examine
+from residual.gap.data.excerpt import excerpt
+from residual.gap.preparation.horizon import usual_horizon
+from residual.gap.preparation.numerics import stride_for
+from residual.gap.preparation.prepare import Prepared, prepare
+from residual.gap.preparation.suited import beyond_noise, horizon_of_windows, needs_closer_rows
+from residual.trajectories import Trajectory
+from sims.host import HostSimulator
+
+
+@dataclasses.dataclass(frozen=True)
+class Log:
+    """What was recorded, looked at.
+
+    Attributes:
+        simulator: The nominal one, for the motion that the log shows.
+        recorded: All runs, without what is faulty in them.
+        runs: Of those the stretches that are searched.
+        horizon: Length of forecasts in s.
+        findings: What was found about the data, in words.
+        left_out: What of the data is not searched, in words.
+    """
+
+    simulator: HostSimulator
+    recorded: Sequence[Trajectory]
+    runs: Sequence[Trajectory]
+    horizon: float
+    findings: list[str]
+    left_out: list[str]
+
+    def at(self, horizon: float) -> Log:
+        """The same for forecasts of another length, which want other rows."""
+        runs, left_out = excerpt(self.recorded, stride_for(self.recorded, horizon))
+        return dataclasses.replace(self, runs=runs, horizon=horizon, left_out=left_out)
+
+
+def look(
+    simulator: HostSimulator,
+    trajectories: Sequence[Trajectory],
+    held: Sequence[Trajectory],
+    horizon: float | None,
+    tell: Callable[[str], None],
+) -> Log:
+    """Find faults of the data, and how far forecasts go if the user does not say."""
+    examined = examine(simulator, trajectories)
+    simulator = simulator.for_motion([run.states for run in [*examined.trajectories, *held]])
+    findings = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
+    findings += [
+        f"{copy.name} is set aside, and holds the same samples as {first.name}, which is fitted: "
+        "what is said of records set aside is no test"
+        for copy, first in copies(held, trajectories)[:1]
+    ]
+    horizon = horizon or usual_horizon(simulator, examined.trajectories)
+    every = examined.trajectories
+    log = Log(simulator, every, every, horizon, findings, []).at(horizon)
+    for says in [*findings, *log.left_out]:
+        tell(says)
+    return log
+
+
+def settle(
+    simulator: HostSimulator, log: Log, by_user: bool, tell: Callable[[str], None]
+) -> tuple[Log, Prepared]:
+    """Windows, weights and numerics, from the nominal simulator alone.
+
+    Args:
+        simulator: The nominal one, with its inputs held as they shall be.
+        log: What was recorded.
+        by_user: Whether the user chose the horizon, so that it stays.
+        tell: Progress.
+    """
+    tell("fitting the nominal simulator")
+    prepared = prepare(simulator, log.runs, log.horizon)
+    if not by_user and not simulator.has_contacts:
+        if needs_closer_rows(log.runs, prepared):
+            log = log.at(horizon_of_windows(prepared))
+            tell(f"windows end early, where motion is unstable: rows for {log.horizon:.3g} s")
+            prepared = prepare(simulator, log.runs, log.horizon)
+        prepared = beyond_noise(simulator, log.runs, prepared)
+        log = dataclasses.replace(log, horizon=prepared.horizon)
+    return log, prepared
