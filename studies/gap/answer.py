@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from residual.gap import GapResult
+from residual.gap.answer.doubts import DOUBTS
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
-from residual.gap.result import Doubt, Gap, Meant, Number, Verdict
+from residual.gap.result import Gap, Meant, Number, Verdict
 from studies.gap.words import (
     KINDS,
     ahead,
@@ -31,25 +32,6 @@ FOOTNOTE = 0.02
 NAMELESS = ("unexplained", "calibrated", "needs_data", "no_gap")
 #: Part of an interval below which one with an exact simulator is worth a line.
 MUCH = 0.7
-
-DOUBTS: dict[Doubt, str] = {
-    "not_needed": "forecasts are not clearly worse without it",
-    "unsteady": "its size differs between parts of the data",
-    "numerics": "its size changes with the integration step or with how the input is held",
-    "at_bound": "its size lies at its bound",
-    "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
-    "conventions": "it has to be seen first whether the log counts as the simulator does",
-    "gross": "a sensor is seldom wrong by a fifth of all that it showed, and something that the "
-    "library lacks may look so",
-    "no_time": "there was no time to ask whether parameters that are a few percent off would do as "
-    "well, give more --minutes",
-    "may_be_zero": "its interval holds zero, or nearly",
-    "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
-    "calibration": "parameters that are a few percent off would do nearly as well",
-    "slight": "without it errors are less than 1.5 times as large, and what has no name may favour "
-    "it by as much",
-    "rivals": "an effect of another kind does nearly as well",
-}
 
 
 def rivals(verdict: Verdict) -> tuple[str, ...]:

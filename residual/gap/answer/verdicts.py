@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from residual.gap.answer.doubts import DOUBTS, doubts
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.size import may_be_none, may_vanish
 from residual.gap.fitting.contract import Left
-from residual.gap.result import Blind, Doubt, Gap, Kind, Number, Span, Verdict
+from residual.gap.result import Blind, Gap, Kind, Number, Span, Verdict
 from residual.gap.search.sets import Key, Search
 
 #: Families of which an effect may be one and still be worth a name, if forecasts do not clearly
@@ -92,58 +93,16 @@ def effect_verdict(
     if together:
         sets = " or ".join(" with ".join(names) for names in together[:2])
         says.append(f"{sets}, in one exact proportion, would move alike")
-    if claim.slight:
-        says.append("what has no name may favour it by as much as it takes off")
-    elif claim.calibration:
-        says.append("parameters that are a few percent off would do as well")
-    if claim.unasked:
-        says.append("there was no time to ask what parameters a few percent off would do")
-    if claim.brief:
-        says.append("shorter than half a sample, as late time stamps and filters in sensors are")
-    if claim.counted:
-        says.append("the log may count otherwise than the simulator")
-    if claim.gross:
-        says.append("a sensor is seldom wrong by a fifth of all that it showed")
-    if not claim.needed:
-        says.append("forecasts are not clearly worse without it")
-    if not claim.steady:
-        says.append("its size differs between parts of the data")
-    if not claim.sound:
-        says.append("its size changes with the integration step or the input's hold")
-    if claim.bounded:
-        says.append("its size is at its bound")
-    if vanishes:
-        says.append("its size may be zero")
-    if not claim.gains:
-        says.append("its share of the gap may be zero")
+    why = doubts(claim, vanishes)
+    says += [DOUBTS[doubt] for doubt in why if doubt != "rivals"]
     if claim.by_fit and not (claim.needed and claim.gains):
         says.append("a fit to all data leaves three times as much without it")
     return Verdict(
         kind, effect.name, effect.where, claim.numbers,
         tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
         "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
-        doubts(claim, vanishes), shape=given, meant=claim.meant, beside=claim.beside,
+        why, shape=given, meant=claim.meant, beside=claim.beside,
     )  # fmt: skip
-
-
-def doubts(claim: Claim, vanishes: bool) -> tuple[Doubt, ...]:
-    """Why an effect is not certain."""
-    why: dict[Doubt, bool] = {
-        "not_needed": not claim.needed,
-        "unsteady": not claim.steady,
-        "numerics": not claim.sound,
-        "at_bound": claim.bounded,
-        "calibration": claim.calibration and not claim.slight,
-        "slight": claim.slight,
-        "no_time": claim.unasked,
-        "clock": claim.brief,
-        "gross": claim.gross,
-        "conventions": claim.counted,
-        "may_be_zero": vanishes,
-        "share_may_be_zero": not claim.gains,
-        "rivals": bool(claim.rivals or claim.alike),
-    }
-    return tuple(doubt for doubt, there in why.items() if there)
 
 
 def calibrated_verdict(search: Search, key: Key) -> Verdict:

@@ -1,0 +1,45 @@
+"""Why an effect is not certain, and how that is said."""
+
+from __future__ import annotations
+
+from residual.gap.confirmation.claim import Claim
+from residual.gap.result import Doubt
+
+DOUBTS: dict[Doubt, str] = {
+    "not_needed": "forecasts are not clearly worse without it",
+    "unsteady": "its size differs between parts of the data",
+    "numerics": "its size changes with the integration step or with how the input is held",
+    "at_bound": "its size lies at its bound",
+    "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
+    "conventions": "it has to be seen first whether the log counts as the simulator does",
+    "gross": "a sensor is seldom wrong by a fifth of all that it showed, and something that the "
+    "library lacks may look so",
+    "no_time": "there was no time to ask whether parameters that are a few percent off would do as "
+    "well, give more --minutes",
+    "may_be_zero": "its interval holds zero, or nearly",
+    "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
+    "calibration": "parameters that are a few percent off would do nearly as well",
+    "slight": "without it errors are less than 1.5 times as large, and what has no name may favour "
+    "it by as much",
+    "rivals": "an effect of another kind does nearly as well",
+}
+
+
+def doubts(claim: Claim, vanishes: bool) -> tuple[Doubt, ...]:
+    """Why an effect is not certain."""
+    why: dict[Doubt, bool] = {
+        "not_needed": not claim.needed,
+        "unsteady": not claim.steady,
+        "numerics": not claim.sound,
+        "at_bound": claim.bounded,
+        "calibration": claim.calibration and not claim.slight,
+        "slight": claim.slight,
+        "no_time": claim.unasked,
+        "clock": claim.brief,
+        "gross": claim.gross,
+        "conventions": claim.counted,
+        "may_be_zero": vanishes,
+        "share_may_be_zero": not claim.gains,
+        "rivals": bool(claim.rivals or claim.alike),
+    }
+    return tuple(doubt for doubt, there in why.items() if there)
