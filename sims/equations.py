@@ -21,7 +21,39 @@ from sims.sliding import advance
 BLOCK = 4096
 
 
-class EquationOfMotion(HostSimulator):
+class _Equations(HostSimulator):
+    """What systems that are written out as equations have in common."""
+
+    parameters: Mapping[str, Parameter] = {}
+    advances_rows_at_once = True
+
+    def __init__(
+        self,
+        dt: float | None = None,
+        substeps: int | None = None,
+        effects: Sequence[Effect] = (),
+    ) -> None:
+        cls = type(self)
+        self.name = getattr(cls, "name", cls.__name__)
+        self.dt = cls.dt if dt is None else dt
+        self.substeps = cls.substeps if substeps is None else substeps
+        if not hasattr(cls, "joints"):
+            self.joints = self._own_joints()
+        self._arrange()
+        self.effects = ()
+        if effects:
+            hosted = self.with_effects(effects)
+            self.effects, self.state_channels = hosted.effects, hosted.state_channels
+
+    @abc.abstractmethod
+    def _own_joints(self) -> tuple[Joint, ...]:
+        """The joints of a class that names none."""
+
+    def _arrange(self) -> None:
+        """Where joints stand among the state channels."""
+
+
+class EquationOfMotion(_Equations):
     """A mechanical system q'' = f(q, v, u, force); it hosts every effect.
 
     A subclass gives ``state_channels`` (each position and its rate, in any order),
@@ -39,24 +71,13 @@ class EquationOfMotion(HostSimulator):
 
     dt = 0.02
     substeps = 10
-    parameters: Mapping[str, Parameter] = {}
-    advances_rows_at_once = True
 
-    def __init__(
-        self,
-        dt: float | None = None,
-        substeps: int | None = None,
-        effects: Sequence[Effect] = (),
-    ) -> None:
-        cls = type(self)
-        self.name = getattr(cls, "name", cls.__name__)
-        self.dt = cls.dt if dt is None else dt
-        self.substeps = cls.substeps if substeps is None else substeps
-        self.has_drive_force = cls.drive_force is not EquationOfMotion.drive_force
-        if not hasattr(cls, "joints"):
-            self.joints = tuple(
-                _joint(c, self.state_channels) for c in self.state_channels if c.kind == "rate"
-            )
+    def _own_joints(self) -> tuple[Joint, ...]:
+        rates = [channel for channel in self.state_channels if channel.kind == "rate"]
+        return tuple(_joint(rate, self.state_channels) for rate in rates)
+
+    def _arrange(self) -> None:
+        self.has_drive_force = type(self).drive_force is not EquationOfMotion.drive_force
         names = [channel.name for channel in self.state_channels]
         self._positions = [names.index(str(joint.position)) for joint in self.joints]
         self._rates = [names.index(str(joint.rate)) for joint in self.joints]
@@ -66,10 +87,6 @@ class EquationOfMotion(HostSimulator):
                 f"{', '.join(names)}; an equation of motion has one position and one rate for "
                 "each joint (for anything else use FirstOrderSystem)"
             )
-        self.effects = ()
-        if effects:
-            hosted = self.with_effects(effects)
-            self.effects, self.state_channels = hosted.effects, hosted.state_channels
 
     @abc.abstractmethod
     def acceleration(self, q: Array, v: Array, u: Array, force: Array, p: Any) -> Array:
@@ -158,7 +175,7 @@ class EquationOfMotion(HostSimulator):
         )
 
 
-class FirstOrderSystem(HostSimulator):
+class FirstOrderSystem(_Equations):
     """A system x' = f(x, u) without joints, such as a heater, a tank or a wheel's speed.
 
     It hosts changes of parameters, actuator and sensor effects, and on each state a constant
@@ -173,34 +190,18 @@ class FirstOrderSystem(HostSimulator):
 
     dt = 1.0
     substeps = 5
-    parameters: Mapping[str, Parameter] = {}
-    advances_rows_at_once = True
 
-    def __init__(
-        self,
-        dt: float | None = None,
-        substeps: int | None = None,
-        effects: Sequence[Effect] = (),
-    ) -> None:
-        cls = type(self)
-        self.name = getattr(cls, "name", cls.__name__)
-        self.dt = cls.dt if dt is None else dt
-        self.substeps = cls.substeps if substeps is None else substeps
-        if not hasattr(cls, "joints"):
-            self.joints = tuple(
-                Joint(
-                    c.name,
-                    c.name,
-                    c.name if c.kind == "rate" else None,
-                    f"{c.unit}/s",
-                    c.scale / (10 * self.dt),
-                )
-                for c in self.state_channels
+    def _own_joints(self) -> tuple[Joint, ...]:
+        return tuple(
+            Joint(
+                c.name,
+                c.name,
+                c.name if c.kind == "rate" else None,
+                f"{c.unit}/s",
+                c.scale / (10 * self.dt),
             )
-        self.effects = ()
-        if effects:
-            hosted = self.with_effects(effects)
-            self.effects, self.state_channels = hosted.effects, hosted.state_channels
+            for c in self.state_channels
+        )
 
     @abc.abstractmethod
     def derivative(self, x: Array, u: Array, p: Any) -> Array:
