@@ -20,6 +20,7 @@ from residual.gap.fitting.plausible import absurd
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.model.model import Model
 from residual.gap.result import Meant
+from residual.gap.search.continuation import handed_over
 from residual.gap.search.sets import Key, Search
 from sims.effects.base import Effect
 from sims.host import HostSimulator
@@ -70,29 +71,38 @@ def with_twins(search: Search, key: Key, claims: Sequence[Claim]) -> tuple[Claim
     ]  # fmt: skip
     for number, twin in twins:
         fit = _in_place(search, key, number, twin)
-        if fit.merit > REACHED * search.tried[key].merit + search.fitter.tie(search.nominal):
+        if fit.merit > _reached(search, key):
             continue
         if absurd(fit.model, fit.theta, search.fitter.samples)[1]:
             continue
-        values = {place: fit.theta[fit.model.owner == place] for place in range(len(key))}
-        mine = values.pop(key.index(number))
+        rest = [i for i in key if i != number]
+        mine = fit.theta[fit.model.owner == len(rest)]
         meant = Meant(twin.label, _units(twin, mine))
         told[number] = dataclasses.replace(told[number], meant=(*told[number].meant, meant))
-        for place, found in values.items():
-            other = key[place]
-            told[other] = _beside(told[other], search.candidates[other], found, twin.label)
+        for place, other in enumerate(rest):
+            values = fit.theta[fit.model.owner == place]
+            told[other] = _beside(told[other], search.candidates[other], values, twin.label)
     return tuple(told.values())
 
 
 def _in_place(search: Search, key: Key, number: int, twin: Candidate) -> Fit:
-    """The set fitted with a twin in place of one of its members."""
-    fit, place = search.tried[key], key.index(number)
-    chosen = [twin if i == number else search.candidates[i] for i in key]
-    model = Model(search.simulator, [*chosen, *search.beside])
-    theta = np.zeros(len(model))
-    theta[model.owner != place] = fit.theta[fit.model.owner != place]
-    theta[model.owner == place] = 0.01 * twin.trials[0].values[0]
-    return search.fitter.fit(model, theta, fit)
+    """The set fitted with a twin in place of one of its members, the twin's numbers last."""
+    fit = search.tried[key]
+    rest = [i for i in key if i != number]
+    model = Model(search.simulator, [*(search.candidates[i] for i in rest), twin, *search.beside])
+    stay = [fit.theta[fit.model.owner == key.index(i)] for i in rest]
+    beside = fit.theta[search.numbers(key) :]
+    start = np.concatenate([*stay, 0.01 * twin.trials[0].values[0], beside])
+    found = search.fitter.fit(model, start, fit)
+    if found.merit <= _reached(search, key) or not search.candidates[number].linear.all():
+        return found
+    again = search.fitter.fit(model, handed_over(search, key, number, twin), fit)
+    return again if again.merit < found.merit else found
+
+
+def _reached(search: Search, key: Key) -> float:
+    """The largest loss of a set that makes the same motion."""
+    return REACHED * search.tried[key].merit + search.fitter.tie(search.nominal)
 
 
 def _units(candidate: Candidate, values: Array) -> dict[str, tuple[float, str]]:

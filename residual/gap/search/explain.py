@@ -16,6 +16,7 @@ from residual.gap.model.candidates import Candidate
 from residual.gap.preparation.effort import Effort
 from residual.gap.search.beam import extend, improves, run
 from residual.gap.search.choice import Choice, choose, reasons
+from residual.gap.search.continuation import add_handed_over
 from residual.gap.search.exchange import add_exchanged
 from residual.gap.search.sets import Key, Proposals, Search, Twins
 from residual.gap.search.significance import score, significant
@@ -178,6 +179,8 @@ def settle(search: Search, floor: Noise) -> Explanation:
         most = LEAST if search.late else max(LEAST, RIVALS // max(len(key), 1))
         reached = search.error(search.best())
         add_exchanged(search, key, most)
+        if not search.simulator.has_contacts:
+            add_handed_over(search, key)
         if not quiet and improves(search, search.best(), reached):
             extend(search, search.best())
         if len(search.tried) == before or search.late:

@@ -53,14 +53,14 @@ def significant(search: Search, needed: float) -> Key:
 
 def least_otherwise(search: Search, key: Key) -> Key:
     """Of sets that no data tell from one, as where effects move alike in an exact proportion, the
-    one with the least to be otherwise than was known."""
+    one of the least surprising sizes, and with the least to be otherwise than was known."""
     merit, numbers = search.tried[key].merit, search.numbers(key)
     alike = [
         k
         for k in search.usable()
         if search.numbers(k) == numbers and search.tried[k].merit <= merit + NO_DIFFERENCE
     ]
-    return min([key, *alike], key=lambda k: departures(search, k))
+    return min([key, *alike], key=lambda k: (search.surprises(k), departures(search, k)))
 
 
 def pruned(search: Search, key: Key, needed: float) -> Key:
