@@ -159,7 +159,7 @@ class Inquiry:
             return prepared, found, []
         self.tell("inputs held the other way fit better: once more so")
         ready = prepare(other, log.runs, log.horizon)
-        again = self.explained(other, ready)
+        again = self.explained(other, ready, earlier=found.search)
         errors = [forecast_error(one.search, one.key) for one in (again, found)]
         if CLEARLY**2 * errors[0] < errors[1]:
             says = (

@@ -31,7 +31,7 @@ from residual.gap.confirmation.tolerance import allow_for_parameters
 from residual.gap.fitting.forecasts import fitted_floor, main_channel, noise_floor
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.model import Model
-from residual.gap.preparation.numerics import own_substeps
+from residual.gap.preparation.numerics import enough_for, own_substeps
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.result import Blind, Gap, GapResult, Verdict
 from residual.gap.search.choice import helps, material
@@ -161,10 +161,14 @@ def judged_apart(answer: Answer, prepared: Prepared, runs: Sequence[Trajectory],
     search = answer.found.search
     other = prepare(search.simulator, runs, prepared.horizon).fitter
     other = other.weighed_like(search.fitter)
-    if answer.corrected.substeps > search.simulator.substeps:
-        assert isinstance(other, SmoothFitter)
-        steps = own_substeps(answer.corrected, runs, other.samples.stride)
-        other = other.with_substeps(max(steps, other.samples.substeps))
+    if isinstance(other, SmoothFitter):
+        # As fine as was searched, and as what was found needs here.
+        samples = other.samples
+        most = own_substeps(answer.corrected, runs, samples.stride)
+        bound = search.tried[answer.key].model.bind(search.tried[answer.key].theta)
+        few = enough_for(bound, search.simulator, samples, other.nodes, other.sigma, most)
+        searched = min(most, search.fitter.samples.substeps)
+        other = other.with_substeps(max(few, searched, samples.substeps))
     fits = []
     for fit in (search.nominal, search.tried[answer.key]):
         fits.append(other.fit(Model(fit.model.bind(fit.theta)), np.zeros(0)))

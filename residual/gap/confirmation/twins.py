@@ -64,7 +64,8 @@ def with_twins(search: Search, key: Key, claims: Sequence[Claim]) -> tuple[Claim
         key: The chosen set.
         claims: Of its members.
     """
-    told = {claim.number: claim for claim in claims}
+    given = {claim.number: claim for claim in claims}
+    told = dict(given)
     twins = [
         (number, twin) for number in told for twin in search.twins_of(number)
         if not search.simulator.has_contacts
@@ -81,7 +82,8 @@ def with_twins(search: Search, key: Key, claims: Sequence[Claim]) -> tuple[Claim
         told[number] = dataclasses.replace(told[number], meant=(*told[number].meant, meant))
         for place, other in enumerate(rest):
             values = fit.theta[fit.model.owner == place]
-            told[other] = _beside(told[other], search.candidates[other], values, twin.label)
+            candidate = search.candidates[other]
+            told[other] = _beside(told[other], given[other], candidate, values, twin.label)
     return tuple(told.values())
 
 
@@ -112,21 +114,31 @@ def _units(candidate: Candidate, values: Array) -> dict[str, tuple[float, str]]:
     }
 
 
-def _beside(claim: Claim, candidate: Candidate, values: Array, twin: str) -> Claim:
-    """A claim with the numbers that it has beside a twin of another, where they differ."""
+def _beside(claim: Claim, before: Claim, candidate: Candidate, values: Array, twin: str) -> Claim:
+    """A claim with the numbers that it has beside a twin of another, where they differ.
+
+    Args:
+        claim: What is known so far.
+        before: The claim without any twin: its interval goes along in proportion.
+        candidate: Whose claim it is.
+        values: Its numbers beside the twin.
+        twin: That one's label.
+    """
     numbers, differs = dict(claim.numbers), False
     for field, (value, _) in _units(candidate, values).items():
-        number = numbers[field]
-        if abs(value - number.value) <= DIFFERS * (number.high - number.low):
+        number, own = numbers[field], before.numbers[field]
+        if abs(value - own.value) <= DIFFERS * (own.high - own.low):
             continue
-        differs, shift = True, value - number.value
-        exact = number.if_exact or (number.low, number.high)
+        differs = True
+        low, high = own.low + value - own.value, own.high + value - own.value
+        if value * own.value > 0:
+            low, high = sorted((own.low * value / own.value, own.high * value / own.value))
         knob = next(knob for knob in candidate.knobs if knob.field == field)
         numbers[field] = dataclasses.replace(
             number,
-            low=max(min(number.low, exact[0] + shift), knob.low),
-            high=min(max(number.high, exact[1] + shift), knob.high),
-            if_exact=exact,
+            low=max(min(number.low, low), knob.low),
+            high=min(max(number.high, high), knob.high),
+            if_exact=number.if_exact or (own.low, own.high),
         )
     if not differs:
         return claim

@@ -35,10 +35,13 @@ def stride_for(trajectories: Sequence[Trajectory], horizon: float) -> int:
 
 
 def own_substeps(simulator: HostSimulator, trajectories: Sequence[Trajectory], stride: int) -> int:
-    """Sub-steps of an interval that are as fine as the simulator's own."""
+    """Sub-steps of an interval that are as fine as the simulator's own.
+
+    Of a thinned log a power of two, as its stride is: whole recorded samples, or parts of them.
+    """
     longest = stride * max(float(np.quantile(t.durations, 0.95)) for t in trajectories)
     own = max(1, int(np.ceil(simulator.substeps * longest / simulator.dt - 1e-6)))
-    return own if stride == 1 else min(_power(own), stride)
+    return own if stride == 1 else _power(own)
 
 
 def enough_substeps(
@@ -74,6 +77,16 @@ def enough_substeps(
             return count
         count, coarse = min(2 * count, most), fine
     return most
+
+
+def enough_for(
+    corrected: HostSimulator, simulator: HostSimulator, samples: Samples, nodes: Array,
+    sigma: Array, most: int,
+) -> int:  # fmt: skip
+    """The same of a simulator with what was found, which may need finer steps than without it, as
+    friction that holds does; of the nominal one if effects remember."""
+    remembers = Model(corrected).width != len(corrected.physical_channels)
+    return enough_substeps(simulator if remembers else corrected, samples, nodes, sigma, most)
 
 
 def held_as(simulator: HostSimulator, hold: Hold | Mapping[str, Hold] | None) -> HostSimulator:

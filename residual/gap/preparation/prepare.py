@@ -19,7 +19,12 @@ from residual.gap.model import paths
 from residual.gap.model.candidates import Candidate
 from residual.gap.model.model import Model
 from residual.gap.preparation.effort import Effort
-from residual.gap.preparation.numerics import enough_substeps, own_substeps, stride_for
+from residual.gap.preparation.numerics import (
+    enough_for,
+    enough_substeps,
+    own_substeps,
+    stride_for,
+)
 from residual.logs.faults import grain
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
@@ -80,11 +85,8 @@ def prepare(
             better = _noise_around(fit, fitter, floor, horizon / (1 - LEAD))
             around = better if (better.sigma < floor.sigma).all() else floor
         again = weighted(now, fit, around.sigma)
-        # What was found may need finer steps than the nominal simulator: friction that holds.
         corrected = fit.model.bind(fit.theta)
-        plain = Model(corrected).width == len(corrected.physical_channels)
-        stepped = corrected if plain else simulator
-        few = enough_substeps(stepped, now.samples, now.nodes, again.sigma, finest)
+        few = enough_for(corrected, simulator, now.samples, now.nodes, again.sigma, finest)
         return again.with_substeps(max(few, now.samples.substeps)), around
 
     effort = Effort() if simulator.advances_rows_at_once else Effort(5, 1, 1, 3, 4)
@@ -111,7 +113,7 @@ def smooth_fitter(
     """A fitter for a system without impacts, weighed by what the nominal simulator leaves."""
     stride = stride_for(trajectories, horizon)
     finest = own_substeps(simulator, trajectories, stride)
-    samples = Samples.join(trajectories, finest, stride)
+    samples = Samples.join(trajectories, finest if stride == 1 else min(finest, stride), stride)
     if not len(samples.measured):
         raise ValueError("no state channel was measured: every value in the trajectories is NaN")
     model = Model(simulator)
