@@ -157,30 +157,26 @@ def boldly(search: Search, parameters: bool) -> list[Key]:
 
 
 def driven(search: Search) -> list[Key]:
-    """Fit every effect that holds still beside the gain of its input, or of the best other one,
-    and beside the best single effect.
+    """Fit every effect that holds still beside the gain of its input, or of the best other one.
 
     When motion begins depends on both, on friction and on the drive that overcomes it; where both
-    are wrong, friction alone ends at numbers from which the linear picture is of no use. What seems
-    a stronger drive may be less damping, too.
+    are wrong, friction alone ends at numbers from which the linear picture is of no use.
     """
     screened = search.candidates[: search.screened]
     gains = [number for number, candidate in enumerate(screened) if candidate.effect.drives]
-    tried = [key[0] for key in search.tried if len(key) == 1 and key[0] < search.screened]
-    tried.sort(key=lambda number: search.error((number,)))
-    still = [number for number in tried if screened[number].effect.holds_still]
-    moving = [n for n in tried if n not in (*still, *gains) and search.sound((n,))]
-    best = next((number for number in [*tried, *gains] if number in gains), None)
+    if not gains:
+        return []
+    best = min(gains, key=lambda n: search.error((n,)) if (n,) in search.tried else np.inf)
+    singles = [key for key in search.tried if len(key) == 1 and key[0] < search.screened]
     found: list[Key] = []
-    for number in still:
-        place = search.place(number)
-        own = next((n for n in gains if search.place(n) == place), best)
-        for other in [*([] if own is None else [own]), *moving[:1]]:
-            small = 0.01 * screened[other].trials[0].values[0]
-            start = search.own((other,)) if (other,) in search.tried else small
-            fresh, theta = search.merged((number,), [(other, start)])
-            if not search.late and search.fits_in(fresh):
-                found += sound(search, fresh, theta)
+    for key in [k for k in singles if screened[k[0]].effect.holds_still]:
+        place = search.place(key[0])
+        gain = next((n for n in gains if search.place(n) == place), best)
+        small = 0.01 * screened[gain].trials[0].values[0]
+        start = search.own((gain,)) if (gain,) in search.tried else small
+        fresh, theta = search.merged(key, [(gain, start)])
+        if not search.late and search.fits_in(fresh):
+            found += sound(search, fresh, theta)
     return found
 
 

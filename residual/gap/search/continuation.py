@@ -28,8 +28,8 @@ PARTS = (0.95, 0.85, 0.7, 0.55, 0.4, 0.25, 0.12)
 IMITATED, SHARE = 0.99, 0.3
 #: Forecast error over that of the set up to which the new one is as good.
 AS_GOOD = 1.1
-#: Such sets that are tried for one set, and if time for searching is over.
-MOST, LEAST = 6, 2
+#: Such sets that are tried for one set.
+MOST = 4
 
 
 def handed_over(search: Search, key: Key, gone: int, heir: Candidate) -> Array:
@@ -74,11 +74,11 @@ def add_handed_over(search: Search, key: Key) -> None:
     members, too.
     """
     reached = search.error(key)
-    for number, gone in _heirs(search, key)[: LEAST if search.late else MOST]:
+    for number, gone in [] if search.late else _heirs(search, key)[:MOST]:
         rest = tuple(i for i in key if i != gone)
         fresh = tuple(sorted((*rest, number)))
         known = fresh in search.tried and search.error(fresh) <= AS_GOOD * reached
-        if not search.fits_in(fresh):
+        if search.late or not search.fits_in(fresh):
             continue
         if not known:
             theta = handed_over(search, key, gone, search.candidates[number])

@@ -179,10 +179,10 @@ def settle(search: Search, floor: Noise) -> Explanation:
         most = LEAST if search.late else max(LEAST, RIVALS // max(len(key), 1))
         reached = search.error(search.best())
         add_exchanged(search, key, most)
-        if not search.simulator.has_contacts:
-            add_handed_over(search, key)
         if not quiet and improves(search, search.best(), reached):
             extend(search, search.best())
+        if not search.simulator.has_contacts:
+            add_handed_over(search, key)
         if len(search.tried) == before or search.late:
             break
         if not quiet and choose(search, enough).key == key:

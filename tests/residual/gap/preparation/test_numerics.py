@@ -21,7 +21,8 @@ from residual.gap.preparation.numerics import (
 )
 from residual.trajectories import Trajectory
 from sims.effects import Delay, ParameterChange
-from sims.equations import FirstOrderSystem
+from sims.effects.library import library
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel, Parameter
 from studies.hidden.data import Truth, make_logs
@@ -77,7 +78,49 @@ def test_an_interval_of_a_thinned_log_has_whole_sub_steps():
     for step in (0.001, 0.002, 0.01):
         runs = [record(100, step)]
         stride = stride_for(runs, 2.0)
-        assert stride % own_substeps(simulator, runs, stride) == 0
+        steps = own_substeps(simulator, runs, stride)
+        assert stride % steps == 0 or steps % stride == 0
+        assert simulator.dt / simulator.substeps >= stride * step / steps  # as fine as its own
+
+
+def slid(seed, friction=1300.0, rows=600):
+    """Positions of a slide of 4 kg under steps of PWM, by closed form: it follows within 3 ms."""
+    rng = np.random.default_rng(seed)
+    pwm = np.repeat(rng.uniform(-300, 300, rows // 10 + 1), 10)[:rows]
+    rate, places, place, speed = friction / 4.0, [], 0.0, 0.0
+    for u in pwm:
+        places.append(place)
+        steady = 0.5 * u / 300.0
+        place += 0.02 * steady + (speed - steady) * (1 - np.exp(-0.02 * rate)) / rate
+        speed = steady + (speed - steady) * np.exp(-0.02 * rate)
+    seen = np.array(places) + 2e-5 * rng.standard_normal(rows)
+    states = np.stack([seen, np.full(rows, np.nan)], axis=1)
+    return Trajectory(f"run {seed}", 0.02 * np.arange(rows), states, pwm[:-1, None])
+
+
+class Slide(EquationOfMotion):
+    """A motor pushes a slide that nothing brakes."""
+
+    dt = 0.02
+    state_channels = (
+        Channel("slide", "m", "position", scale=0.2),
+        Channel("slide rate", "m/s", "rate", rate_of="slide", scale=0.3),
+    )
+    action_channels = (Channel("pwm", "1", "input", scale=100.0, low=-320.0, high=320.0),)
+
+    def acceleration(self, q, v, u, force, p):
+        return ((0.5 * u[:, 0] + force[:, 0]) / 4.0)[:, None]
+
+
+def test_friction_too_fast_for_steps_that_suit_the_nominal_simulator_is_found_and_judged():
+    offered = [e for e in library(Slide()) if e.name in ("viscous_friction", "actuator_gain")]
+    found = find_gap(Slide(), [slid(0)], held=[slid(1)], effects=offered, hold="zero")
+    by_name = {verdict.effect: verdict for verdict in found.verdicts}
+    friction = by_name["viscous_friction"].parameters["coefficient"]
+    assert friction.low < 1300.0 < friction.high
+    assert friction.value == pytest.approx(1300.0, rel=0.3)  # inertia hardly shows
+    assert found.held_out.before.value > 0.1
+    assert found.held_out.after.value < 1e-3
 
 
 def test_sub_steps_are_as_few_as_cannot_be_seen():
