@@ -77,6 +77,16 @@ def foreign(settings: Any) -> str:
     return next((found for part in parts if (found := foreign(part))), "")
 
 
+def needs_trust(settings: Any) -> str:
+    """The first import path that a file with these settings is refused for where nobody is trusted
+    beside this project; empty if there is none."""
+    token = _allowed.set(frozenset())
+    try:
+        return foreign(settings)
+    finally:
+        _allowed.reset(token)
+
+
 def named_packages(settings: Any) -> set[str]:
     """Packages of the import paths in plain values that the user wrote: those are trusted."""
     if isinstance(settings, str):

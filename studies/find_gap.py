@@ -34,7 +34,7 @@ from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Hold, Simulator
-from sims.trust import foreign
+from sims.trust import needs_trust
 from studies.gap.files import CORRECTED, REPORT, write_gap
 from studies.gap.progress import Heartbeat
 from studies.gap.summary import found_in_data, summary
@@ -255,7 +255,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         result = run(settings, output, jobs, tell)
     print(f"\n{summary(result, settings['tolerance'])}\n\nreport:              {output / REPORT}")
     print(f"corrected simulator: {output / CORRECTED}")
-    if strange := foreign(settings["simulator"]):
+    if strange := needs_trust(settings["simulator"]):
         print(f"  names a class of yours: load it with --trust {strange.partition('.')[0]}")
     for name in result.corrected.own_files():
         print(f"corrected model:     {output / name}")
