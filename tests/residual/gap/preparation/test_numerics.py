@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from slides import Slide
 
 from residual.gap import find_gap
 from residual.gap.confirmation.numerics import with_enough_substeps
@@ -22,7 +23,7 @@ from residual.gap.preparation.numerics import (
 from residual.trajectories import Trajectory
 from sims.effects import Delay, ParameterChange
 from sims.effects.library import library
-from sims.equations import EquationOfMotion, FirstOrderSystem
+from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel, Parameter
 from studies.hidden.data import Truth, make_logs
@@ -84,7 +85,7 @@ def test_an_interval_of_a_thinned_log_has_whole_sub_steps():
 
 
 def slid(seed, friction=1300.0, rows=600):
-    """Positions of a slide of 4 kg under steps of PWM, by closed form: it follows within 3 ms."""
+    """Positions of the slide under steps of PWM, by closed form: it follows within 3 ms."""
     rng = np.random.default_rng(seed)
     pwm = np.repeat(rng.uniform(-300, 300, rows // 10 + 1), 10)[:rows]
     rate, places, place, speed = friction / 4.0, [], 0.0, 0.0
@@ -98,27 +99,13 @@ def slid(seed, friction=1300.0, rows=600):
     return Trajectory(f"run {seed}", 0.02 * np.arange(rows), states, pwm[:-1, None])
 
 
-class Slide(EquationOfMotion):
-    """A motor pushes a slide that nothing brakes."""
-
-    dt = 0.02
-    state_channels = (
-        Channel("slide", "m", "position", scale=0.2),
-        Channel("slide rate", "m/s", "rate", rate_of="slide", scale=0.3),
-    )
-    action_channels = (Channel("pwm", "1", "input", scale=100.0, low=-320.0, high=320.0),)
-
-    def acceleration(self, q, v, u, force, p):
-        return ((0.5 * u[:, 0] + force[:, 0]) / 4.0)[:, None]
-
-
 def test_friction_too_fast_for_steps_that_suit_the_nominal_simulator_is_found_and_judged():
     offered = [e for e in library(Slide()) if e.name in ("viscous_friction", "actuator_gain")]
     found = find_gap(Slide(), [slid(0)], held=[slid(1)], effects=offered, hold="zero")
     by_name = {verdict.effect: verdict for verdict in found.verdicts}
     friction = by_name["viscous_friction"].parameters["coefficient"]
-    assert friction.low < 1300.0 < friction.high
-    assert friction.value == pytest.approx(1300.0, rel=0.3)  # inertia hardly shows
+    assert friction.low < 1240.0 < friction.high  # beside a damping of 60
+    assert friction.value == pytest.approx(1240.0, rel=0.3)  # inertia hardly shows
     assert found.held_out.before.value > 0.1
     assert found.held_out.after.value < 1e-3
 
