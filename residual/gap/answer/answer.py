@@ -161,17 +161,16 @@ def judged_apart(answer: Answer, prepared: Prepared, runs: Sequence[Trajectory],
     search = answer.found.search
     other = prepare(search.simulator, runs, prepared.horizon).fitter
     other = other.weighed_like(search.fitter)
+    tried = (search.nominal, search.tried[answer.key])
+    nominal, found = (fit.model.bind(fit.theta) for fit in tried)
     if isinstance(other, SmoothFitter):
         # As fine as was searched, and as what was found needs here.
         samples = other.samples
         most = own_substeps(answer.corrected, runs, samples.stride)
-        bound = search.tried[answer.key].model.bind(search.tried[answer.key].theta)
-        few = enough_for(bound, search.simulator, samples, other.nodes, other.sigma, most)
+        few = enough_for(found, search.simulator, samples, other.nodes, other.sigma, most)
         searched = min(most, search.fitter.samples.substeps)
         other = other.with_substeps(max(few, searched, samples.substeps))
-    fits = []
-    for fit in (search.nominal, search.tried[answer.key]):
-        fits.append(other.fit(Model(fit.model.bind(fit.theta)), np.zeros(0)))
+    fits = [other.fit(Model(simulator), np.zeros(0)) for simulator in (nominal, found)]
     floor = noise_floor(other, fits[1], answer.found.floor.sigma)
     return held_out(table, other, fits[0], fits[1], floor)
 

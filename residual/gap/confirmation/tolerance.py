@@ -7,6 +7,7 @@ also where every parameter may differ by its tolerance.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import time
 from collections.abc import Sequence
 
@@ -21,7 +22,7 @@ from residual.gap.confirmation.widening import widened
 from residual.gap.fitting.bounded import bounded_step
 from residual.gap.fitting.contract import UNCONVERGED, Fit
 from residual.gap.fitting.intervals import deviations
-from residual.gap.fitting.screening import trials
+from residual.gap.fitting.screening import beside_starts, trials
 from residual.gap.fitting.validation import validate
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.model.model import Model
@@ -70,9 +71,14 @@ def allow_for_parameters(
     left = float((beside.fit.projected**2).sum())
     asked: dict[Key, Calibrated] = {}
 
+    @functools.cache
+    def hopeless(other: Key) -> bool:
+        """Whether another set is not worth a fit with parameters free."""
+        return not search.beside and promised(search, other, parameters) > HOPELESS * left
+
     def as_good(claim: Claim, other: Key) -> bool:
         """Whether another set does as well as the chosen one, parameters free beside both."""
-        if not search.beside and promised(search, other, parameters) > HOPELESS * left:
+        if hopeless(other):
             return False
         its = asked[other] = calibrated(search, other, parameters)
         if adequate:
@@ -112,7 +118,7 @@ def allow_for_parameters(
         """Whether nothing comes near without an effect, parameters free."""
         without = all_but(key, claim.number)
         if without not in asked and not search.beside:
-            return promised(search, without, parameters) > HOPELESS * left
+            return hopeless(without)
         group = where_it_matters(search, key, claim.number)
         rest = asked[without] if without in asked else calibrated(search, without, parameters)
         return bool(rest.errors[group] > NO_MATCH * beside.errors[group])
@@ -147,7 +153,7 @@ def promised(search: Search, key: Key, parameters: Sequence[Candidate]) -> float
     fit, variants = search.tried[key], trials(free)
     columns = search.fitter.columns(fit, free)[..., [v.columns[0] for v in variants]]
     columns /= np.array([variant.trial.values[0, 0] for variant in variants])
-    columns -= fit.basis @ (fit.basis.transpose(0, 2, 1) @ columns)
+    columns = beside_starts(fit, columns)
     rows = np.concatenate([fit.by_knob, columns], axis=2)
     rows = rows.reshape(-1, rows.shape[2])
     knobs = [knob for candidate in free for knob in candidate.knobs]

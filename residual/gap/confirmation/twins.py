@@ -20,7 +20,7 @@ from residual.gap.fitting.plausible import absurd
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.model.model import Model
 from residual.gap.result import Meant
-from residual.gap.search.continuation import handed_over
+from residual.gap.search.continuation import handed_over, in_place
 from residual.gap.search.sets import Key, Search
 from sims.effects.base import Effect
 from sims.host import HostSimulator
@@ -90,11 +90,8 @@ def with_twins(search: Search, key: Key, claims: Sequence[Claim]) -> tuple[Claim
 def _in_place(search: Search, key: Key, number: int, twin: Candidate) -> Fit:
     """The set fitted with a twin in place of one of its members, the twin's numbers last."""
     fit = search.tried[key]
-    rest = [i for i in key if i != number]
-    model = Model(search.simulator, [*(search.candidates[i] for i in rest), twin, *search.beside])
-    stay = [fit.theta[fit.model.owner == key.index(i)] for i in rest]
-    beside = fit.theta[search.numbers(key) :]
-    start = np.concatenate([*stay, 0.01 * twin.trials[0].values[0], beside])
+    chosen, start = in_place(search, key, number, twin, 0.01 * twin.trials[0].values[0])
+    model = Model(search.simulator, chosen)
     found = search.fitter.fit(model, start, fit)
     if found.merit <= _reached(search, key) or not search.candidates[number].linear.all():
         return found

@@ -79,6 +79,11 @@ def project_out(basis: Array, columns: Array) -> Array:
     return columns - q @ (q.T @ columns)
 
 
+def beside_starts(fit: Fit, columns: Array) -> Array:
+    """Columns of every window, (W, R, c), less what its start state can imitate."""
+    return columns - fit.basis @ (fit.basis.transpose(0, 2, 1) @ columns)
+
+
 def signatures(fit: Fit, variants: Sequence[Variant], columns: Array) -> Signatures:
     """Signatures from what each variant adds to the whitened output of every window.
 
@@ -90,7 +95,7 @@ def signatures(fit: Fit, variants: Sequence[Variant], columns: Array) -> Signatu
         variants: Whose columns they are.
         columns: shape (W, R, c).
     """
-    columns = columns - fit.basis @ (fit.basis.transpose(0, 2, 1) @ columns)
+    columns = beside_starts(fit, columns)
     free = [j for j in range(len(fit.theta)) if not at_bound(fit, j)]
     chosen = flatten(fit.by_knob[..., free], fit.weights)
     residual = flatten(fit.projected, fit.weights)

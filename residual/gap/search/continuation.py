@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.fitting.screening import flatten
+from residual.gap.fitting.screening import beside_starts, flatten
 from residual.gap.model.candidates import Candidate
 from residual.gap.model.model import Model
 from residual.gap.search.exchange import add_without_each
@@ -32,6 +32,27 @@ AS_GOOD = 1.1
 MOST = 4
 
 
+def in_place(
+    search: Search, key: Key, gone: int, heir: Candidate, values: Array
+) -> tuple[list[Candidate], Array]:
+    """A set with another effect in place of a member: what it holds, and its numbers.
+
+    Args:
+        search: With the set.
+        key: The set, fitted.
+        gone: Its member that goes.
+        heir: What comes.
+        values: Numbers of that.
+
+    Returns:
+        The members that stay, the heir, what is free beside every set; their numbers, (p,).
+    """
+    fit, rest = search.tried[key], [i for i in key if i != gone]
+    stay = [fit.theta[fit.model.owner == key.index(i)] for i in rest]
+    theta = np.concatenate([*stay, values, fit.theta[search.numbers(key) :]])
+    return [*(search.candidates[i] for i in rest), heir, *search.beside], theta
+
+
 def handed_over(search: Search, key: Key, gone: int, heir: Candidate) -> Array:
     """Numbers from which a set is fitted with one effect in place of a member.
 
@@ -46,15 +67,12 @@ def handed_over(search: Search, key: Key, gone: int, heir: Candidate) -> Array:
         heir: What comes.
 
     Returns:
-        Numbers of the members that stay, then of the heir, then of what is free beside, (p,).
+        The numbers in the order of ``in_place``, (p,).
     """
     fit, simulator, leaving = search.tried[key], search.simulator, search.candidates[gone]
-    rest = [i for i in key if i != gone]
     values = fit.theta[fit.model.owner == key.index(gone)]
-    stay = [fit.theta[fit.model.owner == key.index(i)] for i in rest]
     nothing = np.where(heir.linear, 0.0, heir.trials[0].values[0])
-    theta = np.concatenate([*stay, nothing, fit.theta[search.numbers(key) :]])
-    chosen = [*(search.candidates[i] for i in rest), heir, *search.beside]
+    chosen, theta = in_place(search, key, gone, heir, nothing)
     slope, before = np.zeros_like(theta), 1.0
     for part in PARTS:
         left = leaving.bind(np.where(leaving.linear, part * values, values).tolist())
@@ -74,7 +92,7 @@ def add_handed_over(search: Search, key: Key) -> None:
     members, too.
     """
     reached = search.error(key)
-    for number, gone in [] if search.late else _heirs(search, key)[:MOST]:
+    for number, gone in _heirs(search, key)[:MOST]:
         rest = tuple(i for i in key if i != gone)
         fresh = tuple(sorted((*rest, number)))
         known = fresh in search.tried and search.error(fresh) <= AS_GOOD * reached
@@ -105,8 +123,8 @@ def _heirs(search: Search, key: Key) -> list[tuple[int, int]]:
     if not key or not others:
         return []
     columns = search.fitter.columns(fit, [search.candidates[number] for number in others])
-    columns = columns - fit.basis @ (fit.basis.transpose(0, 2, 1) @ columns)
-    flat, own = flatten(columns, fit.weights), flatten(fit.by_knob, fit.weights)
+    flat = flatten(beside_starts(fit, columns), fit.weights)
+    own = flatten(fit.by_knob, fit.weights)
     own = own / np.maximum(np.linalg.norm(own, axis=0), 1e-300)
     found, at = [], 0
     for number in others:

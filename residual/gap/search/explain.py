@@ -181,7 +181,7 @@ def settle(search: Search, floor: Noise) -> Explanation:
         add_exchanged(search, key, most)
         if not quiet and improves(search, search.best(), reached):
             extend(search, search.best())
-        if not search.simulator.has_contacts:
+        if not (search.simulator.has_contacts or search.late):
             add_handed_over(search, key)
         if len(search.tried) == before or search.late:
             break
