@@ -2,6 +2,9 @@
 
 from typing import ClassVar
 
+import numpy as np
+
+from residual.trajectories import Trajectory
 from sims.equations import EquationOfMotion
 from sims.simulator import Channel, Parameter
 
@@ -24,3 +27,20 @@ class Slide(EquationOfMotion):
     def acceleration(self, q, v, u, force, p):
         push = p.force_per_count * u[:, 0] - p.damping * v[:, 0]
         return ((push + force[:, 0]) / p.mass)[:, None]
+
+
+def braked(force, friction, mass, dt):
+    """Positions from rest under forces that are held (n,), viscous friction by closed form."""
+    rate, places, place, speed = friction / mass, [], 0.0, 0.0
+    for steady in np.asarray(force) / friction:
+        places.append(place)
+        place += steady * dt + (speed - steady) * (1 - np.exp(-rate * dt)) / rate
+        speed = steady + (speed - steady) * np.exp(-rate * dt)
+    return np.array(places)
+
+
+def recorded(name, places, pwm, dt, noise, rng):
+    """A log of noisy positions, the rate not measured."""
+    seen = places + noise * rng.standard_normal(len(places))
+    states = np.stack([seen, np.full(len(places), np.nan)], axis=1)
+    return Trajectory(name, dt * np.arange(len(places)), states, pwm[:-1, None])

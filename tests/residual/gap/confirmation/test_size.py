@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from slides import braked, recorded
 
 from residual.gap import find_gap
 from residual.gap.confirmation.size import by_factors
 from residual.gap.model.candidates import Knob
-from residual.trajectories import Trajectory
 from sims.equations import EquationOfMotion
 from sims.simulator import Channel, Parameter
 
@@ -39,15 +39,8 @@ def pushed(friction, gain, rows=600, noise=5e-4, wave=0.03):
     """Positions of the true cart, whose motor also gets weaker and stronger in turn."""
     rng = np.random.default_rng(0)
     pwm = np.repeat(rng.uniform(-200, 200, rows // 12 + 1), 12)[:rows]
-    time, rate = 0.01 * np.arange(rows), friction / 0.5
-    positions, speed, place = [], 0.0, 0.0
-    for u, now in zip(pwm, time, strict=True):
-        positions.append(place)
-        steady = 0.02 * gain * u * (1 + wave * np.sin(2.1 * now)) / friction
-        place += steady * 0.01 + (speed - steady) * (1 - np.exp(-rate * 0.01)) / rate
-        speed = steady + (speed - steady) * np.exp(-rate * 0.01)
-    seen = np.array(positions) + noise * rng.standard_normal(rows)
-    return Trajectory("run", time, np.stack([seen, np.full(rows, np.nan)], 1), pwm[:-1, None])
+    force = 0.02 * gain * pwm * (1 + wave * np.sin(2.1 * 0.01 * np.arange(rows)))
+    return recorded("run", braked(force, friction, 0.5, 0.01), pwm, 0.01, noise, rng)
 
 
 def test_friction_without_which_nothing_fits_is_certain_though_the_mass_may_be_meant():

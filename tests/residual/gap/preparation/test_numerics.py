@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from slides import Slide
+from slides import Slide, braked, recorded
 
 from residual.gap import find_gap
 from residual.gap.confirmation.numerics import with_enough_substeps
@@ -88,15 +88,8 @@ def slid(seed, friction=1300.0, rows=600):
     """Positions of the slide under steps of PWM, by closed form: it follows within 3 ms."""
     rng = np.random.default_rng(seed)
     pwm = np.repeat(rng.uniform(-300, 300, rows // 10 + 1), 10)[:rows]
-    rate, places, place, speed = friction / 4.0, [], 0.0, 0.0
-    for u in pwm:
-        places.append(place)
-        steady = 0.5 * u / 300.0
-        place += 0.02 * steady + (speed - steady) * (1 - np.exp(-0.02 * rate)) / rate
-        speed = steady + (speed - steady) * np.exp(-0.02 * rate)
-    seen = np.array(places) + 2e-5 * rng.standard_normal(rows)
-    states = np.stack([seen, np.full(rows, np.nan)], axis=1)
-    return Trajectory(f"run {seed}", 0.02 * np.arange(rows), states, pwm[:-1, None])
+    places = braked(0.5 * friction / 300.0 * pwm, friction, 4.0, 0.02)
+    return recorded(f"run {seed}", places, pwm, 0.02, 2e-5, rng)
 
 
 def test_friction_too_fast_for_steps_that_suit_the_nominal_simulator_is_found_and_judged():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from slides import Slide
+from slides import Slide, recorded
 
 from residual.gap import find_gap
 from residual.gap.model.candidates import candidates
@@ -10,7 +10,6 @@ from residual.gap.model.model import Model
 from residual.gap.preparation.prepare import prepare
 from residual.gap.search.continuation import handed_over
 from residual.gap.search.sets import Search
-from residual.trajectories import Trajectory
 from sims.effects.library import library
 
 
@@ -24,9 +23,7 @@ def driven(acceleration, rows=600, noise=2e-4, seed=0, dt=0.02):
         for _ in range(100):
             speed += acceleration(speed, u) * dt / 100
             place += speed * dt / 100
-    seen = np.array(places) + noise * rng.standard_normal(rows)
-    states = np.stack([seen, np.full(rows, np.nan)], axis=1)
-    return Trajectory(f"run {seed}", dt * np.arange(rows), states, pwm[:-1, None])
+    return recorded(f"run {seed}", np.array(places), pwm, dt, noise, rng)
 
 
 def searched(log, *labels):
