@@ -9,6 +9,7 @@ from typing import Any
 
 from residual.gap.answer.answer import Answer, confirm
 from residual.gap.answer.free_parameters import better, worth_freeing
+from residual.gap.answer.friction_curve import takes_its_place, worth_a_curve
 from residual.gap.answer.lone import explains_the_rest, lone_stretch
 from residual.gap.confirmation.aliases import (
     aliases,
@@ -125,12 +126,14 @@ class Inquiry:
         ready: Prepared,
         beside: Sequence[Candidate] = (),
         earlier: Search | None = None,
+        more: Sequence[Effect] = (),
     ) -> Explanation:
-        """The effects that explain a log, see ``explain``."""
+        """The effects that explain a log, see ``explain``; ``more`` of them than are offered."""
         free = {candidate.label for candidate in beside}
         samples = ready.fitter.samples
         less = [one.taking_away() for one in candidates(simulator, self.offered.less, samples)]
-        pool = ready.pool([*candidates(simulator, self.offered.kept, samples), *less])
+        offered = [*self.offered.kept, *more]
+        pool = ready.pool([*candidates(simulator, offered, samples), *less])
         pool = [candidate for candidate in pool if candidate.label not in free]
         others = {label: e for label, e in self.offered.by_label.items() if label not in free}
         twins = exact_twins(simulator, ready.fitter.samples, self.offered.groups, others)
@@ -192,6 +195,7 @@ class Inquiry:
         if matters:
             known = self.without_lone_stretch(log, known, tolerance)
             known = self.with_parameters_free(known, tolerance)
+            known = self.with_friction_curves(known, tolerance)
         answer = known.answer
         claims = with_twins(answer.found.search, answer.key, answer.claims)
         return dataclasses.replace(known, answer=dataclasses.replace(answer, claims=claims))
@@ -212,6 +216,23 @@ class Inquiry:
         again = self.explained(search.simulator, prepared, beside, search)
         second = confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
         return dataclasses.replace(known, answer=second) if better(second, answer) else known
+
+    def with_friction_curves(self, known: Confirmed, tolerance: float) -> Confirmed:
+        """The same, or what is found with curves of friction if they take most of what is left.
+
+        Looked for only in time.
+        """
+        answer, prepared = known.answer, known.prepared
+        curves = worth_a_curve(answer)
+        if not curves or time.process_time() > self.clock.search_until:
+            return known
+        self.tell("once more with friction by curves of its own")
+        search = answer.found.search
+        again = self.explained(search.simulator, prepared, search.beside, search, curves)
+        second = confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
+        if not takes_its_place(second, answer):
+            return known
+        return dataclasses.replace(known, answer=second)
 
     def without_lone_stretch(self, log: Log, known: Confirmed, tolerance: float) -> Confirmed:
         """The same, or what is found without a stretch of the log that nothing explains.

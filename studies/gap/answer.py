@@ -8,6 +8,8 @@ from residual.gap import GapResult
 from residual.gap.answer.doubts import DOUBTS
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
 from residual.gap.result import Gap, Meant, Number, Verdict
+from sims.effects.base import Effect
+from sims.host import HostSimulator
 from studies.gap.words import (
     KINDS,
     ahead,
@@ -55,7 +57,9 @@ def headline(verdict: Verdict, result: GapResult) -> str:
             for name, change in verdict.parameters.items()
         ]
         return f"Parameters moved within their tolerance: {listed(moved)}."
-    name = capitalized(effect_name(verdict.label))
+    name = effect_name(verdict.label)
+    if verdict.effect != verdict.where:  # a parameter is called as its author does
+        name = capitalized(name)
     if verdict.kind == "minor":
         return f"{name}: {percent(verdict.share.value)} of the gap, not added."
     parameter = result.corrected.parameters.get(verdict.where)
@@ -67,12 +71,26 @@ def headline(verdict: Verdict, result: GapResult) -> str:
             f"{name}: {number_text(change, sign=True)}, so {total}"
             f"{unit_text(change.unit)} in place of {six_digits(float(parameter.value))}."
         )
-    values = verdict.parameters.items()
-    numbers = ", ".join(f"{_spelt(field)} {number_text(number)}" for field, number in values)
+    effect = known_effects(result)[verdict.label]
+    numbers = ", ".join(numbers_of(verdict, effect, result.corrected))
     if verdict.family:
         own = effect_name(verdict.label)
         return f"{capitalized(verdict.family)}, form undecided: as {own}, {numbers}."
-    return f"{name}{shape(verdict)}: {numbers}{_times(verdict)}."
+    given = "" if any(map(effect.point_of, verdict.parameters)) else shape(verdict)
+    return f"{name}{given}: {numbers}{_times(verdict)}."
+
+
+def numbers_of(verdict: Verdict, effect: Effect, simulator: HostSimulator) -> list[str]:
+    """Each number with its name, or where it holds if a curve is given by them."""
+    texts = []
+    for field, number in verdict.parameters.items():
+        point = effect.point_of(field)
+        if point:
+            unit = effect.measures(simulator)[point[1]][0]
+            texts.append(f"{number_text(number)} at {quantity_text(point[0], unit)}")
+        else:
+            texts.append(f"{_spelt(field)} {number_text(number)}")
+    return texts
 
 
 #: Of what a share is one more: actuators receive, and sensors read.
@@ -90,8 +108,8 @@ def _spelt(field: str) -> str:
 
 
 def shape(verdict: Verdict) -> str:
-    """Whole numbers that were chosen rather than fitted, such as the order of a cogging."""
-    words = [f"{name} {value:g}" for name, value in verdict.shape.items()]
+    """Numbers that were chosen rather than fitted, such as the order of a cogging."""
+    words = [f"{_spelt(name)} {value:.4g}" for name, value in verdict.shape.items()]
     return f" ({', '.join(words)})" if words else ""
 
 

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure as Drawing
 
 from residual.gap import GapResult
 from residual.gap.fitting.where import Profile
-from residual.gap.result import Rollout
+from residual.gap.result import Rollout, Verdict
+from sims.effects import FrictionCurve
 from studies.gap.words import FLOOR, gap_rows, quantity_text, typeset, with_unit
 from studies.reporting.figures import (
     AMBER,
@@ -101,6 +102,26 @@ def rollout(result: GapResult, shown: Rollout, path: Path) -> Drawing:
     figure.align_ylabels()
     figure.legend(loc="outside upper left", ncols=2, handlelength=1.2, columnspacing=1.2)
     save_figure(figure, path, data)
+    return figure
+
+
+@styled()
+def friction(result: GapResult, verdict: Verdict, effect: FrictionCurve, path: Path) -> Drawing:
+    """Size of friction by speed, through three points with their intervals."""
+    measures = effect.measures(result.corrected)
+    figure, axes = new_figure(height=3.0)
+    axis: Axes = axes[0, 0]
+    speeds = np.linspace(0.0, effect.full, 121)
+    sizes = -effect.force(0.0, speeds)
+    axis.plot(speeds, sizes, color=BLUE)
+    for field, number in verdict.parameters.items():
+        speed, _ = effect.point_of(field) or (np.nan, "")
+        axis.plot([speed], [number.value], "o", color=BLUE, markersize=4.5)
+        axis.vlines(speed, number.low, number.high, color=INK, linewidth=1.3)
+    axis.set(xlim=(0, None), ylim=(0, None))
+    axis.set_xlabel(with_unit("speed", measures["rate"][0]))
+    axis.set_ylabel(with_unit("friction", measures["force"][0].replace("/s/s", "/s^2")))
+    save_figure(figure, path, {"speed": speeds, "friction": sizes})
     return figure
 
 

@@ -18,7 +18,7 @@ from residual.logs import Finding
 from simgap_files.atomic import atomic_write_text, flush_to_disk, write_sealed
 from sims.loading import corrected_settings
 from sims.model_files import relative
-from studies.gap.forecasts import bars, rollouts, set_aside, tiles, where
+from studies.gap.forecasts import bars, curves, rollouts, set_aside, tiles, where
 from studies.gap.lead import lead
 from studies.gap.verdicts import apart, banners, blind, evidence
 from studies.gap.words import found_once
@@ -47,6 +47,7 @@ def write_report(
         tiles(result),
         *rollouts(result, figures),
         bars(result, figures),
+        *curves(result, figures),
         *set_aside(result),
         *where(result, figures),
         evidence(result),

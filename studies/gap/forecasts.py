@@ -9,7 +9,8 @@ import numpy as np
 
 from residual.gap import GapResult
 from residual.gap.result import Gap, Rollout
-from studies.gap.figures import lags, profile, rollout, shrinking
+from sims.effects import FrictionCurve
+from studies.gap.figures import friction, lags, profile, rollout, shrinking
 from studies.gap.words import (
     CROSS_VALIDATED,
     ahead,
@@ -88,6 +89,23 @@ def bars(result: GapResult, folder: Path) -> Figure:
         f"simulator would reach on its own data plus noise.{in_vain}",
         heading="The gap, step by step",
     )
+
+
+def curves(result: GapResult, folder: Path) -> list[Section]:
+    """Friction by speed, where it follows a curve of its own."""
+    pictures = [
+        Figure(
+            friction(result, verdict, effect, folder / f"friction-{number}.png"),
+            f"Friction at {verdict.where} by speed: what was found, with 95 % intervals.",
+            f"No law of friction in the library comes near what was measured at {verdict.where}: "
+            "this curve through three points and zero takes most of what they leave.",
+            heading=f"Friction at {verdict.where}",
+        )
+        for number, verdict in enumerate(result.verdicts, start=1)
+        for effect in result.effects
+        if isinstance(effect, FrictionCurve) and str(effect) == verdict.label
+    ]
+    return list(pictures)
 
 
 def set_aside(result: GapResult) -> list[Section]:

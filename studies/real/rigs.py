@@ -15,7 +15,7 @@ from studies.real.prepare import cut_coast, sum_accelerations
 
 #: What takes energy out of a joint.
 FRICTION = ("viscous_friction", "coulomb_friction", "stribeck_friction", "directional_friction")
-DISSIPATION = (*FRICTION, "quadratic_drag")
+DISSIPATION = (*FRICTION, "quadratic_drag", "friction_curve")
 LATE = ("delay", "actuator_lag")
 
 

@@ -26,6 +26,8 @@ from sims.unsound import Unsound
 DEBUG, DEBUG_VARIABLE, TRUST = "--debug", "SIMGAP_DEBUG", "--trust"
 # What a check of a disk writes before the work: less would fit on a disk that is full.
 _PROBE = bytes(2**16)
+# As of a process that SIGPIPE ended.
+_UNREAD = 141
 _HOME = Path(__file__).parents[2]
 _LIBRARIES = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "purelib", "platlib")]
 
@@ -78,10 +80,11 @@ def guarded(
     """Let a command end in one way, whatever happens.
 
     Bad input, which any code may refuse with a ``ValueError``, and disks that fail end it with one
-    line and exit code 2, Ctrl-C with 130, a fault of ours with one line, a file that keeps the
-    traceback, and exit code 1. ``--debug`` or
-    ``SIMGAP_DEBUG=1`` shows tracebacks. Files of simulators may name classes of ours, of packages
-    after ``--trust``, and of those whose classes stand beside it on the command line.
+    line and exit code 2, Ctrl-C with 130, a reader that has read enough, such as ``head``, with
+    141, a fault of ours with one line, a file that keeps the traceback, and exit code 1.
+    ``--debug`` or ``SIMGAP_DEBUG=1`` shows tracebacks. Files of simulators may name classes of
+    ours, of packages after ``--trust``, and of those whose classes stand beside it on the command
+    line.
 
     Args:
         resumes: Whether the same command continues what was stopped.
@@ -109,6 +112,8 @@ def guarded(
                     traceback.print_exception(ended.__context__)
                 raise
             except Exception as error:
+                if isinstance(error, BrokenPipeError) and _nobody_reads():
+                    raise SystemExit(_UNREAD) from None
                 if debug:
                     traceback.print_exc()
                 # One that names a file tells enough.
@@ -124,6 +129,17 @@ def guarded(
         return run
 
     return decorate
+
+
+def _nobody_reads() -> bool:
+    """Whether what is printed goes to a program that has ended, such as ``head``; then no more is
+    printed, at the end of Python neither."""
+    try:
+        print(flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return True
+    return False
 
 
 def on_purpose(error: Exception) -> bool:

@@ -291,3 +291,23 @@ def test_control_c_in_a_callback_is_passed_on(capsys):
         del freed
         time.sleep(10)
     assert capsys.readouterr().err == ""
+
+
+def test_a_reader_that_has_read_enough_is_no_error():
+    code = """
+from studies.running.ending import guarded
+
+@guarded()
+def main(arguments):
+    for number in range(100_000):
+        print(number)
+
+main([])
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout.readline() == b"0\n"
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 141
