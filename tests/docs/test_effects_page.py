@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from sims import effects
-from sims.effects import Effect, library
+from sims.effects import Effect, FrictionCurve, library
 from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel
@@ -33,8 +33,8 @@ def row(effect: Effect) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-# One of each; on another channel an offset has another unit.
-HOSTED = (*library(PendulumEquation()), *library(Tank()))
+# One of each; on another channel an offset has another unit. The curve is asked for later.
+HOSTED = (*library(PendulumEquation()), *library(Tank()), FrictionCurve("pivot"))
 LIBRARY = {e.name: e for e in reversed(HOSTED) if e.enters != "parameter"}
 
 
