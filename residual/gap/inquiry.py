@@ -202,7 +202,7 @@ class Inquiry:
 
     def with_parameters_free(self, known: Confirmed, tolerance: float) -> Confirmed:
         """The same, or what is found with parameters free if they may hide something."""
-        answer, prepared = known.answer, known.prepared
+        answer = known.answer
         beside = worth_freeing(answer, tolerance)
         if not beside:
             return known
@@ -212,9 +212,7 @@ class Inquiry:
                 "what is left: there was no time to look, give more --minutes"
             )
         self.tell("once more with parameters free within their tolerance")
-        search = answer.found.search
-        again = self.explained(search.simulator, prepared, beside, search)
-        second = confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
+        second = self._asked_again(known, tolerance, beside)
         return dataclasses.replace(known, answer=second) if better(second, answer) else known
 
     def with_friction_curves(self, known: Confirmed, tolerance: float) -> Confirmed:
@@ -222,17 +220,27 @@ class Inquiry:
 
         Looked for only in time.
         """
-        answer, prepared = known.answer, known.prepared
+        answer = known.answer
         curves = worth_a_curve(answer)
         if not curves or time.process_time() > self.clock.search_until:
             return known
         self.tell("once more with friction by curves of its own")
-        search = answer.found.search
-        again = self.explained(search.simulator, prepared, search.beside, search, curves)
-        second = confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
+        second = self._asked_again(known, tolerance, answer.found.search.beside, curves)
         if not takes_its_place(second, answer):
             return known
         return dataclasses.replace(known, answer=second)
+
+    def _asked_again(
+        self,
+        known: Confirmed,
+        tolerance: float,
+        beside: Sequence[Candidate],
+        more: Sequence[Effect] = (),
+    ) -> Answer:
+        """What is found in the same windows with parameters free, or with more on offer."""
+        search = known.answer.found.search
+        again = self.explained(search.simulator, known.prepared, beside, search, more)
+        return confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
 
     def without_lone_stretch(self, log: Log, known: Confirmed, tolerance: float) -> Confirmed:
         """The same, or what is found without a stretch of the log that nothing explains.

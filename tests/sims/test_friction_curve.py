@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from hosts import HOSTS, host, rows
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sims.effects import FrictionCurve
+from sims.effects import FrictionCurve, QuadraticDrag
 
 sizes = st.floats(0.0, 1e3)
 
@@ -37,3 +38,14 @@ def test_points_lie_at_thirds_of_the_full_speed():
         (6.0, "rate"),
     ]
     assert curve.point_of("full") is None
+
+
+@host
+def test_hosts_apply_it_like_the_law_that_it_is_a_case_of(host):
+    states, volts = rows(30)
+    plain, full, drag = HOSTS[host], 60.0, 2e-5  # faster than any row becomes
+    curve = FrictionCurve("pivot", *(drag * (k * full / 3) ** 2 for k in (1, 2, 3)), full)
+    of_curve = plain.with_effects([curve]).step(states, volts)
+    of_law = plain.with_effects([QuadraticDrag("pivot", drag)]).step(states, volts)
+    assert of_curve == pytest.approx(of_law, abs=1e-9)
+    assert np.abs(of_law - plain.step(states, volts)).max() > 1e-3
