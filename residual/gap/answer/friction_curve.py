@@ -32,10 +32,12 @@ def worth_a_curve(answer: Answer) -> list[FrictionCurve]:
     left = fitter.left(search.tried[key], answer.found.floor)
     if left.adequate or left.ratio <= FOOTNOTE or not isinstance(fitter, SmoothFitter):
         return []
+    # A simulator's own damping moves like friction at its joint.
+    alike = [one.effect for number in key for one in search.twins_of(number)]
     chosen = [search.candidates[number].effect for number in key]
     rubbed = {
         effect.where
-        for effect in chosen
+        for effect in (*chosen, *alike)
         if isinstance(effect, JointEffect) and effect.family == FrictionCurve.family
     }
     names = [channel.name for channel in simulator.physical_channels]

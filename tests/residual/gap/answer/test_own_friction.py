@@ -7,7 +7,7 @@ from residual.gap import find_gap
 from residual.trajectories import Trajectory
 from sims.effects import FrictionCurve
 from sims.equations import FirstOrderSystem
-from sims.simulator import Channel
+from sims.simulator import Channel, Parameter
 
 
 class Rotor(FirstOrderSystem):
@@ -17,6 +17,15 @@ class Rotor(FirstOrderSystem):
 
     def derivative(self, x, u, p):
         return 5.0 * u
+
+
+class DampedRotor(Rotor):
+    """One whose author expects a damping."""
+
+    parameters = {"damping": Parameter(5.0, "1/s", "of the bearing", low=0.0)}
+
+    def derivative(self, x, u, p):
+        return 5.0 * u - (p.damping * x[:, 0])[:, None]
 
 
 #: Enough to be wrong with.
@@ -82,3 +91,13 @@ def test_a_remainder_that_does_not_follow_speed_leaves_the_laws_of_the_library()
     found = find_gap(Rotor(), [shaken(0), shaken(1)], effects=OFFERED)
     assert not any(isinstance(effect, FrictionCurve) for effect in found.effects)
     assert "viscous_friction" in {v.effect for v in found.verdicts}
+
+
+def test_a_damping_of_the_simulator_s_own_makes_no_difference():
+    found = find_gap(
+        DampedRotor(),
+        [log(eddy_brake, 0), log(eddy_brake, 1)],
+        effects=(*OFFERED, "damping"),
+    )
+    assert any(isinstance(effect, FrictionCurve) for effect in found.effects)
+    assert found.gap.share.value > 0.99
