@@ -218,7 +218,8 @@ class _Problem:
         residual = misfit(samples, windows, slope, sigma) - shown[..., -1]
         flat = residual.reshape(count, -1)
         columns = shown[..., :-1].reshape(count, flat.shape[1], f + p)
-        costs = np.minimum((flat**2).sum(axis=1), 1e30)
+        with np.errstate(over="ignore"):  # what runs away costs no less for being capped
+            costs = np.minimum((flat**2).sum(axis=1), 1e30)
         ridges = np.broadcast_to(np.diag(self.ridge), (count, f, f))
         basis, triangle = np.linalg.qr(np.concatenate([columns[..., :f], ridges], axis=1))
         basis_rows = basis[:, : flat.shape[1]]
