@@ -191,7 +191,9 @@ class Delay(ActuatorEffect):
     time: Value = number(low=0.0, time=1, share=0.1, starts=(0.02, 0.1, 0.4, 1.0, 1.6))
 
     name: ClassVar[str] = "delay"
-    sentence: ClassVar[str] = "Commands arrive late by a fixed time, or all sensors do, which looks the same."
+    sentence: ClassVar[str] = (
+        "Commands arrive late by a fixed time, or all sensors do, which looks the same."
+    )
     needs: ClassVar[str] = "sudden changes of the input"
     family: ClassVar[str] = "delay or lag"
     stage: ClassVar[int] = 5
