@@ -12,9 +12,9 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from studies.learnt.statistics import mean
-from studies.learnt.words import Results, policy_name
-from studies.reporting.figures import PALETTE, draw_lines, legend_above, new_figure, styled
+from studies.learnt.statistics import Mean, mean
+from studies.learnt.words import POLICY_WORDS, Results, policy_name
+from studies.reporting.figures import INK, PALETTE, draw_lines, legend_above, new_figure, styled
 
 Drawn = tuple[Figure, pd.DataFrame]
 
@@ -149,7 +149,12 @@ def path_figure(
 
 @styled()
 def updates_figure(rows: pd.DataFrame) -> Drawn:
-    """Return per update by estimator, and of the control; ``rows`` hold every policy once."""
+    """Return per update by estimator, and of the control and the baselines.
+
+    Args:
+        rows: Every policy once. Cold and warm start, learnt on the true system from as many
+            samples as they say, stand where the last update is.
+    """
     figure, axes = new_figure(height=3.8)
     axis = axes[0, 0]
     begin = rows[rows["name"] == "idealised"].drop_duplicates("seed")["return_true"].tolist()
@@ -159,6 +164,13 @@ def updates_figure(rows: pd.DataFrame) -> Drawn:
     true = rows[rows["name"] == "true"].drop_duplicates("seed")["return_true"]
     factor = scale_of_returns(axis, rows["return_true"].tolist())
     numbers = []
+
+    def told(method: str, update: int, found: Mean) -> None:
+        numbers.append(
+            {"method": method, "update": update, "return": found.value,
+             "half_width": found.half_width}
+        )  # fmt: skip
+
     for colour, (label, part) in zip(PALETTE * 2, loops, strict=False):
         means = {0: mean(begin)} | {
             int(group["iteration"].iloc[0]): mean(group["return_true"].tolist())
@@ -168,15 +180,23 @@ def updates_figure(rows: pd.DataFrame) -> Drawn:
         axis.plot(list(means), [factor * m.value for m in values], "o-", color=colour, label=label)
         bounds = [[factor * m.low for m in values], [factor * m.high for m in values]]
         axis.fill_between(list(means), *bounds, color=colour, alpha=0.15, linewidth=0)
-        numbers += [
-            {"method": label, "update": k, "return": m.value, "half_width": m.half_width}
-            for k, m in means.items()
-        ]
+        for update, found in means.items():
+            told(str(label), update, found)
+    last = int(rows["iteration"].max())
+    for beside, name, mark in ((0.08, "cold", "v"), (0.16, "warm", "^")):
+        for samples, part in rows[rows["name"] == name].groupby("true_samples"):
+            found = mean(part.drop_duplicates("seed")["return_true"].tolist())
+            label = f"{POLICY_WORDS[name]}, {samples} true samples"
+            axis.errorbar(
+                last + beside, factor * found.value, np.nan_to_num(found.half_width), fmt=mark,
+                color=INK, capsize=3, label=label,
+            )  # fmt: skip
+            told(label, last, found)
     if len(true):
         reference_line(axis, factor * true.mean(), "learnt on the true system")
     axis.set_xlabel("update")
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
-    figure.legend(loc="outside upper left", ncols=3, handlelength=1.4)
+    figure.legend(loc="outside upper left", ncols=2, handlelength=1.4)
     return figure, pd.DataFrame(numbers)
 
 

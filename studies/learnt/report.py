@@ -154,7 +154,8 @@ def _of_returns(
             "updates", updates_figure(once), "Return by update",
             "Return on the true system after each update, with and without a difference model.",
             "In tests on the true system that are not counted as samples; of several seeds the "
-            "mean and its 95 % interval; dashed, learnt on the true system.",
+            "mean and its 95 % interval; dashed, learnt on the true system. Cold and warm start "
+            "learnt there, too, from as many samples as the legend says.",
         ))  # fmt: skip
     if len(results) == 1:
         drawings.append((
