@@ -67,6 +67,7 @@ def test_the_report_shows_it_walking_and_carries_everything(folder):
     assert "http://" not in page.replace("http://www.w3.org", "")
     for name in ("trajectories", "updates", "curves"):
         assert (folder / "figures" / f"{name}.png").stat().st_size > 1000
+    assert (folder / "films" / "side_by_side.png").stat().st_size > 1000
 
 
 def test_a_table_over_trials(results, tmp_path):
