@@ -216,14 +216,17 @@ class Inquiry:
         return dataclasses.replace(known, answer=second) if better(second, answer) else known
 
     def with_friction_curves(self, known: Confirmed, tolerance: float) -> Confirmed:
-        """The same, or what is found with curves of friction if they take most of what is left.
-
-        Looked for only in time.
-        """
+        """The same, or what is found with curves of friction if they take most of what is left."""
         answer = known.answer
         curves = worth_a_curve(answer)
-        if not curves or time.process_time() > self.clock.search_until:
+        if not curves:
             return known
+        if time.process_time() > self.clock.search_until:
+            joints = " and ".join(curve.joint for curve in curves)
+            return known.and_says(
+                f"friction at {joints} may follow speed along a curve that no law of the library "
+                "has: there was no time to look, give more --minutes"
+            )
         self.tell("once more with friction by curves of its own")
         second = self._asked_again(known, tolerance, answer.found.search.beside, curves)
         if not takes_its_place(second, answer):
