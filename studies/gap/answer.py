@@ -32,6 +32,8 @@ from studies.gap.words import (
 FOOTNOTE = 0.02
 #: Verdicts that name no effect.
 NAMELESS = ("unexplained", "calibrated", "needs_data", "no_gap")
+#: Letters of a parameter's name up to which it is a symbol: l and L are two.
+SYMBOL = 2
 #: Part of an interval below which one with an exact simulator is worth a line.
 MUCH = 0.7
 
@@ -58,7 +60,7 @@ def headline(verdict: Verdict, result: GapResult) -> str:
         ]
         return f"Parameters moved within their tolerance: {listed(moved)}."
     name = effect_name(verdict.label)
-    if verdict.effect != verdict.where:  # a parameter is called as its author does
+    if len(name) > SYMBOL:
         name = capitalized(name)
     if verdict.kind == "minor":
         return f"{name}: {percent(verdict.share.value)} of the gap, not added."

@@ -230,13 +230,14 @@ def verdicts(
     answer: Answer, table: Gap, sets: Sequence[tuple[str, ...]], tolerance: float | None,
     blind: Sequence[Blind],
 ) -> list[Verdict]:  # fmt: skip
-    """All verdicts, most important first."""
+    """All verdicts, most important first: what is certain, then what takes off most."""
     found, search = answer.found, answer.found.search
     labels = [search.candidates[claim.number].label for claim in answer.claims]
     blocks = len(search.fitter.blocks)
     made: list[Verdict] = []
     for claim, label in zip(answer.claims, labels, strict=True):
         made.append(effect_verdict(search, claim, blocks, *dependent(label, labels, sets)))
+    made.sort(key=lambda verdict: verdict.kind != "confirmed")
     if search.beside:
         made.append(calibrated_verdict(search, answer.key))
     left = search.fitter.left(search.tried[answer.key], found.floor)
