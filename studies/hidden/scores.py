@@ -7,6 +7,7 @@ from typing import Any
 
 from residual.gap import GapResult
 from sims.effects.aliases import exact_aliases
+from sims.effects.friction_curve import FrictionCurve
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.strengths import HIDDEN
 
@@ -31,8 +32,10 @@ def same(name: str) -> frozenset[str]:
 
 
 def alike(name: str) -> frozenset[str]:
-    """The same, and declared near-twins."""
+    """The same, declared near-twins, and the curve of which it is a case."""
     found = same(name)
+    if name in FrictionCurve.special_cases:
+        found |= {FrictionCurve.name}
     for family in TWINS:
         if name in family:
             found |= family

@@ -11,6 +11,7 @@ from residual.gap.result import Verdict
 from residual.trajectories import Trajectory
 from sims.effects.aliases import exact_aliases, exact_twins
 from sims.effects.base import Effect
+from sims.effects.friction_curve import FrictionCurve
 from sims.effects.library import library
 from sims.host import HostSimulator
 from sims.loading import chosen_effects
@@ -93,7 +94,8 @@ def _each(runs: Sequence[Trajectory]) -> int:
 
 def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, Any]:
     """What was named first and what with confidence, held against what was hidden."""
-    offered = {str(effect): effect for effect in library(made.simulator)}
+    curves = [FrictionCurve(joint.name) for joint in made.simulator.joints if joint.rate]
+    offered = {str(effect): effect for effect in (*library(made.simulator), *curves)}
     chosen = [v for v in result.verdicts if v.effect and v.kind in ("confirmed", "ambiguous")]
     named = [v.label for v in chosen]
     sure = [v.label for v in chosen if v.kind == "confirmed"]
