@@ -218,7 +218,7 @@ class Inquiry:
     def with_friction_curves(self, known: Confirmed, tolerance: float) -> Confirmed:
         """The same, or what is found with curves of friction if they take most of what is left."""
         answer = known.answer
-        curves = worth_a_curve(answer)
+        curves = worth_a_curve(answer, self.offered.by_label.keys())
         if not curves:
             return known
         if time.process_time() > self.clock.search_until:

@@ -6,26 +6,32 @@ What they leave is then the same at the same speed, and a curve of three sizes t
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from residual.gap.answer.answer import Answer
 from residual.gap.answer.free_parameters import better
+from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.search.explain import FOOTNOTE
 from sims.effects.friction_curve import FrictionCurve
 from sims.effects.joint import JointEffect
 
-#: Part of the squared forecast error of the library's laws that a curve may leave.
-HALF = 0.5
+#: Part of the squared forecast error of the library's laws, less what noise makes, that a curve may
+#: leave.
+QUARTER = 0.25
 #: Part of the speeds of a log below which the fastest lies, where rates are differences of places.
 FASTEST = 0.99
 
 
-def worth_a_curve(answer: Answer) -> list[FrictionCurve]:
+def worth_a_curve(answer: Answer, offered: Collection[str]) -> list[FrictionCurve]:
     """A curve for every joint where friction was found, if more than noise is left.
 
     Args:
-        answer: What was found with the library.
+        answer: What was found with the effects on offer.
+        offered: Their labels. Where a user leaves a law out that is a case of the curve, the curve
+            is left out as well.
     """
     search, key = answer.found.search, answer.key
     fitter, simulator = search.fitter, search.simulator
@@ -43,7 +49,8 @@ def worth_a_curve(answer: Answer) -> list[FrictionCurve]:
     names = [channel.name for channel in simulator.physical_channels]
     found = []
     for joint in simulator.joints:
-        if joint.name in rubbed and joint.rate is not None:
+        cases = {f"{name}@{joint.name}" for name in FrictionCurve.special_cases}
+        if joint.name in rubbed and joint.rate is not None and cases <= set(offered):
             column = names.index(joint.rate)
             measured = column in fitter.samples.measured
             speeds = np.abs(fitter.nodes[:, column])
@@ -54,7 +61,7 @@ def worth_a_curve(answer: Answer) -> list[FrictionCurve]:
 
 
 def takes_its_place(second: Answer, first: Answer) -> bool:
-    """Whether a curve was named and takes most of what the library's laws left.
+    """Whether a curve was named and takes most of what the library's laws left beside noise.
 
     Args:
         second: What was found with the library and curves; ``first``: without them.
@@ -63,6 +70,13 @@ def takes_its_place(second: Answer, first: Answer) -> bool:
     if not any(isinstance(effect, FrictionCurve) for effect in chosen):
         return False
     search, again = first.found.search, second.found.search
-    before = search.currency.error(search.validated[first.key].squares)
-    after = search.currency.error(again.validated[second.key].squares)
-    return after < HALF * before and better(second, first)
+    by_noise = noise_floor(search.fitter, search.tried[first.key], first.found.floor.sigma)
+    before, after, least = (
+        search.currency.error(squares) ** 2
+        for squares in (
+            search.validated[first.key].squares,
+            again.validated[second.key].squares,
+            by_noise,
+        )
+    )
+    return after - least < QUARTER * (before - least) and better(second, first)
