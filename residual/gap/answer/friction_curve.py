@@ -1,7 +1,7 @@
 """Laws of friction that only imitate the true one: when to ask for the curve itself.
 
-Two laws of the library together, or one where it was never measured, come near any friction.
-What they leave is then the same at the same speed, and a curve of three sizes takes most of it off.
+Two laws of the library together, or one over the few speeds of a log, come near any friction. What
+they leave is then the same at the same speed, and a curve of three sizes takes most of it off.
 """
 
 from __future__ import annotations
