@@ -35,12 +35,12 @@ def write_films(results: Mapping[str, Any], folder: Path, simulator: Simulator) 
         renderer_for(simulator)
     except ValueError:  # it does not say how it looks, or this machine cannot draw it
         return []
-    episodes, paths = read_episodes(results, folder), []
-    for name in shown(results):
+    episodes, paths, seen = read_episodes(results, folder), [], {}
+    for name, title in shown(results).items():
         if name in episodes:
+            seen[title] = episodes[name]["states"]
             paths.append(folder / "films" / f"{name}.gif")
-            atomic_write_bytes(paths[-1], film(simulator, episodes[name]["states"]))
-    seen = {t: episodes[n]["states"] for n, t in shown(results).items() if n in episodes}
+            atomic_write_bytes(paths[-1], film(simulator, seen[title]))
     if seen:
         picture = to_png(side_by_side(simulator, seen))
         atomic_write_bytes(folder / "films" / SIDE_BY_SIDE, picture)
