@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from residual.gap.answer.answer import Answer, confirm
+from residual.gap.answer.curves import curves_for, takes_its_place, worth_a_curve
 from residual.gap.answer.free_parameters import better, worth_freeing
-from residual.gap.answer.friction_curve import takes_its_place, worth_a_curve
 from residual.gap.answer.lone import explains_the_rest, lone_stretch
 from residual.gap.confirmation.aliases import (
     aliases,
@@ -62,6 +62,7 @@ class Offered:
         less: Parameters of which there may be too much, where what is kept cannot be negative.
         groups: Those groups by label.
         sets: Sets of which one is exactly made of the others.
+        curves: Curves by points, for where laws of the library only come near.
     """
 
     by_label: Mapping[str, Effect]
@@ -69,6 +70,7 @@ class Offered:
     less: Sequence[Effect]
     groups: dict[str, tuple[str, ...]]
     sets: Sequence[tuple[str, ...]]
+    curves: Sequence[Effect]
 
     @classmethod
     def of(
@@ -79,12 +81,15 @@ class Offered:
     ) -> Offered:
         """Those that a user asks for, or the library, less what a measured input cannot show."""
         offered = chosen_effects(log.simulator, [LIBRARY] if effects is None else list(effects))
+        curves = curves_for(log.simulator, [str(effect) for effect in offered])
         if measured_input:
             offered = tuple(effect for effect in offered if not effect.upstream_of_sensor)
+            curves = tuple(effect for effect in curves if not effect.upstream_of_sensor)
         offered = beyond_parameters(log.simulator, offered)
         groups, sets = aliases(log.simulator, offered, log.runs)
         kept, less = representatives(log.simulator, offered, groups)
-        return cls({str(effect): effect for effect in offered}, kept, less, groups, sets)
+        by_label = {str(effect): effect for effect in offered}
+        return cls(by_label, kept, less, groups, sets, curves)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -195,7 +200,7 @@ class Inquiry:
         if matters:
             known = self.without_lone_stretch(log, known, tolerance)
             known = self.with_parameters_free(known, tolerance)
-            known = self.with_friction_curves(known, tolerance)
+            known = self.with_curves(known, tolerance)
         answer = known.answer
         claims = with_twins(answer.found.search, answer.key, answer.claims)
         return dataclasses.replace(known, answer=dataclasses.replace(answer, claims=claims))
@@ -215,19 +220,18 @@ class Inquiry:
         second = self._asked_again(known, tolerance, beside)
         return dataclasses.replace(known, answer=second) if better(second, answer) else known
 
-    def with_friction_curves(self, known: Confirmed, tolerance: float) -> Confirmed:
-        """The same, or what is found with curves of friction if they take most of what is left."""
+    def with_curves(self, known: Confirmed, tolerance: float) -> Confirmed:
+        """The same, or what is found with curves by points if they take most of what is left."""
         answer = known.answer
-        curves = worth_a_curve(answer, self.offered.by_label.keys())
+        curves = worth_a_curve(answer, self.offered.curves)
         if not curves:
             return known
         if time.process_time() > self.clock.search_until:
-            joints = " and ".join(curve.joint for curve in curves)
             return known.and_says(
-                f"friction at {joints} may follow speed along a curve that no law of the library "
-                "has: there was no time to look, give more --minutes"
+                "what is left may be a law that the library does not have, along a curve by speed, "
+                "position or command: there was no time to look, give more --minutes"
             )
-        self.tell("once more with friction by curves of its own")
+        self.tell("once more with curves by points in place of laws")
         second = self._asked_again(known, tolerance, answer.found.search.beside, curves)
         if not takes_its_place(second, answer):
             return known

@@ -15,11 +15,16 @@ from sims.effects.backlash import Backlash as Backlash
 from sims.effects.base import Effect as Effect
 from sims.effects.base import Quantity as Quantity
 from sims.effects.base import number as number
+from sims.effects.curves import CURVES as CURVES
+from sims.effects.curves import Curve as Curve
+from sims.effects.curves import ForceCurve as ForceCurve
+from sims.effects.curves import FrictionCurve as FrictionCurve
+from sims.effects.curves import InputCurve as InputCurve
+from sims.effects.curves import StateCurve as StateCurve
 from sims.effects.friction import CoulombFriction as CoulombFriction
 from sims.effects.friction import DirectionalFriction as DirectionalFriction
 from sims.effects.friction import DryFriction as DryFriction
 from sims.effects.friction import StribeckFriction as StribeckFriction
-from sims.effects.friction_curve import FrictionCurve as FrictionCurve
 from sims.effects.joint import Cogging as Cogging
 from sims.effects.joint import ConstantLoad as ConstantLoad
 from sims.effects.joint import CubicSpring as CubicSpring

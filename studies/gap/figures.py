@@ -14,7 +14,7 @@ from matplotlib.figure import Figure as Drawing
 from residual.gap import GapResult
 from residual.gap.fitting.where import Profile
 from residual.gap.result import Rollout, Verdict
-from sims.effects import FrictionCurve
+from sims.effects import Curve
 from studies.gap.words import FLOOR, gap_rows, quantity_text, typeset, with_unit
 from studies.reporting.figures import (
     AMBER,
@@ -106,22 +106,27 @@ def rollout(result: GapResult, shown: Rollout, path: Path) -> Drawing:
 
 
 @styled()
-def friction(result: GapResult, verdict: Verdict, effect: FrictionCurve, path: Path) -> Drawing:
-    """Size of friction by speed, through three points with their intervals."""
+def curve(result: GapResult, verdict: Verdict, effect: Curve, path: Path) -> Drawing:
+    """A law by points, with their intervals."""
     measures = effect.measures(result.corrected)
     figure, axes = new_figure(height=3.0)
     axis: Axes = axes[0, 0]
-    speeds = np.linspace(0.0, effect.full, 121)
-    sizes = -effect.force(0.0, speeds)
-    axis.plot(speeds, sizes, color=BLUE)
+    low, high = effect.reach
+    along = np.linspace(low, high, 121)
+    values = effect.at(along)
+    axis.axhline(0, color=MUTED, linewidth=0.9)
+    axis.plot(along, values, color=BLUE)
     for field, number in verdict.parameters.items():
-        speed, _ = effect.point_of(field) or (np.nan, "")
-        axis.plot([speed], [number.value], "o", color=BLUE, markersize=4.5)
-        axis.vlines(speed, number.low, number.high, color=INK, linewidth=1.3)
-    axis.set(xlim=(0, None), ylim=(0, None))
-    axis.set_xlabel(with_unit("speed", measures["rate"][0]))
-    axis.set_ylabel(with_unit("friction", measures["force"][0].replace("/s/s", "/s^2")))
-    save_figure(figure, path, {"speed": speeds, "friction": sizes})
+        x, _ = effect.point_of(field) or (np.nan, "")
+        axis.plot([x], [number.value], "o", color=BLUE, markersize=4.5)
+        axis.vlines(x, number.low, number.high, color=INK, linewidth=1.3)
+    axis.set(xlim=(low, None))
+    if effect.along == "rate":
+        axis.set_ylim(0, None)
+    unit = next(iter(verdict.parameters.values())).unit
+    axis.set_xlabel(with_unit(effect.by, measures[effect.along][0]))
+    axis.set_ylabel(with_unit(effect.gives, unit.replace("/s/s", "/s^2")))
+    save_figure(figure, path, {effect.by: along, effect.gives: values})
     return figure
 
 

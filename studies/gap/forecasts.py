@@ -6,14 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure as Drawing
 
 from residual.gap import GapResult
-from residual.gap.result import Gap, Rollout
-from sims.effects import FrictionCurve
-from studies.gap.figures import friction, lags, profile, rollout, shrinking
+from residual.gap.result import Gap, Rollout, Verdict
+from sims.effects import Curve
+from studies.gap.figures import curve, lags, profile, rollout, shrinking
 from studies.gap.words import (
     CROSS_VALIDATED,
     ahead,
+    capitalized,
     duration_text,
     percent,
     quantity_text,
@@ -92,20 +94,26 @@ def bars(result: GapResult, folder: Path) -> Figure:
 
 
 def curves(result: GapResult, folder: Path) -> list[Section]:
-    """Friction by speed, where it follows a curve of its own."""
-    pictures = [
-        Figure(
-            friction(result, verdict, effect, folder / f"friction-{number}.png"),
-            f"Friction at {verdict.where} by speed: what was found, with 95 % intervals.",
-            f"No law of friction in the library comes near what was measured at {verdict.where}: "
-            "this curve through three points and zero takes most of what they leave.",
-            heading=f"Friction at {verdict.where}",
-        )
-        for number, verdict in enumerate(result.verdicts, start=1)
-        for effect in result.effects
-        if isinstance(effect, FrictionCurve) and str(effect) == verdict.label
-    ]
+    """Laws by points, where what was measured follows a curve of its own."""
+    pictures = []
+    for number, verdict in enumerate(result.verdicts, start=1):
+        for effect in result.effects:
+            if isinstance(effect, Curve) and str(effect) == verdict.label:
+                path = folder / f"curve-{number}.png"
+                pictures.append(_curve(curve(result, verdict, effect, path), verdict, effect))
     return list(pictures)
+
+
+def _curve(drawing: Drawing, verdict: Verdict, effect: Curve) -> Figure:
+    what = f"{capitalized(effect.gives)} at {verdict.where} by {effect.by}"
+    zero = "" if effect.along == "position" else " and zero"
+    return Figure(
+        drawing,
+        f"{what}: what was found, with 95 % intervals.",
+        f"No law in the library comes near what was measured at {verdict.where}: this curve "
+        f"through {len(verdict.parameters)} points{zero} takes most of what they leave.",
+        heading=what,
+    )
 
 
 def set_aside(result: GapResult) -> list[Section]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from residual.gap import GapResult
 from sims.effects.aliases import exact_aliases
-from sims.effects.friction_curve import FrictionCurve
+from sims.effects.curves import cases_of_curves
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.strengths import HIDDEN
 
@@ -32,10 +32,8 @@ def same(name: str) -> frozenset[str]:
 
 
 def alike(name: str) -> frozenset[str]:
-    """The same, declared near-twins, and the curve of which it is a case."""
-    found = same(name)
-    if name in FrictionCurve.special_cases:
-        found |= {FrictionCurve.name}
+    """The same, declared near-twins, and the curves of which it is a case."""
+    found = same(name) | cases_of_curves(name)
     for family in TWINS:
         if name in family:
             found |= family

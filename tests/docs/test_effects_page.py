@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from sims import effects
-from sims.effects import Effect, FrictionCurve, library
+from sims.effects import Effect, ForceCurve, FrictionCurve, InputCurve, StateCurve, library
 from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel
@@ -25,7 +25,8 @@ class Tank(FirstOrderSystem):
 
 def row(effect: Effect) -> str:
     """The effect's row of the table; units are those of a joint that turns, driven by a voltage."""
-    known = effect.quantities(Tank() if effect.name == "proportional_loss" else PendulumEquation())
+    first_order = effect.name in ("proportional_loss", "state_curve")
+    known = effect.quantities(Tank() if first_order else PendulumEquation())
     numbers = ", ".join(f"`{name}` {quantity.unit}" for name, quantity in known.items())
     place = PLACES[next(iter(inspect.signature(type(effect)).parameters))]
     family = effect.family + (f", {effect.subfamily}" if effect.subfamily else "")
@@ -33,8 +34,11 @@ def row(effect: Effect) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-# One of each; on another channel an offset has another unit. The curve is asked for later.
-HOSTED = (*library(PendulumEquation()), *library(Tank()), FrictionCurve("pivot"))
+# One of each; on another channel an offset has another unit. Curves are asked for later.
+CURVES = (
+    FrictionCurve("pivot"), ForceCurve("pivot"), StateCurve("level"), InputCurve("voltage"),
+)  # fmt: skip
+HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if e.enters != "parameter"}
 
 
@@ -51,7 +55,7 @@ def test_the_page_has_nothing_else():
 
 def test_the_page_says_which_lie_upstream_of_a_sensor():
     text = PAGE.read_text(encoding="utf-8")
-    upstream = [e.name for e in library(PendulumEquation()) if e.upstream_of_sensor]
+    upstream = [e.name for e in HOSTED if e.upstream_of_sensor and e.where != "pump"]
     (line,) = [line for line in text.splitlines() if line.startswith("Upstream of a sensor")]
     assert [word for word in line.split("`")[1::2]] == upstream
 

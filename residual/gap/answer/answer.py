@@ -39,6 +39,7 @@ from residual.gap.search.exchange import add_exchanged
 from residual.gap.search.explain import FOOTNOTE, Explanation
 from residual.gap.search.imitation import imitated
 from residual.gap.search.known import KNOWN
+from residual.gap.search.redundant import doubles
 from residual.gap.search.sets import Key, Search
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
@@ -196,6 +197,9 @@ def told(
         known = {name for claim in answer.claims for name in claim.stand_ins}
         alone = [k for k in search.validated if len(k) == 1]
         known |= {search.labels(k)[0] for k in alone if helps_alone(search, k)}
+        known |= {
+            one.label for n, one in enumerate(search.candidates) if doubles(search, (*key, n))
+        }
         unseen = hidden(search.signatures(key), search.candidates, key, found.needed)
         blind = tuple(one for one in unseen if one.effect not in known)
     where = fitter.where(search.nominal, found.floor)

@@ -15,6 +15,7 @@ from residual.gap.search.choice import AT_ONE, no_match
 from residual.gap.search.exchange import exchanged, split
 from residual.gap.search.sets import Key, Search, all_but
 from residual.gap.search.significance import BETTER, score
+from sims.effects.curves import Curve
 
 Array = NDArray[np.float64]
 
@@ -62,6 +63,9 @@ def claims(
         form, alike, rivals = near(search, key, number, adequate)
         twins = tuple(name for name in groups.get(label, ()) if name != label)
         strengths = [j for j in own if fit.model.knobs[j].strength] or own
+        # A point of a curve may well lie near zero.
+        curved = isinstance(search.candidates[number].effect, Curve)
+        least = float(np.abs(fit.theta[strengths]).max()) if curved else 0.0
         taken = share(search, key, number)
         found.append(
             Claim(
@@ -72,8 +76,11 @@ def claims(
                 other_than(twins, rivals),
                 twins,
                 needed(search, key, number, adequate) and not (adequate and taken[1] < 0),
-                all(steady(search, key, j) for j in strengths),
-                all(survives(fit.theta[j], half[j], [n[j] for n in limits]) for j in strengths),
+                all(steady(search, key, j, least) for j in strengths),
+                all(
+                    survives(fit.theta[j], half[j], [n[j] for n in limits], least)
+                    for j in strengths
+                ),
                 any(ended(fit, j) for j in strengths),
                 taken,
                 brief=brief(search, number, fit.theta[own]),
@@ -224,10 +231,17 @@ def by_fit(search: Search, key: Key, number: int) -> bool:
     return rest in search.tried and no_match(search, rest, key)
 
 
-def steady(search: Search, key: Key, j: int) -> bool:
-    """Whether a number has one sign and about one size in every fold."""
+def steady(search: Search, key: Key, j: int, least: float = 0.0) -> bool:
+    """Whether a number has one sign and about one size in every fold.
+
+    Args:
+        search: With the set.
+        key: The set.
+        j: The number.
+        least: Size that counts if the number is smaller.
+    """
     value, folds = search.tried[key].theta[j], search.validated[key].thetas[:, j]
-    return bool((np.abs(folds - value) <= STEADY * abs(value)).all())
+    return bool((np.abs(folds - value) <= STEADY * max(abs(value), least)).all())
 
 
 def in_the_limit(theta: Array, numerics: Sequence[Array]) -> list[Array]:
@@ -240,9 +254,10 @@ def in_the_limit(theta: Array, numerics: Sequence[Array]) -> list[Array]:
     return [2 * numerics[0] - theta, *numerics[1:]] if len(numerics) else []
 
 
-def survives(value: float, half: float, others: Sequence[float]) -> bool:
+def survives(value: float, half: float, others: Sequence[float], least: float = 0.0) -> bool:
     """Whether a number keeps its sign and about its size under other numerics."""
-    return all(abs(other - value) <= max(STEADY * abs(value), half) for other in others)
+    slack = max(STEADY * max(abs(value), least), half)
+    return all(abs(other - value) <= slack for other in others)
 
 
 def brief(search: Search, number: int, values: Array) -> bool:

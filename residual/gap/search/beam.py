@@ -133,9 +133,10 @@ def grow(search: Search, key: Key) -> list[Key]:
 
 
 def sound(search: Search, key: Key, theta: Array) -> list[Key]:
-    """The set, fitted if it was not, or those that stand for it; none if nothing may be right."""
+    """The set, fitted if it was not, or those that stand for it; none if nothing may be right, or
+    if one member does again what another does."""
     made = search.add({key: theta})
-    return [k for k in dict.fromkeys([key, *made]) if search.sound(k)]
+    return [k for k in dict.fromkeys([key, *made]) if k in search.tried and search.sound(k)]
 
 
 def boldly(search: Search, parameters: bool) -> list[Key]:

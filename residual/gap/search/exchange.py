@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.fitting.screening import gains, pair_gains
+from residual.gap.search.redundant import doubles
 from residual.gap.search.sets import Key, Search, all_but
 
 Array = NDArray[np.float64]
@@ -65,7 +66,7 @@ def _rivals(search: Search, key: Key, gone: int, most: int) -> list[tuple[int, A
         number = around.variants[gain.variants[0]].candidate
         if number in key or number in found or spelt_out(search, number, list(found)):
             continue
-        if search.doubles((*rest, number)):
+        if doubles(search, (*rest, number)):
             continue
         bold = search.candidates[number].bold
         near = len(found) < most or (family and search.family(number) == family)

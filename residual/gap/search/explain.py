@@ -18,6 +18,7 @@ from residual.gap.search.beam import extend, improves, run
 from residual.gap.search.choice import Choice, choose, reasons
 from residual.gap.search.continuation import add_handed_over
 from residual.gap.search.exchange import add_exchanged
+from residual.gap.search.redundant import curves_in_place
 from residual.gap.search.sets import Key, Proposals, Search, Twins
 from residual.gap.search.significance import score, significant
 from sims.host import HostSimulator
@@ -114,6 +115,7 @@ def explain(
             search.currency = search.currency.only_where_wrong(alone)
         if earlier is not None and not seeds:
             search.add(carried(earlier, search))
+            search.add(curves_in_place(search, near_best(search)))
         run(search, seeds, functools.partial(_quiet, search, floor))
         key = choose(search).key
         fresh, floor = weigh(fitter, search.tried[key])

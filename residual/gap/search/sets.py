@@ -23,6 +23,7 @@ from residual.gap.model.nested import absent, from_nested
 from residual.gap.preparation.effort import Effort
 from residual.gap.search.currency import Currency, groups
 from residual.gap.search.global_search import GlobalSearch
+from residual.gap.search.redundant import doubles
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -120,12 +121,7 @@ class Search:
         beside that of one of them.
         """
         few = len(key) <= self.effort.most and self.numbers(key) <= self.most_numbers
-        return few and not self.doubles(key)
-
-    def doubles(self, key: Key) -> bool:
-        """Whether a set holds an effect twice."""
-        effects = [self.candidates[i].effect for i in key]
-        return any(one.covers(other) for one in effects for other in effects)
+        return few and not doubles(self, key)
 
     @property
     def most_numbers(self) -> int:
@@ -187,7 +183,7 @@ class Search:
         which a twin stands for what would be absurd."""
         before = len(self.tried)
         for key, theta in proposals.items():
-            if key in self.tried:
+            if key in self.tried or doubles(self, key):
                 continue
             name = " + ".join(self.labels(key))
             self.tell(f"  trying {name}")
@@ -257,7 +253,7 @@ class Search:
         """Candidates that move exactly as one does."""
         return list(self.twins.get(self.candidates[number].label, ()))
 
-    def _stands_for(self, number: int) -> int:
+    def stands_for(self, number: int) -> int:
         """The screened candidate that moves exactly as a twin does; itself if it is one."""
         effect = self.candidates[number].effect
         alike = (
@@ -279,7 +275,7 @@ class Search:
         """Whether two effects make the same motion in these data beside some others."""
         around = self.signatures(rest)
         columns = {v.candidate: v.columns for v in around.variants}
-        pair = [columns.get(self._stands_for(number), ()) for number in (one, other)]
+        pair = [columns.get(self.stands_for(number), ()) for number in (one, other)]
         if any(len(places) != 1 for places in pair):
             return False
         a, b = (around.matrix[:, places[0]] for places in pair)

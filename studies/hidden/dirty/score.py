@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from residual.gap import GapResult, find_gap
+from residual.gap.answer.curves import curves_for
 from residual.gap.result import Verdict
 from residual.trajectories import Trajectory
 from sims.effects.aliases import exact_aliases, exact_twins
 from sims.effects.base import Effect
-from sims.effects.friction_curve import FrictionCurve
 from sims.effects.library import library
 from sims.host import HostSimulator
 from sims.loading import chosen_effects
@@ -94,8 +94,9 @@ def _each(runs: Sequence[Trajectory]) -> int:
 
 def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, Any]:
     """What was named first and what with confidence, held against what was hidden."""
-    curves = [FrictionCurve(joint.name) for joint in made.simulator.joints if joint.rate]
-    offered = {str(effect): effect for effect in (*library(made.simulator), *curves)}
+    known = library(made.simulator)
+    curves = curves_for(made.simulator, [str(effect) for effect in known])
+    offered = {str(effect): effect for effect in (*known, *curves)}
     chosen = [v for v in result.verdicts if v.effect and v.kind in ("confirmed", "ambiguous")]
     named = [v.label for v in chosen]
     sure = [v.label for v in chosen if v.kind == "confirmed"]

@@ -1,0 +1,128 @@
+"""Laws that only imitate the true one: when to ask for a curve by points itself.
+
+Two laws of the library together, or one over the few speeds of a log, come near any friction. What
+they leave is then the same at the same speed, and a curve of three sizes takes most of it off. So
+it is with forces by position, and with what an actuator makes of a command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from residual.gap.answer.answer import Answer
+from residual.gap.answer.free_parameters import better
+from residual.gap.fitting.forecasts import noise_floor
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.search.explain import FOOTNOTE
+from sims.effects.actuator import AND, ActuatorEffect
+from sims.effects.base import Effect
+from sims.effects.curves import CURVES, Curve
+from sims.effects.joint import JointEffect
+from sims.effects.library import library, like_inputs
+from sims.host import HostSimulator
+
+#: Part of the squared forecast error of the library's laws, less what noise makes, that a curve may
+#: leave.
+QUARTER = 0.25
+#: Part of the values of a log between which a curve lies, where they were not measured.
+MOST = 0.99
+#: Angle beyond which a force by angle would count turns.
+TURN = 2 * np.pi
+
+
+def curves_for(simulator: HostSimulator, offered: Collection[str]) -> tuple[Effect, ...]:
+    """Every curve that a simulator can host, at zero strength.
+
+    Where a user leaves a law out that is a case of a curve, the curve is left out as well.
+
+    Args:
+        simulator: The nominal simulator.
+        offered: Labels of the effects that may be missing.
+    """
+    left_out = {str(effect) for effect in library(simulator)} - set(offered)
+    joints = [joint.name for joint in simulator.joints]
+    inputs = [channel.name for channel in simulator.action_channels]
+    inputs += [AND.join(names) for names in like_inputs(simulator)]
+    found = []
+    for kind in CURVES:
+        for where in joints if issubclass(kind, JointEffect) else inputs:
+            curve = kind(where)
+            try:
+                curve.quantities(simulator)
+            except ValueError:
+                continue
+            cases = {f"{name}@{where}" for name in kind.special_cases}
+            if not cases & left_out:
+                found.append(curve)
+    return tuple(found)
+
+
+def worth_a_curve(answer: Answer, curves: Sequence[Effect]) -> list[Effect]:
+    """The curves to ask for, if more than noise is left, over what the log holds.
+
+    Args:
+        answer: What was found with the effects on offer.
+        curves: Those that may be missing, see ``curves_for``.
+    """
+    search, key = answer.found.search, answer.key
+    fitter = search.fitter
+    left = fitter.left(search.tried[key], answer.found.floor)
+    if left.adequate or left.ratio <= FOOTNOTE or not isinstance(fitter, SmoothFitter):
+        return []
+    found = []
+    for curve in curves:
+        low, high = _values(curve, fitter, search.simulator)
+        if high > low and (not curve_counts_turns(curve, search.simulator, high - low)):
+            found.append(curve.suited_to(low, high))
+    return found
+
+
+def curve_counts_turns(curve: Effect, simulator: HostSimulator, width: float) -> bool:
+    """Whether a force by angle spans more than one turn."""
+    return (
+        isinstance(curve, Curve)
+        and curve.along == "position"
+        and curve.measures(simulator)["position"][0] == "rad"
+        and width > TURN
+    )
+
+
+def _values(curve: Effect, fitter: SmoothFitter, simulator: HostSimulator) -> tuple[float, float]:
+    """Between which values the log moves along a curve."""
+    assert isinstance(curve, Curve)
+    if isinstance(curve, ActuatorEffect):
+        inputs = [channel.name for channel in simulator.action_channels]
+        acting = [inputs.index(name) for name in curve.actuators]
+        return 0.0, float(np.abs(fitter.samples.actions[:, acting]).max())
+    joint = next(joint for joint in simulator.joints if joint.name == curve.where)
+    names = [channel.name for channel in simulator.physical_channels]
+    column = names.index(joint.rate if curve.along == "rate" and joint.rate else joint.position)
+    values = fitter.nodes[:, column]
+    part = 1.0 if column in fitter.samples.measured else MOST
+    if curve.along == "rate":
+        return 0.0, float(np.quantile(np.abs(values), part))
+    return tuple(np.quantile(values, [1 - part, part]))
+
+
+def takes_its_place(second: Answer, first: Answer) -> bool:
+    """Whether a curve was named and takes most of what the library's laws left beside noise.
+
+    Args:
+        second: What was found with the library and curves; ``first``: without them.
+    """
+    chosen = [second.found.search.candidates[number].effect for number in second.key]
+    if not any(isinstance(effect, Curve) for effect in chosen):
+        return False
+    search, again = first.found.search, second.found.search
+    by_noise = noise_floor(search.fitter, search.tried[first.key], first.found.floor.sigma)
+    before, after, least = (
+        search.currency.error(squares) ** 2
+        for squares in (
+            search.validated[first.key].squares,
+            again.validated[second.key].squares,
+            by_noise,
+        )
+    )
+    return after - least < QUARTER * (before - least) and better(second, first)

@@ -1,0 +1,72 @@
+"""Sets in which one effect does again what another does already."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from residual.gap.fitting.screening import Signatures
+from sims.effects.curves import Curve
+
+if TYPE_CHECKING:
+    from residual.gap.search.sets import Key, Proposals, Search
+
+#: Part of the length of what an effect does within what a curve can do, beyond which it is a case
+#: of the curve.
+CASE = 0.995
+
+
+def doubles(search: Search, key: Key) -> bool:
+    """Whether a set holds an effect twice: under two names, or a curve beside a case of it."""
+    effects = [search.candidates[i].effect for i in key]
+    if any(one.covers(other) for one in effects for other in effects):
+        return True
+    curves = [number for number in key if isinstance(search.candidates[number].effect, Curve)]
+    if len(key) < 2 or not curves:
+        return False
+    around = search.signatures(())
+    return any(
+        _is_case(around, search.stands_for(other), curve)
+        for curve in curves
+        for other in key
+        if other != curve and not _takes_away(search, other, curve)
+    )
+
+
+def _takes_away(search: Search, number: int, curve: int) -> bool:
+    """Whether an effect may be negative and a curve may not: less of a damping that is too large
+    makes room for the curve."""
+    lows = [[knob.low for knob in search.candidates[n].knobs] for n in (number, curve)]
+    return min(lows[0]) < 0 <= min(lows[1])
+
+
+def curves_in_place(search: Search, keys: Iterable[Key]) -> Proposals:
+    """Sets with a curve in place of all that it does, and every curve alone."""
+    curves = [n for n, one in enumerate(search.candidates) if isinstance(one.effect, Curve)]
+    found: Proposals = {}
+    for key in [(), *keys]:
+        for curve in curves:
+            gone = tuple(n for n in key if doubles(search, (n, curve)))
+            if curve in key or (key and not gone):
+                continue
+            start = 0.0 * search.candidates[curve].trials[0].values[0]
+            fresh, theta = search.merged(key, [(curve, start)], drop=gone)
+            if search.fits_in(fresh):
+                found[fresh] = theta
+    return found
+
+
+def _is_case(around: Signatures, number: int, curve: int) -> bool:
+    """Whether a curve moves, start states allowed for, as an effect of one column does."""
+    columns = {v.candidate: v.columns for v in around.variants}
+    own, of_curve = columns.get(number, ()), columns.get(curve, ())
+    if len(own) != 1 or not of_curve:
+        return False
+    column, basis = around.matrix[:, own[0]], around.matrix[:, list(of_curve)]
+    length = float(np.linalg.norm(column))
+    if not length > 0:
+        return False
+    fitted = basis @ np.linalg.lstsq(basis, column, rcond=1e-10)[0]
+    return bool(np.linalg.norm(fitted) > CASE * length)
