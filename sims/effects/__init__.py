@@ -15,12 +15,13 @@ from sims.effects.backlash import Backlash as Backlash
 from sims.effects.base import Effect as Effect
 from sims.effects.base import Quantity as Quantity
 from sims.effects.base import number as number
+from sims.effects.curve import Curve as Curve
 from sims.effects.curves import CURVES as CURVES
-from sims.effects.curves import Curve as Curve
 from sims.effects.curves import ForceCurve as ForceCurve
 from sims.effects.curves import FrictionCurve as FrictionCurve
 from sims.effects.curves import InputCurve as InputCurve
 from sims.effects.curves import StateCurve as StateCurve
+from sims.effects.curves import SymmetricInputCurve as SymmetricInputCurve
 from sims.effects.friction import CoulombFriction as CoulombFriction
 from sims.effects.friction import DirectionalFriction as DirectionalFriction
 from sims.effects.friction import DryFriction as DryFriction

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from sims import effects
-from sims.effects import Effect, ForceCurve, FrictionCurve, InputCurve, StateCurve, library
+from sims.effects import Effect, library
 from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel
@@ -35,10 +35,12 @@ def row(effect: Effect) -> str:
 
 
 # One of each; on another channel an offset has another unit. Curves are asked for later.
-CURVES = (
-    FrictionCurve("pivot"), ForceCurve("pivot"), StateCurve("level"), InputCurve("voltage"),
-)  # fmt: skip
-HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES)
+CURVES = [
+    kind("voltage" if kind.along == "input" else "pivot")
+    for kind in effects.CURVES
+    if kind is not effects.StateCurve
+]
+HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, effects.StateCurve("level"))
 LIBRARY = {e.name: e for e in reversed(HOSTED) if e.enters != "parameter"}
 
 

@@ -14,6 +14,7 @@ from sims.effects import (
     LinearSpring,
     QuadraticDrag,
     StateCurve,
+    SymmetricInputCurve,
     library,
 )
 from sims.equations import FirstOrderSystem
@@ -49,7 +50,7 @@ def test_friction_has_the_given_sizes_and_opposes_the_motion(slow, medium, fast,
 
 
 @kinds
-@given(values=st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6))
+@given(values=st.lists(st.floats(-1e3, 1e3), min_size=7, max_size=7))
 def test_every_curve_runs_through_its_points_and_is_level_beyond(kind, values):
     curve = kind("there").suited_to(-1.0, 3.0)
     fields = curve.strengths()
@@ -89,10 +90,16 @@ def test_rows_may_have_numbers_of_their_own(kind):
         assert both.at(x)[row] == pytest.approx(float(both.take(row).at(1.3)))
 
 
-def test_an_input_curve_adds_in_both_directions():
-    curve = through(InputCurve, lambda u: -0.1 * u * u)
+def test_a_symmetric_input_curve_adds_in_both_directions():
+    curve = through(SymmetricInputCurve, lambda u: -0.1 * u * u)
     u = np.array([-2.0, -0.5, 0.0, 0.5, 2.0])
     assert curve.shape(u) == pytest.approx(u - 0.1 * u * np.abs(u))
+
+
+def test_an_input_curve_adds_to_the_command():
+    curve = through(InputCurve, lambda u: 0.5 - 0.1 * u * u)
+    u = np.array([-1.0, -0.5, 0.0, 0.5, 2.0])
+    assert curve.shape(u) == pytest.approx(u + 0.5 - 0.1 * u * u)
 
 
 @host
@@ -121,7 +128,8 @@ def test_hosts_apply_a_force_like_the_spring_that_it_is(host):
 @host
 def test_hosts_apply_an_input_curve_as_the_command_that_it_makes(host):
     states, volts = rows(30)
-    curve = InputCurve("voltage", 0.1, 0.3, 0.2, -0.4, full=3.0)
+    volts = 0.6 * volts  # what is made of it stays within bounds
+    curve = InputCurve("voltage", 0.1, 0.3, 0.2, -0.4, 0.0, 0.2, 0.5, low=-3.0, high=3.0)
     changed = HOSTS[host].with_effects([curve]).step(states, volts)
     assert changed == pytest.approx(HOSTS[host].step(states, curve.shape(volts)), abs=1e-12)
 

@@ -15,10 +15,13 @@ from residual.gap.answer.answer import Answer
 from residual.gap.answer.free_parameters import better
 from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.search.choice import takes_off
 from residual.gap.search.explain import FOOTNOTE
+from residual.gap.search.redundant import by_points
 from sims.effects.actuator import AND, ActuatorEffect
 from sims.effects.base import Effect
-from sims.effects.curves import CURVES, Curve
+from sims.effects.curve import Curve
+from sims.effects.curves import CURVES
 from sims.effects.joint import JointEffect
 from sims.effects.library import library, like_inputs
 from sims.host import HostSimulator
@@ -26,6 +29,8 @@ from sims.host import HostSimulator
 #: Part of the squared forecast error of the library's laws, less what noise makes, that a curve may
 #: leave.
 QUARTER = 0.25
+#: Effects that a curve has to spare where it is no better than laws of the library.
+FEWER = 2
 #: Part of the values of a log between which a curve lies, where they were not measured.
 MOST = 0.99
 #: Angle beyond which a force by angle would count turns.
@@ -95,7 +100,8 @@ def _values(curve: Effect, fitter: SmoothFitter, simulator: HostSimulator) -> tu
     if isinstance(curve, ActuatorEffect):
         inputs = [channel.name for channel in simulator.action_channels]
         acting = [inputs.index(name) for name in curve.actuators]
-        return 0.0, float(np.abs(fitter.samples.actions[:, acting]).max())
+        commands = fitter.samples.actions[:, acting]
+        return float(commands.min()), float(commands.max())
     joint = next(joint for joint in simulator.joints if joint.name == curve.where)
     names = [channel.name for channel in simulator.physical_channels]
     column = names.index(joint.rate if curve.along == "rate" and joint.rate else joint.position)
@@ -107,22 +113,18 @@ def _values(curve: Effect, fitter: SmoothFitter, simulator: HostSimulator) -> tu
 
 
 def takes_its_place(second: Answer, first: Answer) -> bool:
-    """Whether a curve was named and takes most of what the library's laws left beside noise.
+    """Whether a curve was named and takes most of what the library's laws left beside noise, or
+    does as well with several effects less.
 
     Args:
         second: What was found with the library and curves; ``first``: without them.
     """
-    chosen = [second.found.search.candidates[number].effect for number in second.key]
-    if not any(isinstance(effect, Curve) for effect in chosen):
-        return False
     search, again = first.found.search, second.found.search
+    if not any(number in second.key for number in by_points(again)):
+        return False
+    before, after = search.validated[first.key].squares, again.validated[second.key].squares
+    if len(first.key) - len(second.key) >= FEWER and not takes_off(search.currency, after, before):
+        return True
     by_noise = noise_floor(search.fitter, search.tried[first.key], first.found.floor.sigma)
-    before, after, least = (
-        search.currency.error(squares) ** 2
-        for squares in (
-            search.validated[first.key].squares,
-            again.validated[second.key].squares,
-            by_noise,
-        )
-    )
-    return after - least < QUARTER * (before - least) and better(second, first)
+    left, now, least = (search.currency.error(one) ** 2 for one in (before, after, by_noise))
+    return now - least < QUARTER * (left - least) and better(second, first)

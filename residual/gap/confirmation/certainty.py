@@ -15,7 +15,7 @@ from residual.gap.search.choice import AT_ONE, no_match
 from residual.gap.search.exchange import exchanged, split
 from residual.gap.search.sets import Key, Search, all_but
 from residual.gap.search.significance import BETTER, score
-from sims.effects.curves import Curve
+from sims.effects.curve import Curve
 
 Array = NDArray[np.float64]
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from residual.gap.data.samples import Samples
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect, Quantity
+from sims.effects.curve import Curve
 from sims.effects.joint import JointEffect
 from sims.effects.library import typical
 from sims.effects.sensor import SensorEffect
@@ -139,7 +140,8 @@ def candidates(
             acting = [inputs.index(name) for name in effect.actuators]
             reach = float(np.abs(samples.actions[:, acting]).max())
             full = _full(simulator.action_channels[acting[0]], reach)
-            effect = effect.suited_to(-full, full)
+            # A curve comes with its points where the log moves.
+            effect = effect if isinstance(effect, Curve) else effect.suited_to(-full, full)
         if _follows_unseen(effect, simulator, measured):
             continue
         known = _within_reach(effect, effect.quantities(simulator), simulator, samples)

@@ -197,7 +197,7 @@ def _error(simulator: HostSimulator, fitter: SmoothFitter, convention: Conventio
     way = np.where(there, seen - nodes[index[:, :1]][..., samples.measured], 0.0)
     usual = np.sqrt((way**2).sum(axis=(0, 1)) / np.maximum(there.sum(axis=(0, 1)), 1))
     miss = np.where(there, (shown - seen) / np.where(usual > 0, usual, 1.0), 0.0)
-    # What runs away is wrong, too.
-    squares = np.nan_to_num(miss, nan=np.inf) ** 2
+    with np.errstate(over="ignore"):  # what runs away is wrong, too
+        squares = np.nan_to_num(miss, nan=np.inf) ** 2
     each = np.sqrt(squares.sum(axis=(1, 2)) / np.maximum(count.sum(axis=1), 1))
     return float(np.minimum(each, WRONG).mean())

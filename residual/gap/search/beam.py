@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from residual.gap.fitting.screening import Gain, Signatures, gains, pair_gains
 from residual.gap.search.exchange import spelt_out
+from residual.gap.search.redundant import by_points
 from residual.gap.search.sets import Key, Proposals, Search
 from residual.gap.search.significance import score
 
@@ -125,7 +126,8 @@ def grow(search: Search, key: Key) -> list[Key]:
         if not search.simulator.has_contacts:
             found += boldly(search, parameters=False)
             found += driven(search)
-        for pair in [] if search.late else pair_gains(around, search.effort.pairs):
+        alone = by_points(search)
+        for pair in [] if search.late else pair_gains(around, search.effort.pairs, without=alone):
             numbers = [around.variants[v].candidate for v in pair.variants]
             fresh, theta = search.merged(key, zip(numbers, pair.values, strict=True))
             found += sound(search, fresh, theta)

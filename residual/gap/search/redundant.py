@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from residual.gap.fitting.screening import Signatures
-from sims.effects.curves import Curve
+from sims.effects.curve import Curve
 
 if TYPE_CHECKING:
     from residual.gap.search.sets import Key, Proposals, Search
@@ -18,18 +18,23 @@ if TYPE_CHECKING:
 CASE = 0.995
 
 
+def by_points(search: Search) -> list[int]:
+    """Numbers of the candidates that are curves by points."""
+    return [n for n, one in enumerate(search.candidates) if isinstance(one.effect, Curve)]
+
+
 def doubles(search: Search, key: Key) -> bool:
     """Whether a set holds an effect twice: under two names, or a curve beside a case of it."""
     effects = [search.candidates[i].effect for i in key]
     if any(one.covers(other) for one in effects for other in effects):
         return True
-    curves = [number for number in key if isinstance(search.candidates[number].effect, Curve)]
-    if len(key) < 2 or not curves:
+    points = [number for number in by_points(search) if number in key]
+    if len(key) < 2 or not points:
         return False
     around = search.signatures(())
     return any(
         _is_case(around, search.stands_for(other), curve)
-        for curve in curves
+        for curve in points
         for other in key
         if other != curve and not _takes_away(search, other, curve)
     )
@@ -44,10 +49,9 @@ def _takes_away(search: Search, number: int, curve: int) -> bool:
 
 def curves_in_place(search: Search, keys: Iterable[Key]) -> Proposals:
     """Sets with a curve in place of all that it does, and every curve alone."""
-    curves = [n for n, one in enumerate(search.candidates) if isinstance(one.effect, Curve)]
     found: Proposals = {}
     for key in [(), *keys]:
-        for curve in curves:
+        for curve in by_points(search):
             gone = tuple(n for n in key if doubles(search, (n, curve)))
             if curve in key or (key and not gone):
                 continue

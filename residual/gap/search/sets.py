@@ -118,9 +118,11 @@ class Search:
         """Whether a set has few enough numbers for the windows there are, and each effect once.
 
         A law beside its own special case is one law too many, and so is a delay of two inputs
-        beside that of one of them.
+        beside that of one of them. A law by points has many numbers, and may stand alone.
         """
-        few = len(key) <= self.effort.most and self.numbers(key) <= self.most_numbers
+        windows = len(self.fitter.blocks.windows)
+        most = windows if len(key) == 1 else self.most_numbers
+        few = len(key) <= self.effort.most and self.numbers(key) <= most
         return few and not doubles(self, key)
 
     @property

@@ -3,10 +3,18 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import PchipInterpolator
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
-from sims.effects import Curve, ForceCurve, FrictionCurve, InputCurve, StateCurve
+from sims.effects import (
+    Curve,
+    ForceCurve,
+    FrictionCurve,
+    InputCurve,
+    StateCurve,
+    SymmetricInputCurve,
+)
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.simulator import Channel, Parameter
 
@@ -193,9 +201,9 @@ def test_a_thruster_that_flattens_is_a_curve_by_command():
     logs = [integrated(rhs, [0, 0], held(s, -9, 9), 0.02, [1e-3, 1e-2], s) for s in (0, 1)]
     offered = ("actuator_gain", "quadratic_actuator", "saturation", "dead_zone", "viscous_friction")
     found = find_gap(Cart(), logs, effects=offered)
-    assert named(found) == [("confirmed", "input_curve")]
+    assert named(found) == [("confirmed", "symmetric_input_curve")]
     (curve,) = found.effects
-    assert isinstance(curve, InputCurve)
+    assert isinstance(curve, SymmetricInputCurve)
     for u in (2.0, 4.0, 6.0, 8.0):
         assert curve.shape(u) == pytest.approx(8 * np.tanh(0.25 * u), abs=0.15)
 
@@ -204,3 +212,20 @@ def test_where_a_law_was_left_out_its_curve_is_left_out_too():
     logs = [log(eddy_brake, 0), log(eddy_brake, 1)]
     found = find_gap(Rotor(), logs, effects=("viscous_friction", "coulomb_friction", "delay"))
     assert not any(isinstance(effect, Curve) for effect in found.effects)
+
+
+def test_a_thruster_that_is_weaker_astern_is_a_curve_of_both_directions():
+    commands, thrusts = [-9.0, -4.0, 0.0, 3.0, 6.0, 9.0], [-4.0, -3.5, 0.0, 1.5, 7.0, 8.0]
+    thrust = PchipInterpolator(commands, thrusts)
+
+    def rhs(x, u):
+        return [x[1], float(thrust(u)) - 20 * x[0] - x[1]]
+
+    logs = [integrated(rhs, [0, 0], held(s, -9, 9), 0.02, [1e-3, 1e-2], s) for s in (0, 1)]
+    offered = ("actuator_gain", "quadratic_actuator", "actuator_bias", "saturation", "dead_zone")
+    found = find_gap(Cart(), logs, effects=offered)
+    assert named(found)[0] == ("confirmed", "input_curve")
+    curve = next(effect for effect in found.effects if isinstance(effect, InputCurve))
+    for u in (-8.0, -6.0, -3.0, 3.0, 6.0, 8.0):
+        assert curve.shape(u) == pytest.approx(float(thrust(u)), abs=0.5)
+    assert found.gap.share.value > 0.95
