@@ -16,6 +16,7 @@ from sims.effects.base import Effect as Effect
 from sims.effects.base import Quantity as Quantity
 from sims.effects.base import number as number
 from sims.effects.curve import Curve as Curve
+from sims.effects.curve import CurveFromZero as CurveFromZero
 from sims.effects.curves import CURVES as CURVES
 from sims.effects.curves import ForceCurve as ForceCurve
 from sims.effects.curves import FrictionCurve as FrictionCurve

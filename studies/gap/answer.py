@@ -8,6 +8,7 @@ from residual.gap import GapResult
 from residual.gap.answer.doubts import DOUBTS
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
 from residual.gap.result import Gap, Meant, Number, Verdict
+from sims.effects import Curve
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 from studies.gap.words import (
@@ -78,23 +79,32 @@ def headline(verdict: Verdict, result: GapResult) -> str:
     if verdict.family:
         own = effect_name(verdict.label)
         return f"{capitalized(verdict.family)}, form undecided: as {own}, {numbers}."
-    given = "" if any(map(effect.point_of, verdict.parameters)) else shape(verdict)
+    given = "" if isinstance(effect, Curve) else shape(verdict)
     return f"{name}{given}: {numbers}{_times(verdict)}."
 
 
 def numbers_of(verdict: Verdict, effect: Effect, simulator: HostSimulator) -> list[str]:
     """Each number with its name, or where it holds if a curve is given by them."""
+    if isinstance(effect, Curve):
+        return _points(verdict, effect, simulator)
+    return [f"{_spelt(field)} {number_text(n)}" for field, n in verdict.parameters.items()]
+
+
+def _points(verdict: Verdict, curve: Curve, simulator: HostSimulator) -> list[str]:
+    """Values of a curve and where they hold; of many the figure has the intervals."""
+    along = curve.measures(simulator)[curve.along][0]
+    few = len(verdict.parameters) <= FEW_POINTS
     texts = []
     for field, number in verdict.parameters.items():
-        point = effect.point_of(field)
-        if point:
-            unit = effect.measures(simulator)[point[1]][0]
-            texts.append(f"{number_text(number)} at {quantity_text(point[0], unit)}")
-        else:
-            texts.append(f"{_spelt(field)} {number_text(number)}")
-    return texts
+        value = rounded(number.value, 0.5 * (number.high - number.low))
+        value = number_text(number) if few else minus(value) + unit_text(number.unit)
+        at, _ = curve.point_of(field) or (float("nan"), "")
+        texts.append(f"{value} at {quantity_text(at, along)}")
+    return [f"{curve.gives} {texts[0]}", *texts[1:]]
 
 
+#: Points of a curve up to which the answer has the interval of each.
+FEW_POINTS = 3
 #: Of what a share is one more: actuators receive, and sensors read.
 SHARES = {"gain": "the command", "scale": "what is there"}
 
@@ -127,7 +137,8 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.kind not in ("confirmed", "ambiguous"):
         return []
     found = [f"without it, {percent(verdict.share.value)} of the gap would be back"]
-    surer = {field: n for field, n in verdict.parameters.items() if much_surer(n)}
+    curved = isinstance(known_effects(result)[verdict.label], Curve)
+    surer = {f: n for f, n in verdict.parameters.items() if much_surer(n) and not curved}
     if surer:
         single = len(verdict.parameters) == 1
         spans = [("" if single else f"{_spelt(f)} ") + span(n) for f, n in surer.items()]

@@ -107,27 +107,39 @@ def rollout(result: GapResult, shown: Rollout, path: Path) -> Drawing:
 
 @styled()
 def curve(result: GapResult, verdict: Verdict, effect: Curve, path: Path) -> Drawing:
-    """A law by points, with their intervals."""
+    """A law by points, with their intervals; of an actuator what comes out, by the command."""
     measures = effect.measures(result.corrected)
     figure, axes = new_figure(height=3.0)
     axis: Axes = axes[0, 0]
     low, high = effect.reach
     along = np.linspace(low, high, 121)
-    values = effect.at(along)
+    out = effect.along == "input"
+    values = effect.at(along) + (along if out else 0.0)
     axis.axhline(0, color=MUTED, linewidth=0.9)
-    axis.plot(along, values, color=BLUE)
+    if out:
+        axis.plot(along, along, "--", color=MUTED, label="nominal: in proportion")
+    axis.plot(along, values, color=BLUE, label="found")
     for field, number in verdict.parameters.items():
         x, _ = effect.point_of(field) or (np.nan, "")
-        axis.plot([x], [number.value], "o", color=BLUE, markersize=4.5)
-        axis.vlines(x, number.low, number.high, color=INK, linewidth=1.3)
+        base = x if out else 0.0
+        axis.plot([x], [base + number.value], "o", color=BLUE, markersize=4.5)
+        axis.vlines(x, base + number.low, base + number.high, color=INK, linewidth=1.3)
     axis.set(xlim=(low, None))
     if effect.along == "rate":
         axis.set_ylim(0, None)
+    if out:
+        figure.legend(loc="outside upper left", ncols=2)
     unit = next(iter(verdict.parameters.values())).unit
+    gives = drawn(effect)
     axis.set_xlabel(with_unit(effect.by, measures[effect.along][0]))
-    axis.set_ylabel(with_unit(effect.gives, unit.replace("/s/s", "/s^2")))
-    save_figure(figure, path, {effect.by: along, effect.gives: values})
+    axis.set_ylabel(with_unit(gives, unit.replace("/s/s", "/s^2")))
+    save_figure(figure, path, {effect.by: along, gives: values})
     return figure
+
+
+def drawn(effect: Curve) -> str:
+    """What its figure shows, in words."""
+    return "output" if effect.along == "input" else effect.gives
 
 
 @styled()

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure as Drawing
 
 from residual.gap import GapResult
 from residual.gap.result import Gap, Rollout, Verdict
-from sims.effects import Curve
-from studies.gap.figures import curve, lags, profile, rollout, shrinking
+from sims.effects import Curve, CurveFromZero
+from studies.gap.figures import curve, drawn, lags, profile, rollout, shrinking
 from studies.gap.words import (
     CROSS_VALIDATED,
     ahead,
@@ -105,8 +105,8 @@ def curves(result: GapResult, folder: Path) -> list[Section]:
 
 
 def _curve(drawing: Drawing, verdict: Verdict, effect: Curve) -> Figure:
-    what = f"{capitalized(effect.gives)} at {verdict.where} by {effect.by}"
-    zero = "" if effect.along == "position" else " and zero"
+    what = f"{capitalized(drawn(effect))} at {verdict.where} by {effect.by}"
+    zero = " and zero" if isinstance(effect, CurveFromZero) else ""
     return Figure(
         drawing,
         f"{what}: what was found, with 95 % intervals.",
