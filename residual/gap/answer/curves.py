@@ -18,7 +18,7 @@ from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.search.choice import takes_off
 from residual.gap.search.explain import FOOTNOTE
 from residual.gap.search.redundant import by_points
-from sims.effects.actuator import AND, ActuatorEffect
+from sims.effects.actuator import AND, ActuatorEffect, StaticActuatorEffect
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.curves import CURVES
@@ -65,7 +65,10 @@ def curves_for(simulator: HostSimulator, offered: Collection[str]) -> tuple[Effe
 
 
 def worth_a_curve(answer: Answer, curves: Sequence[Effect]) -> list[Effect]:
-    """The curves to ask for, if more than noise is left, over what the log holds.
+    """The curves to ask for over what the log holds, if more than noise is left.
+
+    That is where a law of their kind, or a parameter that may do its work, was named; if nothing
+    was, everywhere.
 
     Args:
         answer: What was found with the effects on offer.
@@ -76,15 +79,32 @@ def worth_a_curve(answer: Answer, curves: Sequence[Effect]) -> list[Effect]:
     left = fitter.left(search.tried[key], answer.found.floor)
     if left.adequate or left.ratio <= FOOTNOTE or not isinstance(fitter, SmoothFitter):
         return []
+    # A simulator's own damping moves like friction at its joint.
+    alike = [one.effect for number in key for one in search.twins_of(number)]
+    named = [search.candidates[number].effect for number in key]
     found = []
     for curve in curves:
+        if named and not any(_of_its_kind(curve, effect) for effect in (*named, *alike)):
+            continue
         low, high = _values(curve, fitter, search.simulator)
-        if high > low and (not curve_counts_turns(curve, search.simulator, high - low)):
+        if high > low and not _counts_turns(curve, search.simulator, high - low):
             found.append(curve.suited_to(low, high))
     return found
 
 
-def curve_counts_turns(curve: Effect, simulator: HostSimulator, width: float) -> bool:
+def _of_its_kind(curve: Effect, effect: Effect) -> bool:
+    """Whether an effect may be an imitation of what follows a curve."""
+    if effect.enters == "parameter":
+        return True
+    if isinstance(curve, ActuatorEffect):
+        if not isinstance(effect, StaticActuatorEffect):
+            return False
+        return not set(effect.actuators).isdisjoint(curve.actuators)
+    alike = curve.family and curve.family == effect.family
+    return curve.contains(effect) or bool(alike and curve.where == effect.where)
+
+
+def _counts_turns(curve: Effect, simulator: HostSimulator, width: float) -> bool:
     """Whether a force by angle spans more than one turn."""
     return (
         isinstance(curve, Curve)

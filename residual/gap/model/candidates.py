@@ -161,6 +161,8 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     joint = next((j for j in simulator.joints if j.name == effect.where), None)
     if not isinstance(effect, JointEffect) or joint is None or joint.position in measured:
         return False
+    if isinstance(effect, Curve):
+        return effect.along == "position"
     there = typical(effect, simulator)
     assert isinstance(there, JointEffect)
     size = effect.measures(simulator)["position"][1] if joint.rate else 1.0
