@@ -229,31 +229,3 @@ def test_a_thruster_that_is_weaker_astern_is_a_curve_of_both_directions():
     for u in (-8.0, -6.0, -3.0, 3.0, 6.0, 8.0):
         assert curve.shape(u) == pytest.approx(float(thrust(u)), abs=0.5)
     assert found.gap.share.value > 0.95
-
-
-class Falling(EquationOfMotion):
-    """A body that falls without drag; only its speed is measured."""
-
-    dt = 0.02
-    state_channels = (
-        Channel("height", "m", "position", scale=5.0),
-        Channel("speed", "m/s", "rate", scale=5.0, rate_of="height"),
-    )
-    action_channels = (Channel("none", "1", "input", scale=1.0),)
-
-    def acceleration(self, q, v, u, force, p):
-        return (-9.81 + force[:, 0])[:, None]
-
-
-def test_no_curve_follows_a_position_that_nobody_measured():
-    def rhs(x, u):
-        return [x[1], -9.81 + 0.05 * x[1] ** 2 + 0.3 * np.sin(3 * x[1])]
-
-    logs = []
-    for s in range(6):
-        fall = integrated(rhs, [0, 0.3 * s], np.zeros(60), 0.02, [0, 0.02], s)
-        hidden = np.where([True, False], np.nan, fall.states)
-        logs.append(Trajectory(fall.name, fall.times, hidden, fall.actions))
-    found = find_gap(Falling(), logs)
-    assert not any(isinstance(effect, ForceCurve) for effect in found.effects)
-    assert any(v.label.endswith("@height") for v in found.verdicts if v.effect)

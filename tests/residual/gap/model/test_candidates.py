@@ -6,7 +6,17 @@ import pytest
 from residual.gap.data.samples import Samples
 from residual.gap.model.candidates import candidates
 from residual.trajectories import Trajectory
-from sims.effects import ActuatorLag, CubicSpring, Delay, LinearSpring, Saturation, SensorScale
+from sims.effects import (
+    ActuatorLag,
+    CubicSpring,
+    Delay,
+    ForceCurve,
+    FrictionCurve,
+    InputCurve,
+    LinearSpring,
+    Saturation,
+    SensorScale,
+)
 from sims.pendulum_equation import PendulumEquation
 
 
@@ -50,3 +60,24 @@ def test_no_command_is_later_than_the_record_lasts(name):
     # A delay of a million samples would need a million places of memory.
     (knob,) = pool(-1.0, 1.0)[name].knobs
     assert knob.high == pytest.approx(2.5, abs=0.06)
+
+
+def test_nothing_follows_a_position_that_nobody_measured():
+    effects = [ForceCurve("pivot"), FrictionCurve("pivot"), LinearSpring("pivot")]
+
+    def found(missing):
+        states = np.column_stack([np.linspace(-1, 1, 51), np.full(51, 0.8)])
+        states[:, missing] = np.nan
+        run = Trajectory("run", 0.05 * np.arange(51.0), states, np.zeros((50, 1)))
+        return {c.name for c in candidates(PendulumEquation(), effects, Samples.join([run], 5))}
+
+    assert found([]) == {"force_curve", "friction_curve", "linear_spring"}
+    assert found([0]) == {"friction_curve"}
+    assert "force_curve" in found([1])
+
+
+def test_a_curve_keeps_the_points_that_it_was_given():
+    run = Trajectory("run", 0.05 * np.arange(51.0), np.zeros((51, 2)), np.ones((50, 1)))
+    given = [InputCurve("voltage", low=0.5, high=1.0), Saturation("voltage")]
+    curve, _ = candidates(PendulumEquation(), given, Samples.join([run], 5))
+    assert curve.effect.reach == (0.5, 1.0)
