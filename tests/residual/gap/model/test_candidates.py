@@ -63,7 +63,11 @@ def test_no_command_is_later_than_the_record_lasts(name):
 
 
 def test_nothing_follows_a_position_that_nobody_measured():
-    effects = [ForceCurve("pivot"), FrictionCurve("pivot"), LinearSpring("pivot")]
+    effects = [
+        ForceCurve("pivot", low=-8.0, high=0.0),
+        FrictionCurve("pivot"),
+        LinearSpring("pivot"),
+    ]
 
     def found(missing):
         states = np.column_stack([np.linspace(-1, 1, 51), np.full(51, 0.8)])
