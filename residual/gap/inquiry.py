@@ -27,6 +27,7 @@ from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.search.explain import Explanation, explain
 from residual.gap.search.sets import Search
 from sims.effects.base import Effect
+from sims.effects.curve import Curve
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
 
@@ -70,7 +71,7 @@ class Offered:
     less: Sequence[Effect]
     groups: dict[str, tuple[str, ...]]
     sets: Sequence[tuple[str, ...]]
-    curves: Sequence[Effect]
+    curves: Sequence[Curve]
 
     @classmethod
     def of(

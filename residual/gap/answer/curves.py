@@ -15,7 +15,6 @@ from residual.gap.answer.answer import Answer
 from residual.gap.answer.free_parameters import better
 from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.search.choice import takes_off
 from residual.gap.search.explain import FOOTNOTE
 from residual.gap.search.redundant import by_points
 from sims.effects.actuator import AND, ActuatorEffect, StaticActuatorEffect
@@ -29,15 +28,13 @@ from sims.host import HostSimulator
 #: Part of the squared forecast error of the library's laws, less what noise makes, that a curve may
 #: leave.
 QUARTER = 0.25
-#: Effects that a curve has to spare where it is no better than laws of the library.
-FEWER = 2
 #: Part of the values of a log between which a curve lies, where they were not measured.
 MOST = 0.99
 #: Angle beyond which a force by angle would count turns.
 TURN = 2 * np.pi
 
 
-def curves_for(simulator: HostSimulator, offered: Collection[str]) -> tuple[Effect, ...]:
+def curves_for(simulator: HostSimulator, offered: Collection[str]) -> tuple[Curve, ...]:
     """Every curve that a simulator can host, at zero strength.
 
     Where a user leaves a law out that is a case of a curve, the curve is left out as well.
@@ -64,7 +61,7 @@ def curves_for(simulator: HostSimulator, offered: Collection[str]) -> tuple[Effe
     return tuple(found)
 
 
-def worth_a_curve(answer: Answer, curves: Sequence[Effect]) -> list[Effect]:
+def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
     """The curves to ask for over what the log holds, if more than noise is left.
 
     That is where a law of their kind, or a parameter that may do its work, was named; if nothing
@@ -92,7 +89,7 @@ def worth_a_curve(answer: Answer, curves: Sequence[Effect]) -> list[Effect]:
     return found
 
 
-def _of_its_kind(curve: Effect, effect: Effect) -> bool:
+def _of_its_kind(curve: Curve, effect: Effect) -> bool:
     """Whether an effect may be an imitation of what follows a curve."""
     if effect.enters == "parameter":
         return True
@@ -104,19 +101,14 @@ def _of_its_kind(curve: Effect, effect: Effect) -> bool:
     return curve.contains(effect) or bool(alike and curve.where == effect.where)
 
 
-def _counts_turns(curve: Effect, simulator: HostSimulator, width: float) -> bool:
+def _counts_turns(curve: Curve, simulator: HostSimulator, width: float) -> bool:
     """Whether a force by angle spans more than one turn."""
-    return (
-        isinstance(curve, Curve)
-        and curve.along == "position"
-        and curve.measures(simulator)["position"][0] == "rad"
-        and width > TURN
-    )
+    by_angle = curve.along == "position" and curve.measures(simulator)["position"][0] == "rad"
+    return by_angle and width > TURN
 
 
-def _values(curve: Effect, fitter: SmoothFitter, simulator: HostSimulator) -> tuple[float, float]:
+def _values(curve: Curve, fitter: SmoothFitter, simulator: HostSimulator) -> tuple[float, float]:
     """Between which values the log moves along a curve."""
-    assert isinstance(curve, Curve)
     if isinstance(curve, ActuatorEffect):
         inputs = [channel.name for channel in simulator.action_channels]
         acting = [inputs.index(name) for name in curve.actuators]
@@ -133,8 +125,7 @@ def _values(curve: Effect, fitter: SmoothFitter, simulator: HostSimulator) -> tu
 
 
 def takes_its_place(second: Answer, first: Answer) -> bool:
-    """Whether a curve was named and takes most of what the library's laws left beside noise, or
-    does as well with several effects less.
+    """Whether a curve was named and takes most of what the library's laws left beside noise.
 
     Args:
         second: What was found with the library and curves; ``first``: without them.
@@ -143,8 +134,6 @@ def takes_its_place(second: Answer, first: Answer) -> bool:
     if not any(number in second.key for number in by_points(again)):
         return False
     before, after = search.validated[first.key].squares, again.validated[second.key].squares
-    if len(first.key) - len(second.key) >= FEWER and not takes_off(search.currency, after, before):
-        return True
     by_noise = noise_floor(search.fitter, search.tried[first.key], first.found.floor.sigma)
     left, now, least = (search.currency.error(one) ** 2 for one in (before, after, by_noise))
     return now - least < QUARTER * (left - least) and better(second, first)
