@@ -15,12 +15,11 @@ from residual.gap.answer.answer import Answer
 from residual.gap.answer.free_parameters import better
 from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.search.explain import FOOTNOTE
 from residual.gap.search.redundant import by_points
 from sims.effects.actuator import AND, ActuatorEffect, StaticActuatorEffect
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
-from sims.effects.curves import CURVES
+from sims.effects.curves import CURVES, StateCurve
 from sims.effects.joint import JointEffect
 from sims.effects.library import library, like_inputs
 from sims.host import HostSimulator
@@ -28,6 +27,8 @@ from sims.host import HostSimulator
 #: Part of the squared forecast error of the library's laws, less what noise makes, that a curve may
 #: leave.
 QUARTER = 0.25
+#: Residual over noise from which on laws may only imitate the true one.
+NOTABLE = 1.5
 #: Part of the values of a log between which a curve lies, where they were not measured.
 MOST = 0.99
 #: Angle beyond which a force by angle would count turns.
@@ -62,10 +63,9 @@ def curves_for(simulator: HostSimulator, offered: Collection[str]) -> tuple[Curv
 
 
 def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
-    """The curves to ask for over what the log holds, if more than noise is left.
+    """The curves to ask for over what the log holds, if clearly more than noise is left.
 
-    That is where a law of their kind, or a parameter that may do its work, was named; if nothing
-    was, everywhere.
+    That is where a law of their kind was named; if nothing was, everywhere.
 
     Args:
         answer: What was found with the effects on offer.
@@ -74,7 +74,7 @@ def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
     search, key = answer.found.search, answer.key
     fitter = search.fitter
     left = fitter.left(search.tried[key], answer.found.floor)
-    if left.adequate or left.ratio <= FOOTNOTE or not isinstance(fitter, SmoothFitter):
+    if left.adequate or left.ratio <= NOTABLE or not isinstance(fitter, SmoothFitter):
         return []
     # A simulator's own damping moves like friction at its joint.
     alike = [one.effect for number in key for one in search.twins_of(number)]
@@ -91,8 +91,8 @@ def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
 
 def _of_its_kind(curve: Curve, effect: Effect) -> bool:
     """Whether an effect may be an imitation of what follows a curve."""
-    if effect.enters == "parameter":
-        return True
+    if isinstance(curve, StateCurve) and effect.enters == "parameter":
+        return True  # a loss that parameters make already is not looked for
     if isinstance(curve, ActuatorEffect):
         if not isinstance(effect, StaticActuatorEffect):
             return False
