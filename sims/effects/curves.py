@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from sims.host import HostSimulator
 
 
+#: What a curve by command can do, or nearly: the last two have a kink.
+STATIC = ("actuator_gain", "quadratic_actuator", "dead_zone", "saturation")
+
+
 @dataclasses.dataclass(frozen=True)
 class FrictionCurve(JointEffect, CurveFromZero):
     """Friction of three measured sizes, and of none at rest.
@@ -127,7 +131,7 @@ class SymmetricInputCurve(StaticActuatorEffect, CurveFromZero):
         "The actuator answers along a curve of its own, the same in both directions."
     )
     needs: ClassVar[str] = "small, middling and large inputs"
-    special_cases: ClassVar[tuple[str, ...]] = ("actuator_gain", "quadratic_actuator")
+    special_cases: ClassVar[tuple[str, ...]] = STATIC
     upstream_of_sensor: ClassVar[bool] = True
     stage: ClassVar[int] = 2
     along: ClassVar[Along] = "input"
@@ -161,12 +165,7 @@ class InputCurve(StaticActuatorEffect, CurveBetween):
     name: ClassVar[str] = "input_curve"
     sentence: ClassVar[str] = "The actuator answers along a curve of its own, not in proportion."
     needs: ClassVar[str] = "small, middling and large inputs"
-    special_cases: ClassVar[tuple[str, ...]] = (
-        "actuator_gain",
-        "quadratic_actuator",
-        "actuator_bias",
-        "symmetric_input_curve",
-    )
+    special_cases: ClassVar[tuple[str, ...]] = (*STATIC, "actuator_bias", "symmetric_input_curve")
     upstream_of_sensor: ClassVar[bool] = True
     stage: ClassVar[int] = 2
     along: ClassVar[Along] = "input"

@@ -89,7 +89,10 @@ def _add_plainer(search: Search, key: Key, gone: int) -> None:
     for number, case in enumerate(search.candidates[: search.screened]):
         if number in key or not search.contains(gone, number) or len(case.knobs) != 1:
             continue
-        fresh, theta = search.merged(key, [(number, np.mean(strengths, keepdims=True))], (gone,))
+        if not case.knobs[0].strength:
+            continue
+        mean = np.clip(np.mean(strengths, keepdims=True), case.knobs[0].low, case.knobs[0].high)
+        fresh, theta = search.merged(key, [(number, mean)], (gone,))
         if fresh in search.tried:
             search.fit(fresh, theta)
         search.add({fresh: theta})

@@ -8,6 +8,7 @@ import pytest
 from residual.gap.model.candidates import candidates
 from residual.gap.preparation.prepare import prepare
 from residual.gap.search.exchange import add_exchanged
+from residual.gap.search.redundant import doubles
 from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
 from sims.effects import CoulombFriction, DirectionalFriction, StribeckFriction
@@ -55,6 +56,6 @@ def test_a_worse_fit_does_not_replace_a_better_one(search):
 
 
 def test_no_set_holds_a_law_beside_its_special_case(search):
-    assert search.doubles((0, 2))
+    assert doubles(search, (0, 2))
     add_exchanged(search, PLAIN, 3)
-    assert not any(search.doubles(key) for key in search.tried)
+    assert not any(doubles(search, key) for key in search.tried)
