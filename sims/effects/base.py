@@ -247,11 +247,6 @@ class Effect(abc.ABC):
         """Its family where it acts, an empty string if it stands alone."""
         return self.family
 
-    def point_of(self, field: str) -> tuple[float, str] | None:
-        """Of a curve that is given by points: where a number of it holds, and which of
-        ``measures`` that is; None of a number that stands for itself."""
-        return None
-
     def __str__(self) -> str:
         return f"{self.name}@{self.where}"
 
