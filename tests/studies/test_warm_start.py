@@ -54,6 +54,22 @@ def test_the_same_simulator_gives_back_the_replay(simulator):
     np.testing.assert_allclose(rows(again), rows(agent), atol=2e-5)
 
 
+def test_what_is_recorded_is_the_way_that_was_gone():
+    env = Recorder(SimulatorEnv(Pendulum(), SwingUp()))
+    assert env.taken() is None
+    seen = []
+    for episode in range(3):  # more rows than are made room for at once
+        state = env.reset(seed=episode)[1]["state"]
+        for k in range(3500):
+            action = np.array([np.sin(0.01 * k * (episode + 1))], np.float32)
+            following = env.step(action)[-1]["state"]
+            seen.append((state, action, following))
+            state = following
+    taken = env.taken()
+    for kept, made in zip(vars(taken).values(), zip(*seen, strict=True), strict=True):
+        np.testing.assert_array_equal(kept, np.array(made, np.float32))
+
+
 def test_another_simulator_says_what_it_would_have_done():
     trainings = [learnt_in(simulator)[1] for simulator in (Pendulum(), correction(0))]
     env = SimulatorEnv(correction(1), SwingUp())
