@@ -15,6 +15,7 @@ from residual.gap.model.workers import workers
 from residual.gap.preparation.conventions import otherwise
 from residual.gap.preparation.numerics import held_as, stride_for
 from residual.gap.result import GapResult
+from residual.gap.search.finals import on_more_windows
 from residual.gap.search.known import KNOWN
 from residual.trajectories import Trajectory
 from sims.contract import refuse_unsound
@@ -59,7 +60,8 @@ def find_gap(
             effect is certain only if they cannot stand in for it within that, and its interval
             allows for them. 0 takes them for exact, so that intervals are of the data alone.
         minutes: Budget of processor time, so that a busy machine finds the same: the search for
-            further explanations ends in time. Confirming may take as long again.
+            further explanations ends in time. Confirming may take as long again, and a choice on
+            more windows what it takes.
         n_jobs: Processes for a simulator that steps row by row.
         progress: Called with a line of text now and then.
 
@@ -91,6 +93,8 @@ def find_gap(
         on_hold: list[str] = []
         if hold is None:
             prepared, found, on_hold = inquiry.other_hold(log, prepared, found)
+        with clock.besides():
+            prepared, found, on_more = on_more_windows(prepared, found, clock.confirm_until, tell)
         clock.lap("search")
 
         tell("confirming")
@@ -109,6 +113,6 @@ def find_gap(
             )
             apart = judged_apart(answer, known.prepared, others, table)
         clock.lap("forecast")
-    quality = [*log.findings, *log.left_out, *on_hold, *known.says]
+    quality = [*log.findings, *log.left_out, *on_hold, *on_more, *known.says]
     result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)
     return dataclasses.replace(result, conventions=conventions)

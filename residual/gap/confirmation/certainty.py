@@ -14,7 +14,7 @@ from residual.gap.fitting.plausible import gross
 from residual.gap.search.choice import AT_ONE, no_match
 from residual.gap.search.exchange import exchanged, split
 from residual.gap.search.sets import Key, Search, all_but
-from residual.gap.search.significance import BETTER, score
+from residual.gap.search.significance import BETTER, score, tie
 from sims.effects.curve import Curve
 
 Array = NDArray[np.float64]
@@ -136,7 +136,7 @@ def excluded(
         if search.simulator.has_contacts and search.error(key) >= BETTER * search.error(rival):
             return False
         behind = score(search, rival) - score(search, key)
-        return behind > tie(search) and not _by_numerics(search, key, rival, behind)
+        return behind > tie(search, key, rival) and not _by_numerics(search, key, rival, behind)
     if no_match(search, rival, key):
         return True
     group = where_it_matters(search, key, number)
@@ -180,15 +180,11 @@ def in_plain_form(search: Search, key: Key, claims: Sequence[Claim]) -> Key | No
 def _by_numerics(search: Search, key: Key, rival: Key, behind: float) -> bool:
     """Whether a rival is behind at the usual step alone."""
     own = at_half_step(search, key).merit - search.tried[key].merit
-    if behind > 2 * abs(own) or abs(own) < tie(search):
+    least = tie(search, key, rival)
+    if behind > 2 * abs(own) or abs(own) < least:
         return False
     its = at_half_step(search, rival).merit - search.tried[rival].merit
-    return behind + its - own <= tie(search)
-
-
-def tie(search: Search) -> float:
-    """Difference of scores beyond which chance excludes a rival."""
-    return search.fitter.tie(search.tried[()])
+    return behind + its - own <= least
 
 
 def ratio(search: Search, one: Key, other: Key, group: int) -> float:
@@ -220,7 +216,7 @@ def needed(search: Search, key: Key, number: int, adequate: bool) -> bool:
     without, own = search.validated[rest].squares, search.validated[key].squares
     lost, _ = search.currency.difference(without, own, group)
     if adequate:
-        return score(search, rest) - score(search, key) > tie(search) and lost > 0
+        return score(search, rest) - score(search, key) > tie(search, key, rest) and lost > 0
     gone = 1 - 1 / max(_ratio(search, without, own, group), 1e-12)
     return gone > 0.5 * AT_ONE and search.currency.clearly(without, own, group, True) > WORSE
 

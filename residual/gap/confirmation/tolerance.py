@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.confirmation.certainty import CLEARLY, tie, where_it_matters
+from residual.gap.confirmation.certainty import CLEARLY, where_it_matters
 from residual.gap.confirmation.certainty import HOPELESS as NO_MATCH
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.size import with_size
@@ -83,7 +83,7 @@ def allow_for_parameters(
         its = asked[other] = calibrated(search, other, parameters)
         if adequate:
             more = search.numbers(key) - search.numbers(other)
-            price = np.log(size(search)) * more + tie(search)
+            price = np.log(size(search)) * more + search.fitter.tie(search.tried[()])
             return bool(its.fit.merit <= beside.fit.merit + price)
         group = where_it_matters(search, key, claim.number)
         return bool(its.errors[group] <= CLEARLY * beside.errors[group])

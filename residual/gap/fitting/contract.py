@@ -7,7 +7,7 @@ everything else (search, choice, confirmation, verdict) only knows what stands h
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -151,13 +151,16 @@ class Fitter(Protocol):
     def where(self, nominal: Fit, floor: Noise) -> Where:
         """Where the nominal simulator fails."""
 
-    def needed(self, around: Signatures, nominal: Fit) -> float:
+    def needed(self, around: Callable[[], Signatures], nominal: Fit) -> float:
         """Fall of the loss that earns an effect a name where only noise is left.
 
         Args:
-            around: Signatures of all candidates around the nominal simulator.
+            around: Gives the signatures of all candidates around the nominal simulator.
             nominal: Its fit.
         """
 
     def tie(self, nominal: Fit) -> float:
         """Difference of the loss beyond which a rival is excluded where only noise is left."""
+
+    def chance(self, one: Fit, other: Fit) -> float:
+        """The same for two fits, as far as it depends on them: luck in finding start states."""

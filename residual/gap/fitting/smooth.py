@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,13 +210,17 @@ class SmoothFitter:
             self.left(nominal, floor).by_channel, floor,
         )  # fmt: skip
 
-    def needed(self, around: Signatures, nominal: Fit) -> float:
+    def needed(self, around: Callable[[], Signatures], nominal: Fit) -> float:
         """See ``Fitter.needed``: what noise alone reaches once in a thousand logs."""
-        return threshold(around, int(self.valid.sum()))
+        return threshold(around(), int(self.valid.sum()))
 
     def tie(self, nominal: Fit) -> float:
         """See ``Fitter.tie``: what a true rival falls short by once in a thousand logs."""
         return TIE
+
+    def chance(self, one: Fit, other: Fit) -> float:
+        """See ``Fitter.chance``: start states are found whatever the model."""
+        return 0.0
 
     @property
     def valid(self) -> NDArray[np.bool_]:

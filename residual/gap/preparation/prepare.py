@@ -13,7 +13,13 @@ from residual.gap.data.samples import Samples
 from residual.gap.data.windows import cut
 from residual.gap.fitting import noise
 from residual.gap.fitting.contract import Fit, Fitter
-from residual.gap.fitting.impacts.prepare import impact_fitter, simple, weigh_impacts
+from residual.gap.fitting.impacts.prepare import (
+    NAMED_ON,
+    impact_fitter,
+    more_windows,
+    simple,
+    weigh_impacts,
+)
 from residual.gap.fitting.smooth import LEAD, SmoothFitter
 from residual.gap.model import paths
 from residual.gap.model.candidates import Candidate
@@ -52,6 +58,7 @@ class Prepared:
         effort: How hard to search.
         horizon: Forecast length in s.
         pool: Which candidates, and trials of them, are worth their cost.
+        more: Makes a fitter of more windows, where few are searched and there are more.
     """
 
     fitter: Fitter
@@ -60,6 +67,7 @@ class Prepared:
     effort: Effort
     horizon: float
     pool: Callable[[Sequence[Candidate]], list[Candidate]] = list
+    more: Callable[[], Fitter] | None = None
 
 
 def prepare(
@@ -71,9 +79,10 @@ def prepare(
         ValueError: Nothing was measured, or every record is too short.
     """
     if simulator.has_contacts:
-        impacts, around = impact_fitter(simulator, trajectories, horizon)
+        impacts, around = impact_fitter(simulator, trajectories, horizon, NAMED_ON)
         effort = Effort(5, 4, 1, 3, 3)
-        return Prepared(impacts, around, weigh_impacts, effort, horizon, simple)
+        more = more_windows(simulator, trajectories, horizon, impacts)
+        return Prepared(impacts, around, weigh_impacts, effort, horizon, simple, more)
     fitter, floor = smooth_fitter(simulator, trajectories, horizon)
     finest = own_substeps(simulator, trajectories, fitter.samples.stride)
 

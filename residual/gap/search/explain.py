@@ -170,7 +170,7 @@ def settle(search: Search, floor: Noise) -> Explanation:
         best = {(), choice.key, search.best(), likeliest}
         quiet = [k for k in best if _quiet(search, floor, k)]
         if quiet:
-            needed = fitter.needed(search.signatures(()), search.tried[()])
+            needed = fitter.needed(functools.partial(search.signatures, ()), search.tried[()])
             key = significant(search, needed)
             choice = Choice(key, reasons(search, key))
         else:

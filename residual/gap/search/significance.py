@@ -45,10 +45,16 @@ def significant(search: Search, needed: float) -> Key:
         return key
     if not search.simulator.has_contacts:
         return least_otherwise(search, key)
-    most = score(search, key) + search.fitter.tie(search.tried[()])
-    alike = [k for k in search.usable() if score(search, k) <= most]
+    own = score(search, key)
+    alike = [k for k in search.usable() if score(search, k) <= own + tie(search, key, k)]
     other = min((k for k in alike if search.numbers(k) <= search.numbers(key)), key=search.error)
     return other if pruned(search, other, needed) == other else key
+
+
+def tie(search: Search, key: Key, other: Key) -> float:
+    """Difference of the scores of two sets that does not tell which is the right one."""
+    fitter, tried = search.fitter, search.tried
+    return max(fitter.tie(tried[()]), fitter.chance(tried[key], tried[other]))
 
 
 def least_otherwise(search: Search, key: Key) -> Key:

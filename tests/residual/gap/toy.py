@@ -96,6 +96,7 @@ class Toy:
                 seen=np.zeros((4 * blocks, 1)),
             ),
             tie=lambda nominal: 0.05,
+            chance=lambda one, other: 0.0,
         )
 
     def surprises(self, key):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,21 @@ from residual.gap.data.samples import Recorded, Samples
 from residual.gap.fitting.contract import Fit, Fitter, Foretold, Left
 from residual.gap.fitting.impacts.columns import candidate_changes, chosen_changes
 from residual.gap.fitting.impacts.noise import with_noise
-from residual.gap.fitting.impacts.refine import Refined, grown, improved, level, refine
-from residual.gap.fitting.impacts.robust import weights
+from residual.gap.fitting.impacts.refine import (
+    Refined,
+    grown,
+    has_short_parts,
+    improved,
+    level,
+    refine,
+)
+from residual.gap.fitting.impacts.robust import losses, weights
 from residual.gap.fitting.impacts.single_shooting import (
     Job,
+    StartFit,
     WindowData,
-    fit_starts,
+    begun,
+    descend,
     job,
     run,
     shown,
@@ -95,11 +104,16 @@ class ImpactFitter:
             # Short parts of the windows say how strong; what long ones proposed overshoots.
             zero = [c.linear & (not c.rough and c.bold is None) for c in model.chosen]
             theta = np.where(np.concatenate([*zero, []]) > 0, 0.0, theta)
-            found = improved(grown(model, theta, data, data.guess), data, STEPS)
+            found = improved(_first(model, theta, data, near), data, STEPS)
         if near is None:
             return self._as_fit(found, found.loss)
         found, gain = level(found, near.inner, data)
         return self._as_fit(found, near.loss - gain)
+
+    def as_fit(self, model: Model, theta: Array, fitted: StartFit) -> Fit:
+        """A model whose start states have been found."""
+        loss = losses(fitted.costs, self.data.freedom)
+        return self._as_fit(Refined(model, theta, fitted, loss), loss)
 
     def _as_fit(self, found: Refined, loss: Array) -> Fit:
         fitted = found.fitted
@@ -129,9 +143,11 @@ class ImpactFitter:
             own = np.flatnonzero(which == number)
             theta = thetas[number]
             part = self.data.take(own)
-            starts = fit.inner.fitted.starts[own]
+            near = fit.inner.fitted.take(own)
+            starts = near.starts
             if len(theta):
-                starts = fit_starts(model, theta, part, starts, 1).starts
+                here = begun(model, theta, part, starts, near.by_start)
+                starts = descend(model, theta, part, here).starts
             one = job(model, theta, part, starts[None])
             inputs = model.inputs(self.samples, theta[None])[0]
             whole = Job(
@@ -139,9 +155,9 @@ class ImpactFitter:
             )
             found[own] = shown(whole, run([whole])[0], self.samples.measured)[0]
         square = np.where(self._inside(rows), np.minimum((seen - found) ** 2, self.limit), np.nan)
-        begun = self.data.windows.index.shape[1]
-        middle = begun + self.horizon // 2
-        return Foretold(_mean(square[:, begun:]), _mean(square[:, begun:middle]), found[:, :begun])
+        size = self.data.windows.index.shape[1]
+        middle = size + self.horizon // 2
+        return Foretold(_mean(square[:, size:]), _mean(square[:, size:middle]), found[:, :size])
 
     def _ahead(self) -> NDArray[np.int64]:
         """Rows of every window and of its forecast, (W, L + horizon)."""
@@ -198,13 +214,18 @@ class ImpactFitter:
         ratio = float(np.sqrt(np.median(fit.inner.fitted.costs / self.data.freedom)))
         return Left(True, ratio, "", tuple(float(r) for r in by_channel))
 
-    def needed(self, around: Signatures, nominal: Fit) -> float:
+    def needed(self, around: Callable[[], Signatures], nominal: Fit) -> float:
         """See ``Fitter.needed``."""
         return MATERIAL * nominal.merit
 
     def tie(self, nominal: Fit) -> float:
         """See ``Fitter.tie``."""
         return TIED * nominal.merit
+
+    def chance(self, one: Fit, other: Fit) -> float:
+        """See ``Fitter.chance``: two standard errors over the windows."""
+        change = one.loss - other.loss
+        return 2 * float(np.sqrt(len(change)) * change.std())
 
     def where(self, nominal: Fit, floor: Noise) -> Where:
         """See ``Fitter.where``; impacts leave no smooth force to be drawn."""
@@ -226,6 +247,13 @@ class ImpactFitter:
                 for r in np.unique(self.blocks.windows.run)
             },
         )
+
+
+def _first(model: Model, theta: Array, data: WindowData, near: Fit | None) -> Refined:
+    """A first fit of strengths and start states; the nominal one, while nothing acts yet."""
+    if near is None or theta.any() or has_short_parts(data):
+        return grown(model, theta, data, data.guess)
+    return dataclasses.replace(near.inner, model=model, theta=theta)
 
 
 def _mean(values: Array) -> Array:

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 #: Noise is never less than this share of a channel's typical size, not even in a simulator's rows.
 FINEST = 1e-5
 #: Turns of start states and noise on whole windows.
-TURNS = 3
+TURNS = 4
 
 
 def first_guess(samples: Samples, nodes: Array) -> Array:
@@ -64,9 +64,19 @@ def with_noise(data: WindowData, sigma: Array, scale: Array) -> WindowData:
 def quieten(
     model: Model, theta: Array, data: WindowData, scale: Array
 ) -> tuple[WindowData, StartFit]:
-    """Start states and noise in turns."""
+    """Start states and noise in turns; the windows are in units of the last one."""
     fitted = grown(model, theta, data, data.guess).fitted
     for _ in range(TURNS):
-        data = with_noise(data, spread(data, fitted)[0], scale)
-        fitted = fit_starts(model, theta, data, fitted.starts, 1)
-    return with_noise(data, spread(data, fitted)[0], scale), fitted
+        quieter = with_noise(data, spread(data, fitted)[0], scale)
+        slope = _in_units_of(quieter.sigma / data.sigma, fitted)
+        data = quieter
+        fitted = fit_starts(model, theta, data, fitted.starts, 1, slope)
+    return data, fitted
+
+
+def _in_units_of(noise: Array, fitted: StartFit) -> Array:
+    """The derivative by start states with every channel's noise so many times as large, (m,)."""
+    slope = fitted.by_start.copy()
+    rows = fitted.shown[0].size
+    slope[:, :rows] /= np.tile(noise, fitted.shown.shape[1])[:, None]
+    return slope

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -21,14 +21,20 @@ from residual.gap.model.model import Model
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
-#: Windows that effects are named on: each costs a simulation for every state and every effect.
-NAMED_ON = 40
+#: Windows that effects are searched on, each of which costs a simulation for every state and every
+#: effect; and those that decide between sets which these leave open.
+NAMED_ON, DECIDED_ON = 40, 120
+#: Times as many windows that are worth another look.
+WORTH = 1.5
 
 
 def impact_fitter(
-    simulator: HostSimulator, trajectories: Sequence[Trajectory], horizon: float
+    simulator: HostSimulator,
+    trajectories: Sequence[Trajectory],
+    horizon: float,
+    most: int,
 ) -> tuple[ImpactFitter, Noise]:
-    """A fitter, weighed by the noise around the nominal simulator."""
+    """A fitter of at most so many windows, weighed by the noise around the nominal simulator."""
     longest = max(float(np.quantile(t.durations, 0.95)) for t in trajectories)
     substeps = max(1, int(np.ceil(simulator.substeps * longest / simulator.dt - 1e-6)))
     samples = Samples.join(trajectories, substeps)
@@ -36,18 +42,31 @@ def impact_fitter(
     nodes = paths.measured(model, samples, none)
     rates = np.array([i for i, c in enumerate(simulator.physical_channels) if c.kind == "rate"])
     cut = pieces(samples, steps_for(samples, horizon))
-    grouped = blocks(samples, Windows.cut(cut), drive(samples, nodes, rates), NAMED_ON)
+    grouped = blocks(samples, Windows.cut(cut), drive(samples, nodes, rates), most)
     scale = scales(simulator)
     data = lay_out(simulator, samples, grouped.windows.pieces)
-    data, _ = quieten(model, none, data, scale)
+    data, fitted = quieten(model, none, data, scale)
     ahead = max(1, round(horizon / samples.step))
     free = np.full(len(data.sigma), np.inf)
     fitter = ImpactFitter(data, grouped, ahead, scale, free)
-    nominal = fitter.fit(model, none)
+    nominal = fitter.as_fit(model, none, fitted)
     every = np.zeros(len(data), np.int64)
     squares = fitter.foretell(model, none[None], every, nominal).squares
     limit = LOST * np.nanquantile(squares, 0.75, axis=0)
     return dataclasses.replace(fitter, limit=limit), Noise(*spread(data, nominal.inner.fitted))
+
+
+def more_windows(
+    simulator: HostSimulator,
+    trajectories: Sequence[Trajectory],
+    horizon: float,
+    fitter: ImpactFitter,
+) -> Callable[[], Fitter] | None:
+    """What makes a fitter of more windows than one has, if the log holds clearly more."""
+    there = len(pieces(fitter.samples, steps_for(fitter.samples, horizon)))
+    if min(there, DECIDED_ON) < WORTH * len(fitter.data):
+        return None
+    return lambda: impact_fitter(simulator, trajectories, horizon, DECIDED_ON)[0]
 
 
 def weigh_impacts(now: Fitter, fit: Fit) -> tuple[Fitter, Noise]:

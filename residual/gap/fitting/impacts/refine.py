@@ -13,8 +13,10 @@ from residual.gap.fitting.impacts.robust import losses
 from residual.gap.fitting.impacts.single_shooting import (
     StartFit,
     WindowData,
+    begun,
     descend,
     fit_starts,
+    renewed,
     residual,
     simulate,
 )
@@ -24,8 +26,6 @@ Array = NDArray[np.float64]
 
 #: Samples of the shortest part of a window that is followed, and how much longer the next one is.
 SHORTEST, LONGER = 7, 1.5
-#: Steps of start states at every trial of strengths.
-TRIES = 5
 #: Share by which the loss must fall for another step.
 SETTLED = 3e-3
 
@@ -46,11 +46,23 @@ class Refined:
     fitted: StartFit
     loss: Array
 
-    def with_better(self, again: Refined) -> Refined:
-        """The better of two fits of the same strengths, window by window."""
-        won = again.loss < self.loss
-        fitted = self.fitted.where(won, again.fitted)
-        return dataclasses.replace(self, fitted=fitted, loss=np.where(won, again.loss, self.loss))
+    def tried_from(self, starts: Array, slope: Array, data: WindowData) -> Refined:
+        """The same strengths, with every window begun elsewhere where that is better.
+
+        Args:
+            starts: Other start states, (W, n_p).
+            slope: Derivative by them, (W, R, n_p).
+            data: The windows.
+        """
+        model, theta = self.model, self.theta
+        found = descend(model, theta, data, begun(model, theta, data, starts, slope))
+        loss = losses(found.costs, data.freedom)
+        won = np.flatnonzero(loss < self.loss)
+        if not len(won):
+            return self
+        better = renewed(model, theta, data.take(won), found.take(won))
+        fitted = self.fitted.with_windows(won, better)
+        return dataclasses.replace(self, fitted=fitted, loss=np.minimum(loss, self.loss))
 
     @property
     def total(self) -> float:
@@ -69,6 +81,11 @@ def settle(
     """Start states alone, the strengths as they are; see ``fit_starts``."""
     fitted = fit_starts(model, theta, data, starts, turns, slope=slope)
     return Refined(model, theta, fitted, losses(fitted.costs, data.freedom))
+
+
+def has_short_parts(data: WindowData) -> bool:
+    """Whether windows are long enough to be followed in part before they are followed whole."""
+    return bool(data.windows.index.shape[1] > SHORTEST)
 
 
 def grown(model: Model, theta: Array, data: WindowData, starts: Array) -> Refined:
@@ -108,11 +125,11 @@ def refine(model: Model, theta: Array, data: WindowData, near: StartFit, turns: 
 def improved(best: Refined, data: WindowData, turns: int) -> Refined:
     """At most so many steps of a fit, while the loss falls by more than a share."""
     for _ in range(turns if len(best.theta) else 0):
-        strengths, starts = step(best, data)
-        fresh = settle(best.model, strengths, data, starts, 1, best.fitted.by_start)
+        fresh = step(best, data)
         gain = best.total - fresh.total
         if gain > 0:
-            best = fresh
+            fitted = renewed(fresh.model, fresh.theta, data, fresh.fitted)
+            best = dataclasses.replace(fresh, fitted=fitted)
         if gain < SETTLED * best.total:
             break
     return best
@@ -124,12 +141,10 @@ def level(one: Refined, other: Refined, data: WindowData) -> tuple[Refined, Arra
     A start state is found by search, and to go on searching lowers the loss of any model. So the
     other one tries the start states of this one, too, before losses are compared.
     """
-    theirs = other.fitted
-    one = one.with_better(settle(one.model, one.theta, data, theirs.starts, 1, theirs.by_start))
+    one = one.tried_from(other.fitted.starts, other.fitted.by_start, data)
     mine = one.fitted
-    shown = simulate(other.model, other.theta, data, mine.starts[None])[0]
-    begin = dataclasses.replace(mine, shown=shown, residual=residual(data, mine.starts, shown))
-    again = descend(other.model, other.theta, data, begin, TRIES)
+    begin = begun(other.model, other.theta, data, mine.starts, mine.by_start)
+    again = descend(other.model, other.theta, data, begin)
     loss = np.minimum(other.loss, losses(again.costs, data.freedom))
     return one, loss - one.loss
 
@@ -155,8 +170,9 @@ def newton(found: Refined, data: WindowData, changes: Array | None = None) -> Ar
     return np.clip(found.theta + change, model.low, model.high) - found.theta
 
 
-def step(best: Refined, data: WindowData) -> tuple[Array, Array]:
-    """Strengths and start states a step of Gauss and Newton further, a part or a multiple of it.
+def step(best: Refined, data: WindowData) -> Refined:
+    """Strengths and start states a step of Gauss and Newton further, a part or a multiple of it;
+    the derivative by start states stays that of before.
 
     Kinks make derivatives noisy, and noisy derivatives make steps too short, so a step that pays
     is doubled while it does.
@@ -166,7 +182,7 @@ def step(best: Refined, data: WindowData) -> tuple[Array, Array]:
     full = newton(best, data, changes)
     inverse = np.linalg.pinv(fitted.by_start, rcond=1e-8)
 
-    def at(share: float) -> tuple[float, Array, Array]:
+    def at(share: float) -> Refined:
         theta = np.clip(best.theta + share * full, model.low, model.high)
         target = fitted.residual - changes @ (theta - best.theta)
         moved = fitted.starts + (inverse @ target[..., None])[..., 0]
@@ -176,16 +192,17 @@ def step(best: Refined, data: WindowData) -> tuple[Array, Array]:
             for starts, output in zip((fitted.starts, moved), outputs, strict=True)
         )
         # An impact may spoil the linear start of one window without spoiling the step.
-        start = stay.where(move.costs < stay.costs, move)
-        found = descend(model, theta, data, start, TRIES)
-        return float(losses(found.costs, data.freedom).sum()), theta, found.starts
+        moves = np.flatnonzero(move.costs <= stay.costs)
+        start = stay.with_windows(moves, move.take(moves))
+        found = descend(model, theta, data, start)
+        return Refined(model, theta, found, losses(found.costs, data.freedom))
 
     reached = at(1.0)
-    shares = (2.0, 4.0, 8.0) if reached[0] < best.total else (0.4, 0.15)
+    shares = (2.0, 4.0, 8.0) if reached.total < best.total else (0.4, 0.15)
     for share in shares:
         trial = at(share)
-        better = trial[0] < reached[0]
+        better = trial.total < reached.total
         reached = trial if better else reached
         if better != (share > 1):
             break
-    return reached[1], reached[2]
+    return reached

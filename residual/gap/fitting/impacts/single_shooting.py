@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 #: Rows of one piece of work for a process.
 PIECE = 200
+#: Steps of start states between two full derivatives.
+TRIES = 10
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,10 +96,16 @@ class StartFit:
         """Squared residual of every window, (W,)."""
         return np.minimum((self.residual**2).sum(axis=1), 1e30)
 
-    def where(self, won: NDArray[np.bool_], other: StartFit) -> StartFit:
-        """Another fit for some of the windows, (W,)."""
-        pairs = [(getattr(self, f.name), getattr(other, f.name)) for f in dataclasses.fields(self)]
-        return StartFit(*(np.where(won.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in pairs))
+    def take(self, which: NDArray[np.int64]) -> StartFit:
+        """Some of the windows."""
+        return StartFit(*(getattr(self, f.name)[which] for f in dataclasses.fields(self)))
+
+    def with_windows(self, which: NDArray[np.int64], other: StartFit) -> StartFit:
+        """The same with some of the windows fitted otherwise."""
+        whole = [np.array(getattr(self, f.name)) for f in dataclasses.fields(self)]
+        for array, field in zip(whole, dataclasses.fields(self), strict=True):
+            array[which] = getattr(other, field.name)
+        return StartFit(*whole)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -204,8 +212,18 @@ def by_start(model: Model, theta: Array, data: WindowData, starts: Array, base: 
     return found
 
 
+def begun(
+    model: Model, theta: Array, data: WindowData, starts: Array, slope: Array | None = None
+) -> StartFit:
+    """Windows as they are from start states, with a derivative from nearby if there is one."""
+    base = simulate(model, theta, data, starts[None])[0]
+    if slope is None:
+        slope = by_start(model, theta, data, starts, base)
+    return StartFit(starts, base, residual(data, starts, base), slope)
+
+
 def fit_starts(
-    model: Model, theta: Array, data: WindowData, starts: Array, turns: int, tries: int = 5,
+    model: Model, theta: Array, data: WindowData, starts: Array, turns: int,
     slope: Array | None = None,
 ) -> StartFit:  # fmt: skip
     """Least squares for the start state of every window (Levenberg and Marquardt).
@@ -215,26 +233,26 @@ def fit_starts(
 
     Args:
         turns: Rounds of steps, with a full derivative after each.
-        tries: Steps in a round.
         slope: Derivative by the start states from nearby, to start with.
     """
-    base = simulate(model, theta, data, starts[None])[0]
-    if slope is None:
-        slope = by_start(model, theta, data, starts, base)
-    found = StartFit(starts, base, residual(data, starts, base), slope)
+    found = begun(model, theta, data, starts, slope)
     for _ in range(turns):
-        found = descend(model, theta, data, found, tries)
-        slope = by_start(model, theta, data, found.starts, found.shown)
-        found = dataclasses.replace(found, by_start=slope)
+        found = renewed(model, theta, data, descend(model, theta, data, found))
     return found
 
 
-def descend(model: Model, theta: Array, data: WindowData, found: StartFit, tries: int) -> StartFit:
+def renewed(model: Model, theta: Array, data: WindowData, found: StartFit) -> StartFit:
+    """A fit with the derivative where it has arrived."""
+    slope = by_start(model, theta, data, found.starts, found.shown)
+    return dataclasses.replace(found, by_start=slope)
+
+
+def descend(model: Model, theta: Array, data: WindowData, found: StartFit) -> StartFit:
     """Some steps of every window by the derivative it has, corrected as they go."""
     starts, base, now = found.starts.copy(), found.shown.copy(), found.residual.copy()
     local, damping = found.by_start, np.full(len(data), 1e-3)
     busy = np.ones(len(data), bool)
-    for _ in range(tries):
+    for _ in range(TRIES):
         rows = np.flatnonzero(busy)
         if not len(rows):
             break

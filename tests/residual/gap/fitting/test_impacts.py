@@ -7,10 +7,13 @@ pytest.importorskip("mujoco")
 
 from residual.gap import find_gap
 from residual.gap.data.examine import examine
+from residual.gap.fitting.impacts import prepare as windows
 from residual.gap.fitting.impacts.prepare import impact_fitter
 from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
+from residual.gap.preparation import prepare
 from residual.gap.preparation.horizon import usual_horizon
+from residual.gap.search import finals
 from residual.trajectories import Trajectory
 from sims.loading import chosen_effects
 from sims.mujoco import AttributeChange, MujocoSimulator
@@ -22,7 +25,7 @@ def test_a_payload_is_found_and_windows_are_followed_past_impacts():
     simulator = nominal("hopper")
     logs = measure("hopper", {"mass of body torso": 0.6}, seed=1, runs=8)
     runs = examine(simulator, logs).trajectories
-    fitter, _ = impact_fitter(simulator, runs, usual_horizon(simulator, runs))
+    fitter, _ = impact_fitter(simulator, runs, usual_horizon(simulator, runs), most=40)
     (payload,) = candidates(
         simulator, chosen_effects(simulator, ["mass of body torso"]), fitter.samples
     )
@@ -53,10 +56,10 @@ BALL = """
 """
 
 
-@pytest.mark.parametrize(("lighter", "kind"), [(0.0, "no_gap"), (1.5, "unexplained")])
-def test_forecasts_that_err_more_than_noise_and_have_no_name_are_a_gap(tmp_path, lighter, kind):
-    (tmp_path / "ball.xml").write_text(BALL)
-    simulator = MujocoSimulator(str(tmp_path / "ball.xml"))
+def ball(folder, lighter):
+    """The nominal ball, and a noisy log of one that falls less hard; rates are not seen."""
+    (folder / "ball.xml").write_text(BALL)
+    simulator = MujocoSimulator(str(folder / "ball.xml"))
     true = simulator.with_effects([AttributeChange("gravity z", change=lighter)])
     rng = np.random.default_rng(0)
     times = simulator.dt * np.arange(601)
@@ -64,7 +67,27 @@ def test_forecasts_that_err_more_than_noise_and_have_no_name_are_a_gap(tmp_path,
     states = true.rollout(np.array([0.3, 0.0]), push)
     states[:, 0] += 5e-4 * rng.standard_normal(len(states))
     states[:, 1] = np.nan
-    runs = [Trajectory("run", times, states, push)]
     assert simulator.for_motion([states]).has_contacts
+    return simulator, [Trajectory("run", times, states, push)]
+
+
+@pytest.mark.parametrize(("lighter", "kind"), [(0.0, "no_gap"), (1.5, "unexplained")])
+def test_forecasts_that_err_more_than_noise_and_have_no_name_are_a_gap(tmp_path, lighter, kind):
+    simulator, runs = ball(tmp_path, lighter)
     found = find_gap(simulator, runs, effects=["sensor_offset@height_qpos"], parameter_tolerance=0)
     assert [v.kind for v in found.verdicts if v.kind != "needs_data"] == [kind]
+
+
+def test_sets_that_few_windows_leave_open_meet_on_more(tmp_path, monkeypatch):
+    simulator, runs = ball(tmp_path, 1.5)
+    effects = ["gravity z", "gain of actuator push"]
+    # As if few windows told nothing apart.
+    monkeypatch.setattr(finals, "finalists", lambda found: [k for k in found.search.tried if k])
+    monkeypatch.setattr(prepare, "NAMED_ON", 20)
+    monkeypatch.setattr(windows, "WORTH", 1.2)
+    found = find_gap(simulator, runs, effects=effects, parameter_tolerance=0)
+    assert any("those leave open on 35" in says for says in found.quality)
+    assert [e.effects for e in found.evidence if e.chosen] == [("gravity z",)]
+    assert (found.verdicts[0].kind, found.verdicts[0].effect) == ("confirmed", "gravity z")
+    number = found.verdicts[0].parameters["change"]
+    assert number.low < 1.5 < number.high
