@@ -10,9 +10,9 @@ goes, and what as much training without a difference model brings.
   python -m studies.leo_gap --estimator residual.GaussianProcess --budget.iterations 1
   python -m studies.leo_gap --corrected results/leo_named/corrected.yaml --budget.iterations 0
   python -m studies.leo_gap --config studies/configs/leo_table.yaml --jobs 2
-  python -m studies.leo_gap --config studies/configs/leo_sac.yaml
+  python -m studies.leo_gap --config studies/configs/leo_td3.yaml
 
-The last one, with soft actor-critic in place of the paper's DDPG, walks farthest (docs/leo.md).
+The last one, with TD3 in place of the paper's DDPG, walks farthest (docs/leo.md).
 A killed run continues where it stopped when the same command is given again. A system of your
 own: python -m studies.learn --help.
 """

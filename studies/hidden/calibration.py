@@ -61,7 +61,7 @@ def run_set(config: Mapping[str, Any], folder: Path, progress: Progress) -> dict
         )  # fmt: skip
         around = search.signatures(())
         best = gains(around)[0].value
-        needed = fitter.needed(around, nominal)
+        needed = fitter.needed(lambda: around, nominal)
         count = int(fitter.valid.sum())
     return {
         **{key: config[key] for key in ("excitation", "noise", "runs", "seed")},
