@@ -21,7 +21,7 @@ from residual.gap.fitting.impacts.refine import (
     level,
     refine,
 )
-from residual.gap.fitting.impacts.robust import losses, weights
+from residual.gap.fitting.impacts.robust import weights
 from residual.gap.fitting.impacts.single_shooting import (
     Job,
     StartFit,
@@ -112,8 +112,8 @@ class ImpactFitter:
 
     def as_fit(self, model: Model, theta: Array, fitted: StartFit) -> Fit:
         """A model whose start states have been found."""
-        loss = losses(fitted.costs, self.data.freedom)
-        return self._as_fit(Refined(model, theta, fitted, loss), loss)
+        found = Refined.of(model, theta, fitted, self.data)
+        return self._as_fit(found, found.loss)
 
     def _as_fit(self, found: Refined, loss: Array) -> Fit:
         fitted = found.fitted

@@ -46,6 +46,11 @@ class Refined:
     fitted: StartFit
     loss: Array
 
+    @classmethod
+    def of(cls, model: Model, theta: Array, fitted: StartFit, data: WindowData) -> Refined:
+        """A model whose start states have been found."""
+        return cls(model, theta, fitted, losses(fitted.costs, data.freedom))
+
     def tried_from(self, starts: Array, slope: Array, data: WindowData) -> Refined:
         """The same strengths, with every window begun elsewhere where that is better.
 
@@ -79,8 +84,7 @@ def settle(
     slope: Array | None = None,
 ) -> Refined:
     """Start states alone, the strengths as they are; see ``fit_starts``."""
-    fitted = fit_starts(model, theta, data, starts, turns, slope=slope)
-    return Refined(model, theta, fitted, losses(fitted.costs, data.freedom))
+    return Refined.of(model, theta, fit_starts(model, theta, data, starts, turns, slope), data)
 
 
 def has_short_parts(data: WindowData) -> bool:
@@ -194,8 +198,7 @@ def step(best: Refined, data: WindowData) -> Refined:
         # An impact may spoil the linear start of one window without spoiling the step.
         moves = np.flatnonzero(move.costs <= stay.costs)
         start = stay.with_windows(moves, move.take(moves))
-        found = descend(model, theta, data, start)
-        return Refined(model, theta, found, losses(found.costs, data.freedom))
+        return Refined.of(model, theta, descend(model, theta, data, start), data)
 
     reached = at(1.0)
     shares = (2.0, 4.0, 8.0) if reached.total < best.total else (0.4, 0.15)
