@@ -80,6 +80,7 @@ class StableBaselines:
         scaling: Scaling | None = None,
     ) -> None:
         from stable_baselines3 import TD3
+        from stable_baselines3.common.logger import Logger
         from stable_baselines3.common.noise import NormalActionNoise
 
         # Copied, since the library adds to what it is given.
@@ -93,6 +94,9 @@ class StableBaselines:
         self._seed = seed % 2**32
         self.scaling = scaling or Scaling.none(int(np.prod(env.observation_space.shape or ())))
         self.model: Any = kind(env=env, seed=self._seed, **chosen)
+        if not {"verbose", "tensorboard_log"} & chosen.keys():
+            # Else it leaves a folder for its log in the system's temporary one.
+            self.model.set_logger(Logger(folder=None, output_formats=[]))
         self._remembered = 0
 
     @property

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.logs.units import UNITS, find_unit
+from residual.logs.units import find_unit, units_of
 from sims.simulator import Channel, wrap
 
 Array = NDArray[np.float64]
@@ -164,8 +164,8 @@ def _looks(fix: str) -> str:
 
 def _or_time(factor: float) -> str:
     """Times in another unit than seconds change the integral of a rate as its own unit does."""
-    found = [n for n, unit in UNITS.items() if unit.base == "s" and unit.factor == factor != 1]
-    return f", or unit: {found[0]} for the time" if found else ""
+    found = [n for n in units_of("s") if math.isclose(find_unit(n, "s").factor, factor)]
+    return f", or unit: {found[0]} for the time" if found and found[0] != "s" else ""
 
 
 def _repairs(position: Signal, rate: Signal) -> list[tuple[Signal, str, tuple[float, float]]]:
@@ -174,9 +174,9 @@ def _repairs(position: Signal, rate: Signal) -> list[tuple[Signal, str, tuple[fl
     for signal in (position, rate):
         target = signal.channel.unit
         stated = find_unit(signal.unit, target).factor
-        for name, unit in UNITS.items():
-            factor = unit.factor / stated
-            if unit.base == target and not math.isclose(factor, 1):
+        for name in units_of(target):
+            factor = find_unit(name, target).factor / stated
+            if not math.isclose(factor, 1):
                 factors = (factor, 1.0) if signal is position else (1.0, factor)
                 repairs.append((signal, f"unit: {name}", factors))
     # The commonest mistake first, since a flipped sign or another unit may come close.

@@ -103,7 +103,7 @@ def _named_like(
             table.path,
             column=column.column,
         ) from None
-    if (unit.factor, unit.offset) != (1.0, 0.0):
+    if unit != (1.0, 0.0):
         says = f"Column {column.column!r} was converted to {channel.unit}."
         findings.append(Finding("unit", table.path.name, says))
     return _told(table, column, channel, findings)

@@ -111,9 +111,9 @@ def _column(channel: Channel) -> Column:
 def _written(channel: Channel, value: float) -> str:
     if np.isnan(value):
         return ""
-    from residual.logs.units import UNITS
+    from residual.logs.units import find_unit
 
-    unit = UNITS[OTHERS.get(channel.unit, channel.unit)]
+    unit = find_unit(OTHERS.get(channel.unit, ""), channel.unit)
     return repr(float((-value - unit.offset) / unit.factor))
 
 

@@ -123,7 +123,7 @@ def users_own():
 @pytest.mark.parametrize(
     ("act", "told"),
     [
-        pytest.param(lambda: find_unit("parsec", "m"), True, id="raised by ours"),
+        pytest.param(lambda: find_unit("furlongz", "m"), True, id="raised by ours"),
         pytest.param(lambda: Windows.cut([(0, 4)]), False, id="inside a line of ours"),
         pytest.param(lambda: np.linalg.inv(np.zeros((2, 2))), False, id="linear algebra"),
         pytest.param(lambda: np.zeros(3).reshape(2, 2), True, id="called by the user"),
@@ -139,7 +139,7 @@ def test_what_was_raised_on_purpose_is_told_from_a_fault_of_ours(act, told):
 
 @pytest.mark.parametrize(
     ("act", "code"),
-    [(lambda: find_unit("parsec", "m"), 2), (lambda: Windows.cut([(0, 4)]), 1), (users_own, 2)],
+    [(lambda: find_unit("furlongz", "m"), 2), (lambda: Windows.cut([(0, 4)]), 1), (users_own, 2)],
 )
 def test_a_value_error_ends_every_command_as_what_it_is(act, code, capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))

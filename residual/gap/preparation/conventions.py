@@ -135,7 +135,7 @@ def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Conv
 
 def _other_units(channel: Channel) -> list[tuple[str, Unit]]:
     units = [(name, find_unit(name, channel.unit)) for name in units_of(channel.unit)]
-    return [(name, unit) for name, unit in units if (unit.factor, unit.offset) != (1.0, 0.0)]
+    return [(name, unit) for name, unit in units if unit != (1.0, 0.0)]
 
 
 def _of_input(

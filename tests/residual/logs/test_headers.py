@@ -33,7 +33,7 @@ def test_a_column_of_exactly_that_name_comes_first(tmp_path):
 
 
 @pytest.mark.parametrize(("headers", "says"), [
-    (["angle [V]"], "'V' is converted to V, but rad is needed"),
+    (["angle [V]"], "'V' cannot be converted to rad"),
     (["angle (filtered)"], "unknown unit 'filtered'"),
     (["angle [deg]", "angle [rad]"], "both named like 'angle'"),
 ])  # fmt: skip

@@ -94,10 +94,10 @@ def test_layout_that_fits_no_file(csv):
         path, states={"angle": Column("angle", "degr")}
     )
     # Nothing is offered that measures something else.
-    assert "unknown unit 'd/min': expected one of rad/s" in error(
+    assert "unit 'd/min' cannot be converted to rad/s: expected one of rad/s" in error(
         path, states={"rate": Column("rate", "d/min")}
     )
-    assert "column 'angle': unit 'deg/s' is converted to rad/s, but rad is needed" in error(
+    assert "column 'angle': unit 'deg/s' cannot be converted to rad: expected one of rad" in error(
         path, states={"angle": Column("angle", "deg/s")}
     )
     assert "give time, states and actions by position" in error(path, header=False)

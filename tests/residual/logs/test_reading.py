@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import constants
 from swings import ACTIONS, STATES, error, kinds, read, swing, write
 
 from residual.logs import Column, LogFormat, read_logs
-from residual.logs.units import UNITS, find_unit
+from residual.logs.units import USUAL, find_unit, units_of
 from sims.simulator import Channel
 
 
@@ -58,16 +59,54 @@ def test_units_sign_and_offset_are_undone_at_the_border(
 
 
 def test_units_agree_with_their_definitions():
-    assert find_unit("degC", "K") == ("K", 1.0, 273.15)
+    assert find_unit("degC", "K") == (1.0, 273.15)
     freezing = find_unit("degF", "K")
     assert freezing.factor * 32 + freezing.offset == pytest.approx(273.15)
     assert find_unit("rpm", "rad/s").factor * 60 == pytest.approx(2 * np.pi)
     assert find_unit("km/h", "m/s").factor * 36 == pytest.approx(10)
     assert find_unit("knots", "m/s").factor * 3600 == pytest.approx(find_unit("nmi", "m").factor)
     assert find_unit("fpm", "m/s").factor * 60 == pytest.approx(find_unit("ft", "m").factor)
-    assert find_unit("", "counts") == ("counts", 1.0, 0.0)
-    for name, unit in UNITS.items():
-        assert unit.base in UNITS and UNITS[unit.base].factor == 1, name
+    assert find_unit("", "counts") == (1.0, 0.0)
+    assert find_unit("kg", "g").factor == pytest.approx(1000)
+
+
+@pytest.mark.parametrize(
+    ("unit", "target", "factor"),
+    [
+        ("mmHg", "Pa", constants.mmHg),
+        ("psi", "Pa", constants.psi),
+        ("L/min", "m3/s", constants.liter / constants.minute),
+        ("inches", "m", constants.inch),
+        ("lbf", "N", constants.lbf),
+        ("g", "m/s2", constants.g),
+        ("g", "kg", constants.gram),
+        ("mNm", "N m", 1e-3),
+        ("kWh", "J", constants.kilo * constants.hour),
+        ("mK", "K", 1e-3),
+        ("deg/s^2", "rad/s²", constants.degree),
+        ("m s-2", "cm/s2", 100),
+        ("°C/min", "K/s", 1 / 60),
+    ],
+)
+def test_any_unit_that_measures_the_same_is_converted(unit, target, factor):
+    assert find_unit(unit, target).factor == pytest.approx(factor, rel=1e-5)
+    assert find_unit(unit, target).offset == 0
+
+
+@given(st.data())
+def test_there_and_back_is_where_one_was(data):
+    target = data.draw(st.sampled_from(USUAL))
+    unit = data.draw(st.sampled_from(units_of(target)))
+    there, back = find_unit(unit, target), find_unit(target, unit)
+    value = data.draw(st.floats(-1e3, 1e3))
+    once = there.factor * value + there.offset
+    assert back.factor * once + back.offset == pytest.approx(value, abs=1e-7 * back.factor + 1e-9)
+
+
+@pytest.mark.parametrize("unit", ["1/s", "Hz", "m/s", "dBm", "furlongz", "9**9**9", "s" * 99, "("])
+def test_what_measures_something_else_is_refused(unit):
+    with pytest.raises(ValueError, match="expected one of rad/s, mrad/s, deg/s, rev/s, rpm"):
+        find_unit(unit, "rad/s")
 
 
 def test_angles_are_unwrapped_and_it_is_said(tmp_path):
