@@ -1,5 +1,7 @@
 """Algorithms by name, policies of other libraries, and files that hold no code."""
 
+import tempfile
+
 import numpy as np
 import pytest
 
@@ -45,6 +47,12 @@ def test_what_is_remembered_is_learnt_from_at_once():
     np.testing.assert_allclose(kept, 2 * (rows[1] + 2) / 3 - 1, atol=1e-6)
     learner.learn(Reach(), 10)
     assert learner.updates >= 9
+
+
+def test_nothing_is_left_in_the_temporary_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    ALGORITHMS[1].make(Reach(), 0).learn(Reach(), 60)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(("options", "spread"), [({}, 0.1), ({"action_noise": 0.03}, 0.03)])
