@@ -68,30 +68,32 @@ def _period(trajectories: Sequence[Trajectory], column: int, angle: bool) -> flo
     for run in trajectories:
         known = np.isfinite(run.states[:, column])
         if known.sum() >= 8:
-            records.append((run.states[known, column], float(np.median(np.diff(run.times[known])))))
+            records.append((run.states[known, column], run.times[known]))
     if not records:
         return float("nan")
     most = TURNING if angle else np.inf
     sizes = np.array([len(values) for values, _ in records], float)
     stds = np.minimum([values.std() for values, _ in records], most)
     spread = float(np.sqrt((sizes * stds**2).sum() / sizes.sum()))
-    speeds = [_speed(values, step, spread) for values, step in records]
+    speeds = [_speed(values, times, spread) for values, times in records]
     speed = float(np.sqrt((sizes * np.square(speeds)).sum() / sizes.sum()))
     if speed <= 0 or spread <= 0:
         return float("nan")
     return 2 * np.pi * spread / speed
 
 
-def _speed(values: Array, step: float, spread: float) -> float:
+def _speed(values: Array, times: Array, spread: float) -> float:
     """Root mean square rate of a channel: from differences over which it moves a quarter of its
-    spread, less what noise adds to differences of any length."""
+    spread, less what noise adds to differences of any length. Samples may come in bursts."""
     lag = 1
     while 4 * lag < len(values) and _change(values, lag) < (0.25 * spread) ** 2:
         lag *= 2
-    once, twice = _change(values, lag), _change(values, min(2 * lag, len(values) - 1))
-    # With noise s: (v L dt)^2 + 2 s^2 and (2 v L dt)^2 + 2 s^2.
-    square = (twice - once) / 3 if twice > once else once
-    return float(np.sqrt(square)) / (lag * step)
+    longer = min(2 * lag, len(values) - 1)
+    once, twice = _change(values, lag), _change(values, longer)
+    short, long = _change(times, lag), _change(times, longer)
+    # With noise s: (v t)^2 + 2 s^2 for both times t.
+    square = (twice - once) / (long - short) if twice > once else once / short
+    return float(np.sqrt(square))
 
 
 def _change(values: Array, lag: int) -> float:

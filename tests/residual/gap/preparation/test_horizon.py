@@ -57,6 +57,17 @@ def test_how_often_and_in_which_order_it_was_recorded_does_not_matter():
     assert usual_horizon(PendulumEquation(), rare) == pytest.approx(wanted, rel=0.05)
 
 
+@given(st.integers(3, 15), st.integers(10, 25))
+@settings(max_examples=20, deadline=None)
+def test_samples_in_bursts_do_not_pass_for_fast_motion(burst, pause):
+    run = swing(2.0, step=0.005)
+    rows = np.arange(len(run.times))
+    rows = rows[rows % (burst + pause) < burst]
+    rare = Trajectory(run.name, run.times[rows], run.states[rows], run.actions[rows[:-1]])
+    wanted = usual_horizon(PendulumEquation(), [run])
+    assert usual_horizon(PendulumEquation(), [rare]) == pytest.approx(wanted, rel=0.3)
+
+
 def test_short_records_leave_room_for_windows():
     found = usual_horizon(PendulumEquation(), [swing(20.0, 10.0)])
     assert found == pytest.approx((1 - LEAD) * 10.0 / WINDOWS, rel=0.01)
