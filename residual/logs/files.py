@@ -61,11 +61,13 @@ def read_table(
 def _read_text(
     path: Path, data: bytes, delimiter: str, header: bool, comment: str, skip: int
 ) -> Table:
-    lines = [
-        (number, line)
-        for number, line in enumerate(_decoded(path, data).splitlines(), start=1)
-        if number > skip and line.strip() and not (comment and line.lstrip().startswith(comment))
-    ]
+    lines: list[tuple[int, str]] = []
+    above = ""
+    for number, line in enumerate(_decoded(path, data).splitlines(), start=1):
+        if comment and line.lstrip().startswith(comment):
+            above = above if lines else line.lstrip().removeprefix(comment)
+        elif number > skip and line.strip():
+            lines.append((number, line))
     if not lines:
         raise LogError("no row holds data, expected a table with one row per sample", path)
     rows = _split(path, lines, delimiter)
@@ -73,7 +75,11 @@ def _read_text(
     names: tuple[str | int, ...] = tuple(range(1, len(names_row) + 1))
     repeated = 0
     if header:
-        if all(_is_number(field) for field in names_row):
+        numbers = all(_is_number(field) for field in names_row)
+        if numbers and (commented := _names_in(above, lines[0][1], delimiter, path)):
+            # As NumPy's savetxt writes them: names in a comment just above the table.
+            rows.insert(0, (first, names_row := commented))
+        elif numbers:
             raise LogError(
                 f"holds only numbers ({shortened(', '.join(names_row))}), expected the names of "
                 "the columns; if the file has none, set header: false and give columns by "
@@ -103,6 +109,15 @@ def _read_text(
     for name, *fields in zip(names, *(fields for _, fields in rows), strict=True):
         columns.setdefault(name, fields)
     return Table(path, columns, names, np.array([number for number, _ in rows]), cut_off, repeated)
+
+
+def _names_in(comment: str, row: str, delimiter: str, path: Path) -> list[str]:
+    """Names of columns in a comment, nothing if it does not name those of a row of numbers."""
+    if not comment.strip() or '"' in comment:
+        return []
+    (_, fields), (_, names) = _split(path, [(1, row), (1, comment.strip())], delimiter)
+    named = len(names) == len(fields) and not any(_is_number(n) or not n for n in names)
+    return names if named else []
 
 
 def _decoded(path: Path, data: bytes) -> str:

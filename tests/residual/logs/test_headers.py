@@ -100,3 +100,29 @@ def test_a_channel_may_count_in_another_unit_than_that_of_the_table(
     logged = {"time": 0.1 * np.arange(50), header: factor * values + zero}
     (run,) = read(write(tmp_path / "log.csv", logged), channels).trajectories
     np.testing.assert_allclose(run.states[:, 0], values, rtol=1e-12)
+
+
+@pytest.mark.parametrize("delimiter", [",", " ", "\t"])
+def test_names_in_the_comment_that_numpy_writes_are_the_header(tmp_path, delimiter):
+    columns = swing()
+    path = tmp_path / "log.txt"
+    rows = np.stack(list(columns.values()), axis=1)
+    header = "made by a rig, at noon\n" + delimiter.join(columns)
+    np.savetxt(path, rows, header=header, delimiter=delimiter, fmt="%.17g")
+    (run,) = read(path).trajectories
+    np.testing.assert_array_equal(run.states[:, 0], columns["angle"])
+    np.testing.assert_array_equal(run.states[:, 1], columns["rate"])
+    assert len(run.times) == len(rows)
+
+
+@pytest.mark.parametrize("above", [
+    "# made by a rig", "# time,angle,rate", "# 1,2,3,4", "# time,angle,rate,voltage\n0,0,0,0\n#",
+])  # fmt: skip
+def test_a_comment_that_does_not_name_every_column_is_no_header(tmp_path, above):
+    path = tmp_path / "log.csv"
+    np.savetxt(path, np.stack(list(swing().values()), axis=1), delimiter=",")
+    path.write_text(f"{above}\n{path.read_text()}")
+    if above.endswith("#"):  # Above the first row of numbers it does; a later comment is none.
+        assert len(read(path).trajectories) == 1
+    else:
+        assert "holds only numbers" in error(path)
