@@ -18,7 +18,7 @@ import yaml
 
 from simgap_files import safe_yaml
 from sims.effects.base import Effect
-from sims.effects.library import library
+from sims.effects.library import curves_in, library
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
 from sims.model_files import model_settings, names_model
@@ -128,7 +128,8 @@ def chosen_effects(
     Args:
         simulator: What hosts them.
         wanted: ``"library"``; effects of the library by name, ``"viscous_friction"`` or, at one
-            place, ``"viscous_friction@pivot"``, parameters as ``"mass"``; a class of your own by
+            place, ``"viscous_friction@pivot"``, parameters as ``"mass"``; a curve by points, as
+            ``"friction_curve"``; a class of your own by
             import path, ``"my_file.FanTorque"``, at every place that can host it or at one; or
             ``class_path`` and ``init_args``; or an effect itself.
 
@@ -136,6 +137,7 @@ def chosen_effects(
         ValueError: Something is not known, or cannot act in this simulator.
     """
     known = {str(effect): effect for effect in library(simulator)}
+    curves = curves_in(simulator)
     found: dict[str, Effect] = {}
     for entry in wanted:
         if isinstance(entry, Effect):
@@ -147,13 +149,13 @@ def chosen_effects(
             own = list(known.values())
         else:
             name, _, where = entry.partition("@")
-            own = [e for e in known.values() if entry in (e.name, str(e))]
+            own = [e for e in (*known.values(), *curves) if entry in (e.name, str(e))]
             if not own and entry in simulator.parameters:
                 own = [ParameterChange(entry)]
             if not own and "." in name:
                 own = _placed(simulator, name, where)
         if not own:
-            there = ", ".join(known)
+            there = ", ".join([*known, *map(str, curves)])
             raise ValueError(
                 f"no effect {entry!r} for {simulator.name}: give one of {there}, or the import "
                 "path of a class of your own"

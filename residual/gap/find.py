@@ -9,10 +9,12 @@ from typing import Any
 from residual.gap.answer.answer import judged_apart, matters, summed_up, told
 from residual.gap.data.examine import examine
 from residual.gap.data.excerpt import excerpt
-from residual.gap.inquiry import Clock, Inquiry, Offered
+from residual.gap.inquiry import Clock, Inquiry
 from residual.gap.log import look, settle
 from residual.gap.model.workers import workers
+from residual.gap.offered import Offered
 from residual.gap.preparation.conventions import otherwise
+from residual.gap.preparation.horizon import other_length
 from residual.gap.preparation.numerics import held_as, stride_for
 from residual.gap.result import GapResult
 from residual.gap.search.finals import on_more_windows
@@ -113,6 +115,8 @@ def find_gap(
             )
             apart = judged_apart(answer, known.prepared, others, table)
         clock.lap("forecast")
-    quality = [*log.findings, *log.left_out, *on_hold, *on_more, *known.says]
+    other = other_length(horizon, table.horizon_s) if horizon else []
+    quality = [*log.findings, *log.left_out, *other, *on_hold, *on_more, *known.says]
+    quality += inquiry.untried(answer)
     result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)
     return dataclasses.replace(result, conventions=conventions)

@@ -5,32 +5,25 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
 
 from residual.gap.answer.answer import Answer, confirm
-from residual.gap.answer.curves import curves_for, takes_its_place, worth_a_curve
+from residual.gap.answer.curves import over_the_log, takes_its_place, worth_a_curve
 from residual.gap.answer.free_parameters import better, worth_freeing
 from residual.gap.answer.lone import explains_the_rest, lone_stretch
-from residual.gap.confirmation.aliases import (
-    aliases,
-    beyond_parameters,
-    representatives,
-)
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
 from residual.gap.confirmation.twins import exact_twins, with_twins
-from residual.gap.fitting.smooth import LEAD
+from residual.gap.fitting.smooth import LEAD, SmoothFitter
 from residual.gap.log import Log
 from residual.gap.model.candidates import Candidate, candidates
+from residual.gap.offered import Offered
 from residual.gap.preparation.numerics import held_otherwise, how_held
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.search.explain import Explanation, explain
 from residual.gap.search.sets import Search
 from sims.effects.base import Effect
-from sims.effects.curve import Curve
 from sims.host import HostSimulator
-from sims.loading import LIBRARY, chosen_effects
 
 #: Part of the time budget after which nothing new is tried.
 SEARCHING = 0.7
@@ -59,46 +52,6 @@ class Clock:
         now = time.perf_counter()
         self.laps[step] = now - self._last
         self._last = now
-
-
-@dataclasses.dataclass(frozen=True)
-class Offered:
-    """Effects that may be missing.
-
-    Attributes:
-        by_label: All of them.
-        kept: One of each group that no motion tells apart.
-        less: Parameters of which there may be too much, where what is kept cannot be negative.
-        groups: Those groups by label.
-        sets: Sets of which one is exactly made of the others.
-        curves: Curves by points, for where laws of the library only come near.
-    """
-
-    by_label: Mapping[str, Effect]
-    kept: Sequence[Effect]
-    less: Sequence[Effect]
-    groups: dict[str, tuple[str, ...]]
-    sets: Sequence[tuple[str, ...]]
-    curves: Sequence[Curve]
-
-    @classmethod
-    def of(
-        cls,
-        log: Log,
-        effects: Iterable[Effect | str | Mapping[str, Any]] | None,
-        measured_input: bool,
-    ) -> Offered:
-        """Those that a user asks for, or the library, less what a measured input cannot show."""
-        offered = chosen_effects(log.simulator, [LIBRARY] if effects is None else list(effects))
-        curves = curves_for(log.simulator, [str(effect) for effect in offered])
-        if measured_input:
-            offered = tuple(effect for effect in offered if not effect.upstream_of_sensor)
-            curves = tuple(effect for effect in curves if not effect.upstream_of_sensor)
-        offered = beyond_parameters(log.simulator, offered)
-        groups, sets = aliases(log.simulator, offered, log.runs)
-        kept, less = representatives(log.simulator, offered, groups)
-        by_label = {str(effect): effect for effect in offered}
-        return cls(by_label, kept, less, groups, sets, curves)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,6 +100,9 @@ class Inquiry:
         samples = ready.fitter.samples
         less = [one.taking_away() for one in candidates(simulator, self.offered.less, samples)]
         offered = [*self.offered.kept, *more]
+        if isinstance(ready.fitter, SmoothFitter):
+            for curve in self.offered.asked:
+                offered += over_the_log(curve, ready.fitter, simulator)
         pool = ready.pool([*candidates(simulator, offered, samples), *less])
         pool = [candidate for candidate in pool if candidate.label not in free]
         others = {label: e for label, e in self.offered.by_label.items() if label not in free}
@@ -257,6 +213,19 @@ class Inquiry:
         search = known.answer.found.search
         again = self.explained(search.simulator, known.prepared, beside, search, more)
         return confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
+
+    def untried(self, answer: Answer) -> list[str]:
+        """What is to be said of curves that a user asks for, and that were not tried."""
+        search = answer.found.search
+        tried = {number for key in search.tried for number in key}
+        labels = {search.candidates[number].label for number in tried}
+        asked = [str(curve) for curve in self.offered.asked if str(curve) not in labels]
+        windows = len(search.fitter.blocks.windows)
+        return [
+            f"{label} was not tried: it has more numbers than these data can tell ({windows} "
+            "windows), or what it follows never changed"
+            for label in asked
+        ]
 
     def without_lone_stretch(self, log: Log, known: Confirmed, tolerance: float) -> Confirmed:
         """The same, or what is found without a stretch of the log that nothing explains.

@@ -20,10 +20,12 @@ Kind = Literal[
 #: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
 #: between folds or with the numerics, lies at its bound, parameters within their tolerance do as
 #: well, or there was no time to ask that, it is a time shorter than half a sample, its interval
-#: holds zero, or an effect of another kind does as well.
+#: holds zero, few blocks of data leave much without a name, or an effect of another kind does as
+#: well.
 Doubt = Literal[
     "not_needed", "unsteady", "numerics", "at_bound", "calibration", "slight",
-    "no_time", "clock", "gross", "conventions", "may_be_zero", "share_may_be_zero", "rivals",
+    "no_time", "clock", "gross", "conventions", "may_be_zero", "share_may_be_zero", "few_blocks",
+    "rivals",
 ]  # fmt: skip
 
 

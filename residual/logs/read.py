@@ -98,7 +98,8 @@ def _check_actions(runs: Sequence[Run], channels: Sequence[Channel], columns: Lo
         raise LogError(
             f"the action {channel.name!r} is {values[0]:g} {channel.unit} in all {len(values)} "
             "samples, expected one that changes; check the column, or if it is a run without "
-            "input, such as a free decay, set allow_constant_action: true",
+            "input, such as a free decay, set allow_constant_action: true (on the command line "
+            "--columns.allow_constant_action true)",
             runs[0].path,
             column=column.column,
         )

@@ -18,6 +18,8 @@ from sims.effects.actuator import (
 )
 from sims.effects.backlash import Backlash
 from sims.effects.base import Effect
+from sims.effects.curve import Curve
+from sims.effects.curves import CURVES
 from sims.effects.friction import (
     CoulombFriction,
     DirectionalFriction,
@@ -27,6 +29,7 @@ from sims.effects.joint import (
     Cogging,
     ConstantLoad,
     CubicSpring,
+    JointEffect,
     LinearSpring,
     ProportionalLoss,
     QuadraticDrag,
@@ -95,6 +98,23 @@ def library(simulator: HostSimulator) -> tuple[Effect, ...]:
             if quantity.role != "strength" and quantity.starts
         }
         found.append(effect.with_values(**typical))
+    return tuple(found)
+
+
+def curves_in(simulator: HostSimulator) -> tuple[Curve, ...]:
+    """Every curve by points that a simulator can host, at zero strength and over no range yet."""
+    joints = [joint.name for joint in simulator.joints]
+    inputs = [channel.name for channel in simulator.action_channels]
+    inputs += [AND.join(names) for names in like_inputs(simulator)]
+    found = []
+    for kind in CURVES:
+        for where in joints if issubclass(kind, JointEffect) else inputs:
+            curve = kind(where)
+            try:
+                curve.quantities(simulator)
+            except ValueError:
+                continue
+            found.append(curve)
     return tuple(found)
 
 

@@ -194,7 +194,7 @@ def span(number: Number) -> str:
 
 def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
     gap = result.gap
-    found = [f"{gap.windows_after:.3g} times the noise is left"]
+    found = [f"residuals of the fit are {gap.windows_after:.3g} times the noise"]
     few = gap.blocks < TOO_FEW and all(v.kind in NAMELESS for v in result.verdicts)
     if result.adequate:
         times = gap.after.value / max(gap.noise_floor.value, 1e-300)
@@ -249,8 +249,8 @@ def experiment(label: str, others: Sequence[str], result: GapResult, same: bool)
     """What would tell an effect from others."""
     if same:
         return (
-            f"No log of this motion can tell. Measure one of them directly, or change "
-            f"{effect_name(label)} by a known amount, such as a known payload, and log again."
+            "No log of this system can tell. Measure one of them directly, or change "
+            f"{effect_name(label)} by a known amount and log again."
         )
     known = known_effects(result)
     needs = [known[name].needs for name in (label, *others) if name in known]

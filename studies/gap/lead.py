@@ -116,7 +116,8 @@ def _but_worse_apart(result: GapResult) -> str:
     if apart is None or WORSE * apart.after.value < apart.before.value:
         return ""
     before, after = (quantity_text(s.value, apart.unit) for s in (apart.before, apart.after))
-    if apart.after.value <= WORSE * apart.before.value:
+    by_chance = apart.after.low < apart.before.value and apart.after.value < apart.before.high
+    if by_chance or apart.after.value <= WORSE * apart.before.value:
         return (
             f" But it does not help on the records set aside, where the {ahead(apart)} is {after} "
             f"with it and {before} without."

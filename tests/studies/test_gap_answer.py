@@ -92,11 +92,19 @@ def test_what_the_log_may_count_otherwise_comes_first():
 
 
 @pytest.mark.parametrize(
-    ("after", "worse", "helps"), [(0.9, False, True), (0.99, False, False), (1.2, True, False)]
-)
-def test_the_first_sentence_says_where_the_corrected_simulator_is_no_better(after, worse, helps):
+    ("after", "spread", "worse", "helps"),
+    # The last is worse by no more than which records were set aside.
+    [(0.9, 1.1, False, True), (0.99, 1.1, False, False), (1.2, 1.1, True, False),
+     (1.2, 2.0, False, False)],
+)  # fmt: skip
+def test_the_first_sentence_says_where_the_corrected_simulator_is_no_better(
+    after, spread, worse, helps
+):
     found = result(MASS)
-    apart = dataclasses.replace(found.gap, after=Span(after, 0.5 * after, 2 * after))
+    before = Span(1.0, 1 / spread, spread)
+    apart = dataclasses.replace(
+        found.gap, before=before, after=Span(after, after / spread, after * spread)
+    )
     says = lead(dataclasses.replace(found, held_out=apart))
     assert says.startswith("98 % of the gap is mass.")
     assert (
@@ -104,8 +112,8 @@ def test_the_first_sentence_says_where_the_corrected_simulator_is_no_better(afte
         "error of angle is 1.2 rad, the nominal one's 1 rad." in says
     ) is worse
     assert (
-        "does not help on the records set aside, where the 1 s error of angle is 0.99 rad with it "
-        "and 1 rad without." in says
+        f"does not help on the records set aside, where the 1 s error of angle is {after} rad with "
+        "it and 1 rad without." in says
     ) is not (helps or worse)
     assert ("records set aside" in says) is not helps
 

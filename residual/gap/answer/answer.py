@@ -23,7 +23,7 @@ from residual.gap.answer.verdicts import (
     remainder_verdict,
 )
 from residual.gap.confirmation.aliases import hidden
-from residual.gap.confirmation.certainty import claims, in_plain_form, share
+from residual.gap.confirmation.certainty import TOO_FEW, claims, in_plain_form, share
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.numerics import other_numerics, with_enough_substeps
 from residual.gap.confirmation.size import may_vanish
@@ -193,7 +193,7 @@ def told(
         ]
     measured = [simulator.physical_channels[c] for c in fitter.samples.measured]
     blind: tuple[Blind, ...] = ()
-    if found.adequate:
+    if found.adequate and len(fitter.blocks) >= TOO_FEW:
         known = {name for claim in answer.claims for name in claim.stand_ins}
         alone = [k for k in search.validated if len(k) == 1]
         known |= {search.labels(k)[0] for k in alone if helps_alone(search, k)}
@@ -239,12 +239,14 @@ def verdicts(
     labels = [search.candidates[claim.number].label for claim in answer.claims]
     blocks = len(search.fitter.blocks)
     made: list[Verdict] = []
+    left = search.fitter.left(search.tried[answer.key], found.floor)
+    times = 1.0 if left.adequate else left.ratio
     for claim, label in zip(answer.claims, labels, strict=True):
-        made.append(effect_verdict(search, claim, blocks, *dependent(label, labels, sets)))
+        exact = dependent(label, labels, sets)
+        made.append(effect_verdict(search, claim, blocks, *exact, times))
     made.sort(key=lambda verdict: verdict.kind != "confirmed")
     if search.beside:
         made.append(calibrated_verdict(search, answer.key))
-    left = search.fitter.left(search.tried[answer.key], found.floor)
     if tolerance is not None and table.before.value <= tolerance:
         made.insert(
             0,

@@ -16,12 +16,11 @@ from residual.gap.answer.free_parameters import better
 from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.search.redundant import by_points
-from sims.effects.actuator import AND, ActuatorEffect, StaticActuatorEffect
+from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
-from sims.effects.curves import CURVES, StateCurve
-from sims.effects.joint import JointEffect
-from sims.effects.library import library, like_inputs
+from sims.effects.curves import StateCurve
+from sims.effects.library import curves_in, library
 from sims.host import HostSimulator
 
 #: Part of the squared forecast error of the library's laws, less what noise makes, that a curve may
@@ -45,21 +44,17 @@ def curves_for(simulator: HostSimulator, offered: Collection[str]) -> tuple[Curv
         offered: Labels of the effects that may be missing.
     """
     left_out = {str(effect) for effect in library(simulator)} - set(offered)
-    joints = [joint.name for joint in simulator.joints]
-    inputs = [channel.name for channel in simulator.action_channels]
-    inputs += [AND.join(names) for names in like_inputs(simulator)]
-    found = []
-    for kind in CURVES:
-        for where in joints if issubclass(kind, JointEffect) else inputs:
-            curve = kind(where)
-            try:
-                curve.quantities(simulator)
-            except ValueError:
-                continue
-            cases = {f"{name}@{where}" for name in kind.special_cases}
-            if not cases & left_out:
-                found.append(curve)
-    return tuple(found)
+    return tuple(
+        curve
+        for curve in curves_in(simulator)
+        if not {f"{name}@{curve.where}" for name in curve.special_cases} & left_out
+    )
+
+
+def over_the_log(curve: Curve, fitter: SmoothFitter, simulator: HostSimulator) -> tuple[Curve, ...]:
+    """A curve over the values that the log has, none if it has a single one."""
+    low, high = _values(curve, fitter, simulator)
+    return (curve.suited_to(low, high),) if high > low else ()
 
 
 def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
@@ -79,13 +74,13 @@ def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
     # A simulator's own damping moves like friction at its joint.
     alike = [one.effect for number in key for one in search.twins_of(number)]
     named = [search.candidates[number].effect for number in key]
-    found = []
+    found: list[Curve] = []
     for curve in curves:
         if named and not any(_of_its_kind(curve, effect) for effect in (*named, *alike)):
             continue
         low, high = _values(curve, fitter, search.simulator)
-        if high > low and not _counts_turns(curve, search.simulator, high - low):
-            found.append(curve.suited_to(low, high))
+        if not _counts_turns(curve, search.simulator, high - low):
+            found += over_the_log(curve, fitter, search.simulator)
     return found
 
 

@@ -21,12 +21,20 @@ DOUBTS: dict[Doubt, str] = {
     "calibration": "parameters that are a few percent off would do nearly as well",
     "slight": "without it errors are less than 1.5 times as large, and what has no name may favour "
     "it by as much",
+    "few_blocks": "much has no name, and there are too few blocks of data to say that it is not "
+    "what this one stands for",
     "rivals": "an effect of another kind does nearly as well",
 }
 
 
-def doubts(claim: Claim, vanishes: bool) -> tuple[Doubt, ...]:
-    """Why an effect is not certain."""
+def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...]:
+    """Why an effect is not certain.
+
+    Args:
+        claim: What bears on it.
+        vanishes: Whether its interval holds zero, or nearly.
+        thin: Whether few blocks of data leave much without a name.
+    """
     why: dict[Doubt, bool] = {
         "not_needed": not claim.needed,
         "unsteady": not claim.steady,
@@ -40,6 +48,7 @@ def doubts(claim: Claim, vanishes: bool) -> tuple[Doubt, ...]:
         "conventions": claim.counted,
         "may_be_zero": vanishes,
         "share_may_be_zero": not claim.gains,
+        "few_blocks": thin,
         "rivals": bool(claim.rivals or claim.alike),
     }
     return tuple(doubt for doubt, there in why.items() if there)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from residual.gap.result import Rival
-from residual.gap.search.choice import reasons
+from residual.gap.search.choice import material, reasons
 from residual.gap.search.explain import Explanation
 from residual.gap.search.sets import Key
 
@@ -23,7 +23,9 @@ def evidence(found: Explanation, left: Key, leads: Sequence[str]) -> tuple[Rival
     """
     search, why = found.search, found.choice.reasons
     if found.key != left:
+        larger = {key for key in search.usable() if set(left) < set(key)}
         gone = {key for key in search.tried if set(search.labels(key)) & set(leads)}
+        gone |= {key for key in larger if material(search, left, key)}
         unnamed = dict.fromkeys(gone, "holds effects that these data do not establish")
         why = reasons(search, left) | unnamed
     rows = [

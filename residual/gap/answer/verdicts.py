@@ -17,6 +17,8 @@ from residual.gap.search.sets import Key, Search
 #: Families of which an effect may be one and still be worth a name, if forecasts do not clearly
 #: need it. What they do need makes a better simulator, whichever of many it is.
 UNNEEDED = 3
+#: Times the noise from which on what has no name may be another law that few blocks cannot show.
+MUCH = 2.0
 #: Part of what a parameter may change by that is a change.
 MOVED = 1e-3
 
@@ -51,6 +53,7 @@ def effect_verdict(
     blocks: int,
     stand_ins: Sequence[str] = (),
     together: Sequence[tuple[str, ...]] = (),
+    left: float = 1.0,
 ) -> Verdict:
     """One chosen effect.
 
@@ -60,11 +63,13 @@ def effect_verdict(
         blocks: Blocks of data.
         stand_ins: Effects that could stand in its place beside the other chosen ones, exactly.
         together: Sets of effects that make the same motion in one exact proportion.
+        left: Times the noise that all chosen ones leave.
     """
     claim = claim.less(stand_ins)
     effect = search.candidates[claim.number].effect
     vanishes = may_vanish(search, claim) if claim.there else may_be_none(search, claim)
-    sure = claim.sure and blocks >= TOO_FEW and not vanishes
+    thin = blocks < FEW and left > MUCH
+    sure = claim.sure and blocks >= TOO_FEW and not (vanishes or thin)
     kind: Kind = "confirmed" if sure else "ambiguous"
     family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""
     numbers = ", ".join(
@@ -93,7 +98,7 @@ def effect_verdict(
     if together:
         sets = " or ".join(" with ".join(names) for names in together[:2])
         says.append(f"{sets}, in one exact proportion, would move alike")
-    why = doubts(claim, vanishes)
+    why = doubts(claim, vanishes, thin)
     says += [DOUBTS[doubt] for doubt in why if doubt != "rivals"]
     if claim.by_fit and not (claim.needed and claim.gains):
         says.append("a fit to all data leaves three times as much without it")
@@ -132,7 +137,10 @@ def calibrated_verdict(search: Search, key: Key) -> Verdict:
 def remainder_verdict(left: Left, gap: Gap, leads: Sequence[str] = ()) -> Verdict:
     """What has no name."""
     share = Span(1 - gap.share.value, 1 - gap.share.high, 1 - gap.share.low)
-    says = f"{100 * share.value:.3g} % of the gap has no name: {left.ratio:.3g} times the noise"
+    says = (
+        f"{100 * share.value:.3g} % of the gap has no name: residuals of the fit are "
+        f"{left.ratio:.3g} times the noise"
+    )
     if left.force:
         says += f"; it looks like something that follows {left.force}"
     if leads:

@@ -38,10 +38,12 @@ def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
     period = float(np.median(np.concatenate([run.durations for run in trajectories])))
     if period <= _SLOW * simulator.dt:
         return []
+    driven = any(np.ptp(run.actions, axis=0).any() for run in trajectories if run.actions.size)
+    unknown = "what the input did between samples is not known, and " if driven else ""
     says = (
         f"a sample every {period:.4g} s, {period / simulator.dt:.0f} control periods of "
-        f"{simulator.name} ({simulator.dt:g} s): what the input did between samples is not known, "
-        "and fast effects cannot show; log at the control period if you can"
+        f"{simulator.name} ({simulator.dt:g} s): {unknown}fast effects cannot show; log at the "
+        "control period if you can"
     )
     numbers = {"period_s": period, "control_period_s": simulator.dt}
     return [Finding("sampling", "", says, numbers, "warning")]

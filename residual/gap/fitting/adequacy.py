@@ -24,6 +24,8 @@ ERRORS = 3.0
 #: Probability below which a generic force is there. The same logs gave probabilities that are
 #: uniform or a little larger, down to 0.03.
 CHANCE = 1e-4
+#: Part of the best gain of a single force from which on the plainer one is told.
+NEARLY = 0.95
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,7 +56,10 @@ class Remainder:
 def generic_forces(
     simulator: HostSimulator, samples: Samples, nodes: Array, scale: Array
 ) -> tuple[Array, list[str]]:
-    """Functions of state and input that a missing force could be made of, (n, g) and names."""
+    """Functions of state and input that a missing force could be made of, (n, g), and names.
+
+    Where an angle does not run through half a wave, it shows no wave: that has no name.
+    """
     columns: list[Array] = []
     names: list[str] = []
 
@@ -69,8 +74,9 @@ def generic_forces(
         x = nodes[:, i]
         if channel.angle:
             for k in (1, 2, 3, 5):
-                add(f"sin({k} {channel.name})", np.sin(k * x))
-                add(f"cos({k} {channel.name})", np.cos(k * x))
+                shows = k * np.ptp(x) > np.pi
+                add(f"sin({k} {channel.name})" if shows else "", np.sin(k * x))
+                add(f"cos({k} {channel.name})" if shows else "", np.cos(k * x))
         size = max(float(np.std(x)), 1e-12)
         middle = 0.0 if channel.kind == "rate" else float(np.mean(x))
         z = (x - middle) / size
@@ -127,9 +133,9 @@ def remainder(
     gain, rank = _gain(matrix, residual)
     variance = max(1.0, float(np.median(ratio)) ** 2)
     single = (matrix.T @ residual) ** 2 / np.maximum((matrix**2).sum(axis=0), 1e-300)
-    best = int(np.argmax(single))
-    chance = float(chi2.sf(gain / variance, rank))
     driven = driven_states(model)
+    best = _plainest(single, names * len(driven))
+    chance = float(chi2.sf(gain / variance, rank))
     channel = model.simulator.physical_channels[driven[best // len(names)]].name
     where = f"{names[best % len(names)]}, acting on {channel}"
     alone = float(chi2.sf(single[best] / variance, 1)) * len(single)
@@ -137,6 +143,14 @@ def remainder(
         ratio, spread, limit, gain, rank, chance, where if alone < 1e-3 else "",
         bool((ratio < limit).all() and chance > CHANCE),
     )  # fmt: skip
+
+
+def _plainest(gains: Array, names: list[str]) -> int:
+    """The force with a name that takes most off alone, or one with a shorter name next to it."""
+    told = np.array([bool(name) for name in names])
+    most = float(np.max(gains[told]))
+    near = np.flatnonzero(told & (gains >= NEARLY * most))
+    return int(min(near, key=lambda place: (len(names[place]), -gains[place])))
 
 
 def _beyond_cap(fit: ShootingFit, places: int) -> Array:

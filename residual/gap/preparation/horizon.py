@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 TURNING = np.pi / np.sqrt(3)
 #: Part of the usual period of the motion.
 PART = 1 / 3
+#: Part of a length asked for by which another is none.
+NEARLY = 0.2
 #: Windows that the records should at least be good for.
 WINDOWS = 8
 #: Least samples of a window, and of a forecast of a system that strikes the ground.
@@ -54,6 +56,27 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
     most = longest_horizon(trajectories)
     least = STRIDE if simulator.has_contacts else (1 - LEAD) * SAMPLES
     return float(max(min(wanted, most), least * step))
+
+
+def other_length(asked: float, seconds: float) -> list[str]:
+    """What is to be said if forecasts are not as long as a user asked for.
+
+    Args:
+        asked: Length asked for in s.
+        seconds: What they last, lead-in included, in s.
+    """
+    lead = asked * LEAD / (1 - LEAD)
+    if abs(seconds - lead - asked) <= NEARLY * asked:
+        return []
+    why = (
+        "the samples are too far apart for less"
+        if seconds > asked + lead
+        else "records are too short for more, or motion is too unstable"
+    )
+    return [
+        f"a horizon of {asked:.3g} s was asked for, and forecasts last {seconds:.3g} s with their "
+        f"lead-in: {why}"
+    ]
 
 
 def longest_horizon(trajectories: Sequence[Trajectory]) -> float:

@@ -230,13 +230,24 @@ def reasons(search: Search, chosen: Key) -> dict[Key, str]:
                 search, key, chosen
             )
         elif set(chosen) < set(key):
-            taken = 1 - search.error(key) / max(own, 1e-12)
-            more = len(key) - len(chosen)
-            by = f" with {more} effects more" if more > 1 else ""
-            found[key] = f"takes only {100 * max(taken, 0):.2g} % off what remains{by}"
+            found[key] = _not_enough(search, key, chosen)
         else:
             found[key] = "as good, with as many or more numbers"
     return found
+
+
+def _not_enough(search: Search, key: Key, chosen: Key) -> str:
+    """Why what a set holds beyond the chosen one is not asked for."""
+    taken = max(1 - search.error(key) / max(search.error(chosen), 1e-12), 0.0)
+    more = len(key) - len(chosen)
+    off = f"{100 * taken:.2g} % off what remains" + (f" with {more} effects more" * (more > 1))
+    if taken < 1 - (1 - MATERIAL) ** more:
+        return f"takes only {off}"
+    if as_good(search, chosen, key):
+        return f"takes {off}, no more than chance may"
+    if score(search, chosen) <= score(search, key):
+        return f"takes {off}, and fits no better"
+    return f"takes {off}, but these data do not establish it"
 
 
 def _worst(search: Search, key: Key, chosen: Key) -> str:

@@ -21,6 +21,9 @@ SPELLINGS = 2
 STILL = 3
 #: Pairs that are tried in place of one effect with as many numbers.
 SPLITS = 2
+#: Effects that move as another one does in these data, tried beside it: under a constant input a
+#: gain is a load, a dead zone and dry friction, and none of them may lack for the others.
+ALIKE = 4
 
 
 def add_without_each(search: Search, key: Key) -> None:
@@ -62,6 +65,7 @@ def _rivals(search: Search, key: Key, gone: int, most: int) -> list[tuple[int, A
     ranked = gains(around)
     found: dict[int, Array] = {}
     still: set[int] = set()
+    alike: set[int] = set()
     for gain in ranked:
         number = around.variants[gain.variants[0]].candidate
         if number in key or number in found or spelt_out(search, number, list(found)):
@@ -69,9 +73,11 @@ def _rivals(search: Search, key: Key, gone: int, most: int) -> list[tuple[int, A
         if doubles(search, (*rest, number)):
             continue
         bold = search.candidates[number].bold
-        near = len(found) < most or (family and search.family(number) == family)
+        near = len(found) - len(alike) < most or (family and search.family(number) == family)
         if both_hold_still(search, gone, number) and len(still) < STILL:
             still.add(number)
+        elif len(alike) < ALIKE and any(search.same_motion(rest, n, number) for n in found):
+            alike.add(number)
         elif not near or gain.value < HOPELESS * ranked[0].value:
             continue
         found[number] = gain.values[0] if gain.value > 0 or bold is None else bold

@@ -113,8 +113,8 @@ def explain(
         if len(search.currency.groups) > 1 and not simulator.has_contacts:
             alone = noise_floor(fitter, search.nominal, floor.sigma)
             search.currency = search.currency.only_where_wrong(alone)
-        if earlier is not None and not seeds:
-            search.add(carried(earlier, search))
+        if not seeds:
+            search.add(carried(earlier, search) if earlier is not None else {})
             search.add(curves_in_place(search, near_best(search)))
         run(search, seeds, functools.partial(_quiet, search, floor))
         key = choose(search).key

@@ -38,8 +38,9 @@ def departures(search: Search, key: Key) -> float:
 
 
 def parameters(search: Search, key: Key) -> int:
-    """How many members of a set are parameters that the simulator declares."""
-    return sum(isinstance(search.candidates[i].effect, ParameterChange) for i in key)
+    """How many members of a set are parameters that the simulator declares, or move as one does."""
+    own = [[search.candidates[i], *search.twins_of(i)] for i in key]
+    return sum(any(isinstance(c.effect, ParameterChange) for c in one) for one in own)
 
 
 def _departure(search: Search, effect: Effect) -> float:

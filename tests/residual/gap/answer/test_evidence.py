@@ -55,6 +55,14 @@ def test_reasons_are_those_of_the_set_that_is_left():
     assert told["a",] == ""
 
 
+def test_what_would_take_much_but_may_not_be_named_takes_no_little():
+    toy = Toy({(0,): 0.3, (0, 1): 0.02})
+    toy.labels = lambda key: tuple("abcde"[n] for n in key)
+    found = SimpleNamespace(search=toy, key=(0,), choice=SimpleNamespace(reasons={}))
+    told = {one.effects: one.reason for one in evidence(found, (), ())}
+    assert told["a", "b"] == "holds effects that these data do not establish"
+
+
 def test_what_fits_down_to_the_noise_and_forecasts_worse_than_nothing_is_not_named(monkeypatch):
     for name, found in {
         "claims": lambda search, key, *_: [SimpleNamespace(number=n, needed=True) for n in key],

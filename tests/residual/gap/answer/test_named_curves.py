@@ -80,6 +80,23 @@ def test_a_brake_that_weakens_with_speed_is_a_curve(braked):
     assert braked.gap.share.value > 0.999
 
 
+@pytest.mark.parametrize("name", ["friction_curve", "friction_curve@speed"])
+def test_a_curve_may_be_asked_for_by_name(name):
+    logs = [log(eddy_brake, 0), log(eddy_brake, 1)]
+    found = find_gap(Rotor(), logs, effects=("coulomb_friction", name))
+    assert [(v.kind, v.effect) for v in found.verdicts[:1]] == [("confirmed", "friction_curve")]
+    fastest = max(np.abs(one.states).max() for one in logs)
+    assert found.effects[0].full == pytest.approx(fastest, rel=0.01)  # over what the log holds
+
+
+def test_a_curve_with_more_numbers_than_the_log_can_tell_is_told():
+    short = log(eddy_brake, 0)
+    short = Trajectory("short", short.times[:40], short.states[:40], short.actions[:39])
+    found = find_gap(Rotor(), [short], effects=("input_curve",), horizon=0.3)
+    assert not found.effects
+    assert any("input_curve@torque was not tried" in says for says in found.quality)
+
+
 def test_it_explains_records_set_aside(braked):
     assert braked.held_out.after.value < 0.02 * braked.held_out.before.value
 

@@ -193,6 +193,15 @@ def test_only_what_leaves_no_doubt_is_confirmed():
     assert (alike.kind, alike.alternatives) == ("ambiguous", ("constant_load@pivot",))
 
 
+@pytest.mark.parametrize(("blocks", "left", "kind"), [
+    (6, 4.0, "ambiguous"), (6, 1.5, "confirmed"), (20, 4.0, "confirmed"),
+])  # fmt: skip
+def test_few_blocks_that_leave_much_without_a_name_confirm_nothing(blocks, left, kind):
+    verdict = effect_verdict(Toy({(0,): 0.3}), claim(), blocks, left=left)
+    assert verdict.kind == kind
+    assert verdict.doubts == (("few_blocks",) if kind == "ambiguous" else ())
+
+
 def test_rivals_of_one_family_leave_the_family_confirmed():
     verdict = effect_verdict(Toy({(1,): 0.3}), claim(1, form=("coulomb_friction@pivot",)), 20)
     assert (verdict.kind, verdict.family) == ("confirmed", "dissipation")

@@ -112,6 +112,10 @@ def test_a_second_between_samples_is_told():
     (found,) = [one for one in findings(PendulumEquation(), [slow]) if one.kind == "sampling"]
     assert found.severity == "warning"
     assert "20 control periods" in found.says
+    assert "what the input did" in found.says
+    free = dataclasses.replace(slow, actions=0 * slow.actions)
+    (found,) = [one for one in findings(PendulumEquation(), [free]) if one.kind == "sampling"]
+    assert "input" not in found.says
 
 
 @given(step=st.floats(0.01, 0.2))

@@ -28,6 +28,19 @@ def swing(period, seconds=60.0, step=0.02, size=0.4, noise=0.0, name="run"):
     return Trajectory(name, times, states, np.sin(times)[:-1, None])
 
 
+@pytest.mark.parametrize(("step", "asked", "why"), [
+    (0.02, 0.5, None), (0.02, 0.04, "too far apart"), (0.1, 0.2, "too far apart"),
+    (0.02, 9.0, "too short"),
+])  # fmt: skip
+def test_another_length_than_was_asked_for_is_told(step, asked, why):
+    found = find_gap(
+        PendulumEquation(), [swing(2.0, 10.0, step, noise=1e-3)], horizon=asked, effects=["mass"]
+    )
+    told = [says for says in found.quality if "a horizon of" in says]
+    assert len(told) == (why is not None)
+    assert why is None or (why in told[0] and f"{found.gap.horizon_s:.3g} s" in told[0])
+
+
 @given(st.floats(0.8, 10))
 @settings(max_examples=20, deadline=None)
 def test_a_third_of_the_period(period):

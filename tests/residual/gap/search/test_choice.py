@@ -118,6 +118,13 @@ def test_every_other_set_has_a_reason_with_its_worst_place():
     assert found.reasons[(1,)].startswith("2.5 times the error, most at ")
 
 
+def test_what_takes_more_than_a_fifth_is_not_said_to_take_little():
+    # The larger set fits no better, so that its better forecasts are luck.
+    found = choose(Toy({(0,): 0.2, (0, 1): 0.1}, {(0,): 1.0, (0, 1): 1.0}))
+    assert found.key == (0,)
+    assert found.reasons[(0, 1)] == "takes 50 % off what remains, and fits no better"
+
+
 @given(st.lists(st.floats(0.02, 1.2), min_size=6, max_size=6), st.integers(0, 3))
 @settings(max_examples=60, deadline=None)
 def test_what_is_chosen_is_never_worse_than_the_nominal(errors, seed):

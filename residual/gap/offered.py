@@ -1,0 +1,69 @@
+"""What may be missing: the library, or what a user asks for, less what no motion tells apart."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from residual.gap.answer.curves import curves_for
+from residual.gap.confirmation.aliases import aliases, beyond_parameters, representatives
+from residual.gap.log import Log
+from sims.effects.base import Effect
+from sims.effects.curve import Curve
+from sims.effects.library import curves_in
+from sims.loading import LIBRARY, chosen_effects
+
+
+@dataclasses.dataclass(frozen=True)
+class Offered:
+    """Effects that may be missing.
+
+    Attributes:
+        by_label: All of them.
+        kept: One of each group that no motion tells apart.
+        less: Parameters of which there may be too much, where what is kept cannot be negative.
+        groups: Those groups by label.
+        sets: Sets of which one is exactly made of the others.
+        curves: Curves by points, for where laws of the library only come near.
+        asked: Curves by points that a user asks for.
+    """
+
+    by_label: Mapping[str, Effect]
+    kept: Sequence[Effect]
+    less: Sequence[Effect]
+    groups: dict[str, tuple[str, ...]]
+    sets: Sequence[tuple[str, ...]]
+    curves: Sequence[Curve]
+    asked: Sequence[Curve] = ()
+
+    @classmethod
+    def of(
+        cls,
+        log: Log,
+        effects: Iterable[Effect | str | Mapping[str, Any]] | None,
+        measured_input: bool,
+    ) -> Offered:
+        """Those that a user asks for, or the library, less what a measured input cannot show.
+
+        Raises:
+            ValueError: One of them is not known, or cannot be looked for here.
+        """
+        offered = chosen_effects(log.simulator, [LIBRARY] if effects is None else list(effects))
+        # Those by name have no range yet: the log gives it.
+        asked = [e for e in offered if isinstance(e, Curve) and e in curves_in(log.simulator)]
+        if asked and log.simulator.has_contacts:
+            raise ValueError(
+                f"{asked[0]} is not looked for in what strikes the ground: leave it out of effects"
+            )
+        offered = tuple(effect for effect in offered if effect not in asked)
+        curves = curves_for(log.simulator, [str(effect) for effect in offered])
+        if measured_input:
+            offered = tuple(effect for effect in offered if not effect.upstream_of_sensor)
+            curves = tuple(effect for effect in curves if not effect.upstream_of_sensor)
+        curves = tuple(curve for curve in curves if curve not in asked)
+        offered = beyond_parameters(log.simulator, offered)
+        groups, sets = aliases(log.simulator, offered, log.runs)
+        kept, less = representatives(log.simulator, offered, groups)
+        by_label = {str(effect): effect for effect in offered}
+        return cls(by_label, kept, less, groups, sets, curves, asked)
