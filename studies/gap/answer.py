@@ -14,6 +14,7 @@ from sims.host import HostSimulator
 from studies.gap.words import (
     KINDS,
     ahead,
+    by_place,
     capitalized,
     duration_text,
     effect_name,
@@ -53,7 +54,9 @@ def headline(verdict: Verdict, result: GapResult) -> str:
     if verdict.kind == "unexplained":
         return f"{capitalized(percent(verdict.share.value))} of the gap has no name."
     if verdict.kind == "needs_data":
-        return capitalized(names_of(verdict.alternatives, "and")) + "."
+        hidden = by_place([effect_name(label) for label in verdict.alternatives])
+        plain = not any(" and " in name for name in hidden)
+        return capitalized(listed(hidden) if plain else "; ".join(hidden)) + "."
     if verdict.kind == "calibrated":
         moved = [
             minus(f"{effect_name(name)} {change.value:+.3g}{unit_text(change.unit)}")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from residual.gap import GapResult
 from residual.gap.fitting.forecasts import own_channels
 from residual.gap.result import ChannelGap, Verdict
 from studies.gap.answer import rivals
 from studies.gap.words import (
     ahead,
+    by_place,
     capitalized,
     effect_name,
     listed,
@@ -133,7 +132,7 @@ def _what(result: GapResult) -> str:
     certain = [v for v in result.verdicts if v.kind == "confirmed"]
     others = [v for v in result.verdicts if v.kind == "ambiguous"]
     moved = [verdict for verdict in result.verdicts if verdict.kind == "calibrated"]
-    words = _by_place([_briefly(verdict, result) for verdict in certain])
+    words = by_place([_briefly(verdict, result) for verdict in certain])
     beside = ""
     if moved and (moved[0].share.value > TRIFLE or not (certain or others)):
         words.append("parameters that are off within their tolerance")
@@ -145,7 +144,7 @@ def _what(result: GapResult) -> str:
     if len(others) == 1:
         doubtful = _with_rivals(others[0], result)
     else:
-        doubtful = "perhaps " + listed(_by_place([_briefly(v, result) for v in others]))
+        doubtful = "perhaps " + listed(by_place([_briefly(v, result) for v in others]))
     return (f"{sure} and {doubtful}" if sure else doubtful) + beside
 
 
@@ -165,15 +164,6 @@ def _with_rivals(verdict: Verdict, result: GapResult) -> str:
     if len(others) <= FEW_RIVALS:
         return f"{name} or {names_of(others)}"
     return f"{name} or one of {len(others)} others"
-
-
-def _by_place(names: Sequence[str]) -> list[str]:
-    """``friction at a`` and ``friction at b`` as ``friction at a and b``."""
-    places: dict[str, list[str]] = {}
-    for name in names:
-        what, _, place = name.partition(" at ")
-        places.setdefault(what, []).append(place)
-    return [f"{what} at {listed(found)}" if all(found) else what for what, found in places.items()]
 
 
 def _short(verdict: Verdict, result: GapResult) -> str:

@@ -69,6 +69,15 @@ def names_of(labels: Sequence[str], last: str = "or") -> str:
     return listed([effect_name(label) for label in labels], last)
 
 
+def by_place(names: Sequence[str]) -> list[str]:
+    """``friction at a`` and ``friction at b`` as ``friction at a and b``."""
+    places: dict[str, list[str]] = {}
+    for name in names:
+        what, _, place = name.partition(" at ")
+        places.setdefault(what, []).append(place)
+    return [f"{what} at {listed(found)}" if all(found) else what for what, found in places.items()]
+
+
 def found_once(findings: Iterable[tuple[Any, str]]) -> list[tuple[Any, str]]:
     """What was found in files, equal findings as one: of ``run.csv and 2 more``."""
     places: dict[Any, list[str]] = {}

@@ -293,3 +293,15 @@ def test_too_few_blocks_are_no_verdict_on_the_library(effects):
     assert not any("nothing of the library" in note for note in told)
     enough = notes(rest(0.6), result(*verdicts, effects=effects, blocks=20))
     assert any("nothing of the library explains it" in note for note in enough)
+
+
+@pytest.mark.parametrize(("hidden", "says"), [
+    (("delay@voltage",), "Delay at voltage."),
+    (("delay@voltage", "mass"), "Delay at voltage and mass."),
+    (("delay@u", "mass", "coulomb_friction@left_hip", "coulomb_friction@left_knee",
+      "coulomb_friction@x"),
+     "Delay at u; mass; Coulomb friction at left hip, left knee and x."),
+])  # fmt: skip
+def test_what_the_log_cannot_show_is_told_by_effect(hidden, says):
+    blind = Verdict("needs_data", "", "", {}, hidden, "", "never parsed", Span(0.0, 0.0, 0.0))
+    assert headline(blind, result(blind)) == says
