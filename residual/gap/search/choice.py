@@ -35,6 +35,8 @@ NEAR = 1.5
 #: Loss over that of another set from which on a fit is no match, and the part of all blocks that
 #: the other set may forecast worse.
 NO_MATCH, ASTRAY = 9.0, 0.25
+#: The same where one block alone says that the other set forecasts better.
+FITS_BETTER = 2.0
 #: Difference of the losses of sets that move exactly alike, as a share.
 ROUNDING = 1e-4
 #: Differences of relative errors below this are none, nor such below a part of the best error.
@@ -118,15 +120,38 @@ def no_match(search: Search, key: Key, other: Key) -> bool:
 
 
 def _fits_far_better(search: Search, key: Key, among: list[Key]) -> Key:
-    """The likeliest set of those that a set is no match for, if any, or the set."""
+    """The likeliest set of those that a set is no match for, if any, or the set.
+
+    Where one block alone makes its forecasts the better ones, less says that it is none: what lies
+    in one block, such as a single step, is foretold from data that do not hold it.
+    """
     own = search.currency.by_block(search.validated[key].squares).mean(axis=1)
 
     def seldom_behind(other: Key) -> bool:
         its = search.currency.by_block(search.validated[other].squares).mean(axis=1)
         return bool((its > own + SAME / len(own)).mean() <= ASTRAY)
 
-    far = [k for k in among if no_match(search, key, k) and seldom_behind(k)]
-    return min(far, key=lambda k: score(search, k), default=key)
+    def out(other: Key) -> bool:
+        return no_match(search, key, other) or _ahead_by_one_block(search, key, other)
+
+    far = [k for k in among if out(k) and seldom_behind(k)]
+    if not far:
+        return key
+    likeliest = min(far, key=lambda k: score(search, k))
+    least = score(search, likeliest) + search.fitter.tie(search.tried[()])
+    near = [k for k in far if score(search, k) <= least]
+    return _better_fit(search, near)
+
+
+def _ahead_by_one_block(search: Search, key: Key, other: Key) -> bool:
+    """Whether a set fits clearly worse than another with no more numbers, and forecasts better in
+    one block alone."""
+    losses = search.tried[key].merit, search.tried[other].merit
+    if search.numbers(other) > search.numbers(key) or losses[0] <= FITS_BETTER * losses[1]:
+        return False
+    own, its = (search.validated[k].squares for k in (key, other))
+    joints = range(len(search.currency.groups))
+    return all(search.currency.clearly(its, own, joint, True) <= 1.0 for joint in joints)
 
 
 def _better_fit(search: Search, keys: list[Key]) -> Key:

@@ -149,8 +149,22 @@ def test_what_leaves_a_third_of_all_data_wins_though_a_block_or_two_go_astray(as
     toy.validated[2,].squares[:astray] = toy.currency.nominal[:astray]
     assert toy.error((2,)) > 3 * toy.error((0,))
     assert choose(toy).key == key
-    toy.tried[2,].merit = 40.0
+    toy.tried[2,].merit = 200.0
     assert choose(toy).key == (0,)
+
+
+@pytest.mark.parametrize(("alone", "merit", "key"), [
+    (1, 40.0, (2,)), (3, 40.0, (0,)), (1, 120.0, (0,)),
+])  # fmt: skip
+def test_a_step_that_lies_in_one_block_is_judged_by_fits(alone, merit, key):
+    """Data without it do not tell what it shows, so that its forecast is luck."""
+    toy = Toy({(0,): 0.02, (2,): 0.02}, merits={(): 9e3, (0,): 220.0, (2,): merit}, blocks=8)
+    toy.validated[2,].squares[:alone] *= 9.0
+    toy.currency.nominal[:alone] *= 100.0
+    for one in toy.validated.values():
+        one.squares[:alone] *= 100.0
+    assert toy.error((2,)) > 1.5 * toy.error((0,))
+    assert choose(toy).key == key
 
 
 @pytest.mark.parametrize(("merit", "key"), [(20.5, (0, 3)), (25.0, (1, 3))])
