@@ -243,7 +243,8 @@ def sentence(label: str, result: GapResult) -> str:
     effect = known_effects(result).get(label)
     parameter = result.corrected.parameters.get(label)
     if parameter is not None:
-        meaning = f" ({parameter.meaning})" if parameter.meaning else ""
+        told = parameter.meaning and parameter.meaning != label.replace("_", " ")
+        meaning = f" ({parameter.meaning})" if told else ""
         return f"The parameter {label}{meaning} differs from what the simulator says."
     return effect.sentence if effect else ""
 
