@@ -115,7 +115,7 @@ def find_gap(
             )
             apart = judged_apart(answer, known.prepared, others, table)
         clock.lap("forecast")
-    other = other_length(horizon, table.horizon_s) if horizon else []
+    other = other_length(simulator, horizon, table.horizon_s) if horizon else []
     quality = [*log.findings, *log.left_out, *other, *on_hold, *on_more, *known.says]
     quality += inquiry.untried(answer)
     result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)

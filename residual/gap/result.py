@@ -144,7 +144,8 @@ class Gap:
 
     Attributes:
         channel: The channel that the main figures are about, and ``unit`` its unit.
-        horizon_s: Seconds that a forecast lasts, its lead-in included.
+        horizon_s: Seconds over which errors of forecasts are told: lead-ins included, but for
+            what strikes the ground, whose forecasts begin where a window ends.
         before, after: Of the nominal and of the corrected simulator.
         noise_floor: What the corrected simulator would reach on its own data plus noise.
         steps: From nominal to corrected, one effect at a time.

@@ -68,11 +68,9 @@ def gap(
         squares = search.validated[part].squares[:, main]
         steps.append(Step(search.candidates[number].label, span(squares)))
     blocks: Blocks = search.fitter.blocks
-    index = blocks.windows.index
-    spans = samples.times[index[:, -1]] - samples.times[index[:, 0]]
     share = search.currency.share(before.squares, after.squares, np.random.default_rng(0))
     return Gap(
-        name, by_channel[name].unit, float(np.median(spans)),
+        name, by_channel[name].unit, search.fitter.seconds,
         by_channel[name].before, by_channel[name].after, by_channel[name].noise_floor,
         tuple(steps), by_channel, *ratios,
         Span(*share) if key or search.beside else Span(0.0, 0.0, 0.0), len(blocks), blocks.folds,

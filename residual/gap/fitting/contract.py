@@ -66,7 +66,7 @@ class Foretold:
     """Forecasts over every window, started from a state fitted to its lead-in.
 
     Attributes:
-        squares: Mean squared error over the horizon, (W, m), in the channels' units squared.
+        squares: Mean squared error over ``Fitter.seconds``, (W, m), in the channels' units squared.
         half: The same over the first half of the horizon.
         shown: What was foretold, (W, L, m), lead-in included.
     """
@@ -107,6 +107,10 @@ class Fitter(Protocol):
     @property
     def sigma(self) -> Array:
         """Weight of every measured channel: an error of this size counts one, (m,)."""
+
+    @property
+    def seconds(self) -> float:
+        """Over how long errors of forecasts are told."""
 
     def halved(self) -> Fitter:
         """The same with half the integration step."""

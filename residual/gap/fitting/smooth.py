@@ -58,6 +58,12 @@ class SmoothFitter:
     turns: int = 8
     lead_part: float = LEAD
 
+    @property
+    def seconds(self) -> float:
+        """See ``Fitter.seconds``: whole windows, lead-ins included."""
+        index, times = self.blocks.windows.index, self.samples.times
+        return float(np.median(times[index[:, -1]] - times[index[:, 0]]))
+
     def with_substeps(self, count: int) -> SmoothFitter:
         """The same with so many integration steps between rows."""
         return dataclasses.replace(self, samples=dataclasses.replace(self.samples, substeps=count))

@@ -58,14 +58,15 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
     return float(max(min(wanted, most), least * step))
 
 
-def other_length(asked: float, seconds: float) -> list[str]:
+def other_length(simulator: HostSimulator, asked: float, seconds: float) -> list[str]:
     """What is to be said if forecasts are not as long as a user asked for.
 
     Args:
+        simulator: If it strikes the ground, lead-ins do not count.
         asked: Length asked for in s.
-        seconds: What they last, lead-in included, in s.
+        seconds: What they last in s.
     """
-    lead = asked * LEAD / (1 - LEAD)
+    lead = 0.0 if simulator.has_contacts else asked * LEAD / (1 - LEAD)
     if abs(seconds - lead - asked) <= NEARLY * asked:
         return []
     why = (
@@ -74,8 +75,8 @@ def other_length(asked: float, seconds: float) -> list[str]:
         else "records are too short for more, or motion is too unstable"
     )
     return [
-        f"a horizon of {asked:.3g} s was asked for, and forecasts last {seconds:.3g} s with their "
-        f"lead-in: {why}"
+        f"a horizon of {asked:.3g} s was asked for, and forecasts last {seconds:.3g} s"
+        f"{' with their lead-in' if lead else ''}: {why}"
     ]
 
 

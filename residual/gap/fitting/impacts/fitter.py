@@ -81,6 +81,11 @@ class ImpactFitter:
         """Weight of every measured channel, (m,)."""
         return self.data.sigma
 
+    @property
+    def seconds(self) -> float:
+        """See ``Fitter.seconds``: from the end of every window on."""
+        return self.horizon * self.samples.step
+
     def halved(self) -> ImpactFitter:
         """See ``Fitter.halved``."""
         samples = dataclasses.replace(self.samples, substeps=2 * self.samples.substeps)

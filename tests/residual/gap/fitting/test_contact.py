@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 from residual.gap import find_gap
 from residual.gap.fitting.impacts.quadratic import Quadratic, minimise
 from residual.gap.fitting.impacts.robust import losses
+from residual.gap.preparation.horizon import other_length, usual_horizon
 from residual.trajectories import Trajectory
 from sims.effects.parameter import ParameterChange
 from sims.leo import Leo, Walking
@@ -66,6 +67,10 @@ def test_a_short_struggle_names_the_heavier_torso():
     result = find_gap(Leo(), logs, effects=effects, minutes=20.0)
     found = {str(effect): effect.change for effect in result.effects}
     assert 0.94226 + found["torso_mass"] == pytest.approx(1.25, rel=0.1)
+    # What is told is how far forecasts go, not how long the windows are that they begin after.
+    told = result.gap.horizon_s
+    assert told == pytest.approx(usual_horizon(Leo(), logs), abs=0.5 * Leo().dt + 1e-9)
+    assert other_length(Leo(), told, told) == []
 
 
 @pytest.mark.long
