@@ -6,7 +6,7 @@ from residual.gap.confirmation.claim import Claim
 from residual.gap.result import Doubt
 
 DOUBTS: dict[Doubt, str] = {
-    "not_needed": "forecasts are not clearly worse without it",
+    "not_needed": "without it forecasts are not worse in enough blocks of data to be sure",
     "unsteady": "its size differs between parts of the data",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",

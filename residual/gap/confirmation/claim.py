@@ -9,6 +9,8 @@ from residual.gap.result import Meant, Number
 
 #: Part of an effect's share of the gap by which it may add to the gap where few blocks tell.
 HARDLY = 0.1
+#: Share of the gap below which it may not add to it at all.
+SMALL = 0.05
 
 
 def other_than(exact: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
@@ -98,4 +100,5 @@ class Claim:
     def gains(self) -> bool:
         """Whether it takes a part of the gap off, or hardly adds to it, whichever blocks of data
         are drawn."""
-        return self.share[1] >= -HARDLY * self.share[0]
+        value, low, _ = self.share
+        return low > 0 if value < SMALL else low >= -HARDLY * value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -21,6 +22,8 @@ SPELLINGS = 2
 STILL = 3
 #: Pairs that are tried in place of one effect with as many numbers.
 SPLITS = 2
+#: Pairs that are tried in place of two members.
+PAIRS = 3
 #: Effects that move as another one does in these data, tried beside it: under a constant input a
 #: gain is a load, a dead zone and dry friction, and none of them may lack for the others.
 ALIKE = 4
@@ -56,6 +59,31 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
         _add_plainer(search, key, gone)
         if len(search.candidates[gone].knobs) == 2:
             _add_split(search, rest, gone)
+
+
+def add_pairs_exchanged(search: Search, key: Key) -> None:
+    """Fit sets in which two members have been exchanged for the two that gain most together.
+
+    What takes nothing off alone, nor beside one member of a wrong set, may be right together: an
+    inflow that was forgotten hides that all outflows are too small.
+
+    Args:
+        search: What is tried goes there.
+        key: A fitted set.
+    """
+    pool = range(len(search.candidates))
+    screened = [n for n in pool if n < search.screened and len(search.candidates[n].knobs) == 1]
+    for two in itertools.combinations(key, 2):
+        rest, theta = search.merged(key, (), drop=two)
+        search.add({rest: theta})
+        if search.late or rest not in search.tried:
+            return
+        around = search.signatures(rest)
+        without = [n for n in pool if n in rest or n not in screened]
+        for pair in pair_gains(around, PAIRS, without=without):
+            numbers = [around.variants[v].candidate for v in pair.variants]
+            fresh, theta = search.merged(rest, zip(numbers, pair.values, strict=True))
+            search.add({fresh: theta} if search.fits_in(fresh) else {})
 
 
 def _rivals(search: Search, key: Key, gone: int, most: int) -> list[tuple[int, Array]]:

@@ -17,7 +17,7 @@ from residual.gap.preparation.effort import Effort
 from residual.gap.search.beam import extend, improves, run
 from residual.gap.search.choice import Choice, choose, reasons
 from residual.gap.search.continuation import add_handed_over
-from residual.gap.search.exchange import add_exchanged
+from residual.gap.search.exchange import add_exchanged, add_pairs_exchanged
 from residual.gap.search.redundant import curves_in_place
 from residual.gap.search.sets import Key, Proposals, Search, Twins
 from residual.gap.search.significance import score, significant
@@ -185,6 +185,7 @@ def settle(search: Search, floor: Noise) -> Explanation:
             extend(search, search.best())
         if not (search.simulator.has_contacts or search.late):
             add_handed_over(search, key)
+            add_pairs_exchanged(search, () if quiet else key)
         if len(search.tried) == before or search.late:
             break
         if not quiet and choose(search, enough).key == key:

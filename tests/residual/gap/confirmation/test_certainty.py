@@ -193,6 +193,14 @@ def test_only_what_leaves_no_doubt_is_confirmed():
     assert (alike.kind, alike.alternatives) == ("ambiguous", ("constant_load@pivot",))
 
 
+@pytest.mark.parametrize(("share", "kind"), [
+    ((0.5, -0.02, 0.9), "confirmed"), ((0.5, -0.06, 0.9), "ambiguous"),
+    ((0.02, -0.0003, 0.05), "ambiguous"), ((0.02, 0.001, 0.05), "confirmed"),
+])  # fmt: skip
+def test_what_takes_little_off_has_to_do_so_whichever_blocks_are_drawn(share, kind):
+    assert effect_verdict(Toy({(0,): 0.3}), claim(share=share), 20).kind == kind
+
+
 @pytest.mark.parametrize(("blocks", "left", "kind"), [
     (6, 4.0, "ambiguous"), (6, 1.5, "confirmed"), (20, 4.0, "confirmed"),
 ])  # fmt: skip
