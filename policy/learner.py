@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import inspect
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,6 +20,8 @@ from policy.replay import Seen
 from policy.scaling import Scaling
 
 OURS = "policy.DDPG"
+# What the loop gives itself.
+_GIVEN = ("env", "seed", "self")
 
 
 class Learner(Protocol):
@@ -83,7 +86,12 @@ class Algorithm:
     def __post_init__(self) -> None:
         if self.path == OURS and self.options:
             raise ValueError(f"the options of {OURS} are those of ddpg, not {dict(self.options)}")
-        self.kind()
+        known = inspect.signature(self.kind()).parameters
+        if unknown := [name for name in self.options if name not in known]:
+            raise ValueError(
+                f"{self.path} has no option {', '.join(unknown)}, it has "
+                f"{', '.join(name for name in known if name not in _GIVEN)}"
+            )
 
     def kind(self) -> type[Any]:
         """The class."""

@@ -267,6 +267,10 @@ def _joint(rate: Channel, channels: Sequence[Channel]) -> Joint:
     """The joint of a rate channel, called after its position."""
     position = next((c for c in channels if c.name == rate.rate_of), None)
     if position is None:
-        raise ValueError(f"channel {rate.name!r} needs rate_of=, the name of its position")
+        names = ", ".join(repr(c.name) for c in channels if c.kind == "position")
+        raise ValueError(
+            f"channel {rate.name!r} has rate_of={rate.rate_of!r}, expected the name of its "
+            f"position, one of {names or 'none that is declared'}"
+        )
     turns = position.angle or position.unit in ("rad", "deg", "rev")
     return Joint(position.name, position.name, rate.name, "N m" if turns else "N")

@@ -134,10 +134,15 @@ class HostSimulator(Simulator):
         return changed
 
     def with_parameters(self, **values: float | Array) -> Self:
-        """A copy with some parameters changed; ``KeyError`` names an unknown one."""
+        """A copy with some parameters changed.
+
+        Raises:
+            ValueError: There is no such parameter.
+        """
         unknown = ", ".join(sorted(set(values) - set(self.parameters)))
         if unknown:
-            raise KeyError(f"no parameter {unknown}; there are {', '.join(self.parameters)}")
+            there = ", ".join(self.parameters) or "none"
+            raise ValueError(f"{self.name} has no parameter {unknown}, it has {there}")
         changed = copy.copy(self)
         changed.parameters = {
             name: dataclasses.replace(parameter, value=values.get(name, parameter.value))

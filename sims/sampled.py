@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from typing import Any
 
@@ -63,10 +64,14 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             names = ", ".join(
                 f"{c.name} from {c.low:g} to {c.high:g} {c.unit}" for c in nominal.action_channels
             )
+            mend = "wrap the environment (gymnasium.wrappers.RescaleAction) or change the channels"
+            if not isinstance(box, gymnasium.spaces.Box):
+                mend = "policies act in a Box, so wrap it in one that takes continuous actions"
             raise Unsound(
-                f"the true environment's actions are {box}, those of {nominal.name} {names}: wrap "
-                "the environment (gymnasium.wrappers.RescaleAction) or change the channels"
+                f"the true environment's actions are {box}, those of {nominal.name} {names}: {mend}"
             )
+        _refuse_early_end(env, task)
+        _refuse_calls(env, state_of)
         period = getattr(env.unwrapped, "dt", None)
         number = isinstance(period, int | float | np.number) and not isinstance(period, bool)
         if number and not np.isclose(period, nominal.dt):  # type: ignore[arg-type]
@@ -85,7 +90,13 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin an episode where the environment begins it."""
         super().reset(seed=seed)
-        observation, info = self.env.reset(seed=seed, options=options)
+        begun = self.env.reset(seed=seed, options=options)
+        if not isinstance(begun, tuple) or len(begun) != 2:
+            raise Unsound(
+                f"{self._name}: reset returned {type(begun).__name__}, expected Gymnasium's two: "
+                "observation, info"
+            )
+        observation, info = begun
         self._steps = 0
         start = self._read(observation, info)
         turned = self._usual_start + wrap(start - self._usual_start)
@@ -145,6 +156,36 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             )
         refuse_not_finite(self._name, channels, state, self._steps)
         return state
+
+
+def _refuse_early_end(env: gymnasium.Env[Any, Any], task: Task) -> None:
+    """Refuse a time limit below the task's horizon: returns of both would not compare."""
+    limit = env.spec.max_episode_steps if env.spec is not None else None
+    if limit is not None and limit < task.horizon:
+        raise Unsound(
+            f"the true environment ends episodes after {limit} steps, the task after "
+            f"{task.horizon}: give gymnasium.make(..., max_episode_steps={task.horizon}), or the "
+            f"task horizon={limit}"
+        )
+
+
+def _refuse_calls(env: gymnasium.Env[Any, Any], state_of: StateOf | None) -> None:
+    """Refuse functions that cannot be called as they will be."""
+    calls: list[tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any], str]] = [
+        (env.unwrapped.reset, (), {"seed": 0, "options": None}, "reset(seed=, options=)")
+    ]
+    if state_of is not None:
+        calls.append((state_of, (env, None), {}, "state_of(env, observation)"))
+    for function, given, named, such_as in calls:
+        try:
+            inspect.signature(function).bind(*given, **named)
+        except TypeError as error:
+            raise Unsound(
+                f"the true environment cannot be asked for {such_as}: {error}; give its function "
+                "these arguments"
+            ) from None
+        except ValueError:  # Written in C: it says nothing of its arguments.
+            continue
 
 
 def _middle(task: Task, width: int) -> Array:

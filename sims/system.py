@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -21,6 +22,8 @@ from sims.unsound import Unsound
 
 # Up to so many state channels are reported one by one, more by their kind.
 _FEW = 6
+# Of a protocol, what may be left out.
+_MAY_BE_NONE = ("noisy", "final_episodes")
 #: Starts of a test on the true system where they differ.
 USUAL_STARTS = 5
 
@@ -59,6 +62,18 @@ class EvaluationProtocol:
     visited_seconds: float = 2.0
     visited_rollouts: int = 5
     visited_stride: int = 1
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value, least = getattr(self, field.name), 0 if field.name in _MAY_BE_NONE else 1
+            if field.name == "visited_seconds" or (value is None and field.default is None):
+                continue
+            whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+            if not whole or value < least:
+                raise ValueError(
+                    f"EvaluationProtocol: {field.name} is {value!r}, expected a whole number from "
+                    f"{least}"
+                )
 
     def __repr__(self) -> str:
         # What is as by default tells nothing.
@@ -120,13 +135,15 @@ class System:
     def __post_init__(self) -> None:
         if not isinstance(self.nominal, Simulator):
             raise ValueError(
-                f"system {self.name}: nominal is a {type(self.nominal).__name__}, expected a "
-                "Simulator: subclass sims.EquationOfMotion or sims.Simulator"
+                f"system {self.name}: nominal is {_kind(self.nominal)}, expected a Simulator: "
+                "an object of a subclass of sims.EquationOfMotion or sims.Simulator"
             )
+        if not isinstance(self.true, Simulator | gymnasium.Env):
+            _refuse_no_maker(self.true, f"system {self.name}: true")
         if not isinstance(self.task, Task):
             raise ValueError(
-                f"system {self.name}: task is a {type(self.task).__name__}, expected a Task: "
-                "derive its class from sims.Task"
+                f"system {self.name}: task is {_kind(self.task)}, expected a Task: an object of a "
+                "class derived from sims.Task"
             )
         if isinstance(self.true, Simulator):
             check_same_channels(self.nominal, self.true, f"system {self.name}: the true system")
@@ -160,6 +177,11 @@ class System:
         true = self.true
         if not isinstance(true, Simulator | gymnasium.Env):
             true = true()
+            if not isinstance(true, Simulator | gymnasium.Env):
+                raise ValueError(
+                    f"system {self.name}: the function true returned {_kind(true)}, expected a "
+                    "Simulator or a Gymnasium environment, such as gymnasium.make(...)"
+                )
         if isinstance(true, Simulator):
             check_same_channels(self.nominal, true, f"system {self.name}: the true system")
             env: gymnasium.Env[Any, Any] = SimulatorEnv(seen_as(self.nominal, true), self.task)
@@ -246,3 +268,30 @@ class System:
             "best": self.best,
             "published": dict(self.published),
         }
+
+
+def _kind(given: Any) -> str:
+    """What somebody gave, in words."""
+    if isinstance(given, type):
+        return f"the class {given.__name__}, not an object of it ({given.__name__}(...))"
+    if isinstance(given, str | int | float):
+        return f"{given!r:.40} ({type(given).__name__})"
+    return f"a {type(given).__name__}"
+
+
+def _refuse_no_maker(true: Any, what: str) -> None:
+    """Refuse what is no function without arguments."""
+    if not callable(true):
+        raise ValueError(
+            f"{what} is {_kind(true)}, expected a Simulator, a Gymnasium environment, or a "
+            "function that makes either"
+        )
+    try:
+        inspect.signature(true).bind()
+    except TypeError as error:
+        raise ValueError(
+            f"{what} cannot be called without arguments ({error}): give a function that makes the "
+            "true system, such as lambda: gymnasium.make(...)"
+        ) from None
+    except ValueError:  # Written in C: it says nothing of its arguments.
+        return

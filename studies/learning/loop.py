@@ -22,6 +22,7 @@ import numpy as np
 from sklearn.base import BaseEstimator
 
 from policy.config import DDPGConfig
+from policy.ddpg import DDPG
 from policy.learner import OURS, Algorithm
 from sims.simulator import Simulator
 from sims.system import EvaluationProtocol, System
@@ -137,6 +138,8 @@ def learn_by_difference(
         raise TypeError(f"seed is {seed!r}, expected a whole number from 0, such as seed=0")
     from residual.gaussian_process import GaussianProcess
 
+    if ddpg is not None and learner != OURS and learner is not DDPG:
+        raise ValueError("ddpg has settings of policy.DDPG, but another learner is given")
     path = learner if isinstance(learner, str) else f"{learner.__module__}.{learner.__qualname__}"
     system = System(
         name, nominal, true, task, evaluation or EvaluationProtocol(), state_of=state_of

@@ -69,7 +69,11 @@ class Learnt:
         seen = {"iteration": update, "true_samples": samples}
         self.add_policy("difference", policy, **seen)
         self.models.append(model.difference)
-        self.accuracy.append({**seen, **measured.accuracy, "fit_seconds": model.fit_seconds})
+        learnt: dict[str, Any] = {"fit_seconds": model.fit_seconds}
+        # What an estimator that can say what it learnt says, as NamedEffects does.
+        if says := getattr(model.difference.fitted(), "says_", ""):
+            learnt["says"] = str(says)
+        self.accuracy.append({**seen, **measured.accuracy, **learnt})
 
     def add_on_truth(self, name: str, training: Training, within: int) -> None:
         """Record a policy learnt on the true system, as if it had ended after so many samples."""

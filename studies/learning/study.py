@@ -114,6 +114,14 @@ class Study:
                 "smoothing is false, but measure.unmeasured leaves no state to take differences of"
             )
         system = dataclasses.replace(system, measurement=trial.measure)
+        usual = self.trial()
+        if trial.learner != OURS and trial.ddpg != usual.ddpg:
+            raise ValueError(
+                f"ddpg has settings of {OURS}, but {trial.learner} learns: give its own as "
+                "learner_options"
+            )
+        if trial.seed < 0:
+            raise ValueError(f"seed is {trial.seed}, expected a whole number from 0")
         trial.budget.check(trial.algorithm, trial.replay == "all", trial.corrected is not None)
         if trial.corrected is not None:
             # Delay, lag and play have a memory, which is more state than the nominal one has.

@@ -25,6 +25,7 @@ from studies.learnt.sections import (
     legend,
     policies_once,
     policies_section,
+    says_section,
     summarise,
 )
 from studies.learnt.tables import apart, tables_of
@@ -90,6 +91,7 @@ def write_report(
     sections += [
         policies_section(summary, once, about),
         *accuracy_section(errors, about),
+        *says_section(results),
         *samples_section(once, apart(results), about),
         *_provenance(results),
     ]
@@ -103,7 +105,9 @@ def write_report(
     # What others published makes lines too long for a terminal.
     told = summary.drop(columns="published", errors="ignore")
     table = told.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
-    return "\n".join([table, "", *legend(summary, once)])
+    single = says_section(results) if len(results) == 1 else []
+    says = [f"{row[0]}: {row[-1]}" for part in single for row in part.rows]
+    return "\n".join([table, "", *legend(summary, once), *(["", *says] if says else [])])
 
 
 def _before_and_after(results: Results, films: Mapping[str, Path]) -> list[Section]:

@@ -110,6 +110,19 @@ def policies_section(summary: pd.DataFrame, once: pd.DataFrame, about: About) ->
     return Table.of(summary, heading="Policies", caption=caption, digits=2)
 
 
+def says_section(results: Sequence[Mapping[str, Any]]) -> list[Table]:
+    """What estimators say of what they learnt, one row for each update of each trial."""
+    rows = [
+        [f"{trial.get('label', 'model')}, update {record['iteration']}", record["true_samples"],
+         trial.get("seed", 0), record["says"]]
+        for trial in results
+        for record in trial["accuracy"]
+        if "says" in record
+    ]  # fmt: skip
+    columns = ["model", "true samples", "seed", "what it learnt"]
+    return [Table(columns, rows, heading="What the difference model says")] if rows else []
+
+
 def accuracy_section(errors: pd.DataFrame, about: About) -> list[Section]:
     """One-step and multi-step error, by estimator, samples, place and group of channels."""
     if errors.empty:

@@ -94,6 +94,12 @@ def test_options_of_another_algorithm_are_not_ddpgs():
         Algorithm(options={"gamma": 0.9})
 
 
+def test_an_option_that_an_algorithm_does_not_have_is_named():
+    with pytest.raises(ValueError, match=r"has no option learning_rat, it has .*learning_rate"):
+        Algorithm("stable_baselines3.SAC", options={"learning_rat": 0.1})
+    assert Algorithm("stable_baselines3.SAC", options={"learning_rate": 0.1}).options
+
+
 class Predicts:
     def predict(self, observation, deterministic=False):
         assert deterministic

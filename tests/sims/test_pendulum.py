@@ -122,7 +122,7 @@ def test_parameters_may_differ_by_row():
 
 
 def test_an_unknown_parameter_is_named():
-    with pytest.raises(KeyError, match=r"weight.*mass"):
+    with pytest.raises(ValueError, match=r"no parameter weight, it has .*mass"):
         Pendulum().with_parameters(weight=1.0)
 
 

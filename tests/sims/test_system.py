@@ -10,7 +10,7 @@ from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.sampled import SampledEnv
 from sims.simulator import Channel, wrap
-from sims.system import System
+from sims.system import EvaluationProtocol, System
 from sims.tasks import SwingUp, Task
 
 
@@ -286,3 +286,66 @@ def test_a_parameter_for_each_row_is_tried_and_the_remedy_named():
 
     with pytest.raises(ValueError, match=r"gives other numbers.*np.stack"):
         System("mine", Averaged(), PendulumEquation(), SwingUp()).check()
+
+
+class Seedless(Foreign):
+    def reset(self):
+        return super().reset()
+
+
+class OldReset(Foreign):
+    def reset(self, seed=None, options=None):
+        return super().reset(seed)[0]
+
+
+class Choices(Foreign):
+    action_space = gymnasium.spaces.Discrete(3)
+
+
+@pytest.mark.parametrize(("made", "says"), [
+    (Seedless, "reset(seed=, options=)"),
+    (OldReset, "reset returned ndarray, expected Gymnasium's two"),
+    (Choices, "policies act in a Box"),
+    (lambda: "Pendulum-v1", "returned 'Pendulum-v1' (str), expected a Simulator or a Gymnasium"),
+    (lambda: gymnasium.make("Pendulum-v1", max_episode_steps=20), "ends episodes after 20 steps"),
+])  # fmt: skip
+def test_what_a_true_environment_gets_wrong_is_its_own_line(made, says):
+    task = SwingUp(horizon=50)
+    nominal = Pendulum()
+    if says.startswith("ends"):
+        nominal = PendulumEquation()
+        nominal.action_channels = (Channel("voltage", "V", "input", low=-2.0, high=2.0),)
+    system = System("odd", nominal, made, task)
+    with pytest.raises(ValueError) as error:
+        system.true_environment().reset(seed=0)
+    assert says in str(error.value)
+
+
+def test_a_reader_of_states_takes_two_arguments():
+    with pytest.raises(ValueError, match=r"state_of\(env, observation\)"):
+        SampledEnv(Foreign(False), Pendulum(), SwingUp(), lambda observation: observation)
+
+
+@pytest.mark.parametrize(("true", "says"), [
+    (3, "true is 3 (int), expected a Simulator"),
+    (lambda seed: Foreign(), "true cannot be called without arguments"),
+])  # fmt: skip
+def test_what_makes_no_true_system_is_refused_at_once(true, says):
+    with pytest.raises(ValueError) as error:
+        System("odd", Pendulum(), true, SwingUp())
+    assert says in str(error.value)
+
+
+def test_a_class_in_place_of_an_object_is_told():
+    with pytest.raises(ValueError, match="nominal is the class Pendulum, not an object of it"):
+        System("odd", Pendulum, Foreign, SwingUp())
+
+
+@pytest.mark.parametrize("wrong", [
+    {"every": 0}, {"true_episodes": 0}, {"episodes": 1.5}, {"noisy": -1}, {"finalists": True},
+])  # fmt: skip
+def test_a_protocol_that_tests_nothing_is_refused(wrong):
+    (name,) = wrong
+    with pytest.raises(ValueError, match=f"EvaluationProtocol: {name} is .*expected a whole"):
+        EvaluationProtocol(**wrong)
+    assert EvaluationProtocol(noisy=0, true_episodes=None).noisy == 0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from policy import Algorithm, DDPGConfig
-from residual import Linear
+from residual import Linear, NamedEffects
 from sims import Channel, FirstOrderSystem, Parameter
 from sims.effects import ActuatorLag
 from sims.environment import SimulatorEnv
@@ -229,6 +229,23 @@ def test_the_python_call_is_the_loop(tmp_path):
     assert found.plot().axes
     page = found.report(tmp_path / "page.html")
     assert page == tmp_path / "page.html" and "closing the simulation gap" in page.read_text()
+
+
+def test_what_named_effects_named_is_told(tmp_path):
+    found = learn_by_difference(
+        SYSTEM.nominal, SYSTEM.true, SYSTEM.task, estimator=NamedEffects(), samples=90, updates=1,
+        steps=120, ddpg=DDPG, evaluation=SYSTEM.evaluation, progress=Silent(),
+    )  # fmt: skip
+    (record,) = found.accuracy
+    assert record["says"] == found.model.fitted().says_ and "mass" in record["says"]
+    assert record["says"] in found.report(tmp_path / "page.html").read_text()
+
+
+def test_settings_of_another_learner_are_not_taken_in_silence():
+    with pytest.raises(ValueError, match=r"ddpg has settings of policy\.DDPG"):
+        learn_by_difference(
+            SYSTEM.nominal, SYSTEM.true, SYSTEM.task, learner="stable_baselines3.SAC", ddpg=DDPG
+        )
 
 
 @pytest.mark.parametrize(

@@ -178,6 +178,8 @@ def test_an_estimator_of_ones_own_needs_no_registration(tmp_path, monkeypatch):
         (["--budget.true_samples", "-5"], "true_samples"),
         (["--ddpg.gamma", "1.5"], "gamma"),
         (["--seed", "x"], "seed"),
+        (["--seed", "-1"], "seed is -1"),
+        (["--learner", "stable_baselines3.SAC", "--ddpg.gamma", "0.5"], "learner_options"),
         (["--config", "absent.yaml"], "absent.yaml"),
         (["--nonsense"], "nonsense"),
     ],
