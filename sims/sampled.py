@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike
 from sims.environment import observe
 from sims.simulator import Array, Simulator, wrap
 from sims.tasks import Task
-from sims.unsound import Unsound, refuse_not_finite
+from sims.unsound import Unsound, cannot_call, refuse_not_finite
 
 #: Reads the state, shape (n_s,), from the environment and its last observation.
 StateOf = Callable[[Any, Any], ArrayLike]
@@ -177,15 +176,11 @@ def _refuse_calls(env: gymnasium.Env[Any, Any], state_of: StateOf | None) -> Non
     if state_of is not None:
         calls.append((state_of, (env, None), {}, "state_of(env, observation)"))
     for function, given, named, such_as in calls:
-        try:
-            inspect.signature(function).bind(*given, **named)
-        except TypeError as error:
+        if why := cannot_call(function, *given, **named):
             raise Unsound(
-                f"the true environment cannot be asked for {such_as}: {error}; give its function "
+                f"the true environment cannot be asked for {such_as}: {why}; give its function "
                 "these arguments"
-            ) from None
-        except ValueError:  # Written in C: it says nothing of its arguments.
-            continue
+            )
 
 
 def _middle(task: Task, width: int) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -18,7 +17,7 @@ from sims.sampled import SampledEnv, StateOf
 from sims.simulator import Array, Simulator, physical
 from sims.task_contract import refuse_unsound_task
 from sims.tasks import Task
-from sims.unsound import Unsound
+from sims.unsound import Unsound, cannot_call
 
 # Up to so many state channels are reported one by one, more by their kind.
 _FEW = 6
@@ -286,12 +285,8 @@ def _refuse_no_maker(true: Any, what: str) -> None:
             f"{what} is {_kind(true)}, expected a Simulator, a Gymnasium environment, or a "
             "function that makes either"
         )
-    try:
-        inspect.signature(true).bind()
-    except TypeError as error:
+    if why := cannot_call(true):
         raise ValueError(
-            f"{what} cannot be called without arguments ({error}): give a function that makes the "
+            f"{what} cannot be called without arguments ({why}): give a function that makes the "
             "true system, such as lambda: gymnasium.make(...)"
-        ) from None
-    except ValueError:  # Written in C: it says nothing of its arguments.
-        return
+        )

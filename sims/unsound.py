@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+from collections.abc import Callable
+from typing import Any
 
 from sims.simulator import Array, Channel
 
 
 class Unsound(ValueError):
     """A simulator, an environment or a task that breaks its contract; the user can mend it."""
+
+
+def cannot_call(function: Callable[..., Any], *given: Any, **named: Any) -> str:
+    """Why a function cannot be called with some arguments, empty if it can."""
+    try:
+        inspect.signature(function).bind(*given, **named)
+    except TypeError as error:
+        return str(error)
+    except ValueError:  # Written in C: it says nothing of its arguments.
+        return ""
+    return ""
 
 
 def refuse_not_finite(
