@@ -21,7 +21,7 @@ from policy.scaling import Scaling
 
 OURS = "policy.DDPG"
 # What the loop gives itself.
-_GIVEN = ("env", "seed", "self")
+_GIVEN = ("env", "seed")
 
 
 class Learner(Protocol):

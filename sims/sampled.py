@@ -70,7 +70,9 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 f"the true environment's actions are {box}, those of {nominal.name} {names}: {mend}"
             )
         _refuse_early_end(env, task)
-        _refuse_calls(env, state_of)
+        _refuse_call(env.unwrapped.reset, "reset(seed=, options=)", seed=0, options=None)
+        if state_of is not None:
+            _refuse_call(state_of, "state_of(env, observation)", env, None)
         period = getattr(env.unwrapped, "dt", None)
         number = isinstance(period, int | float | np.number) and not isinstance(period, bool)
         if number and not np.isclose(period, nominal.dt):  # type: ignore[arg-type]
@@ -168,19 +170,13 @@ def _refuse_early_end(env: gymnasium.Env[Any, Any], task: Task) -> None:
         )
 
 
-def _refuse_calls(env: gymnasium.Env[Any, Any], state_of: StateOf | None) -> None:
-    """Refuse functions that cannot be called as they will be."""
-    calls: list[tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any], str]] = [
-        (env.unwrapped.reset, (), {"seed": 0, "options": None}, "reset(seed=, options=)")
-    ]
-    if state_of is not None:
-        calls.append((state_of, (env, None), {}, "state_of(env, observation)"))
-    for function, given, named, such_as in calls:
-        if why := cannot_call(function, *given, **named):
-            raise Unsound(
-                f"the true environment cannot be asked for {such_as}: {why}; give its function "
-                "these arguments"
-            )
+def _refuse_call(function: Callable[..., Any], such_as: str, *given: Any, **named: Any) -> None:
+    """Refuse a function that cannot be called as it will be."""
+    if why := cannot_call(function, *given, **named):
+        raise Unsound(
+            f"the true environment cannot be asked for {such_as}: {why}; give its function "
+            "these arguments"
+        )
 
 
 def _middle(task: Task, width: int) -> Array:

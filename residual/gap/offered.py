@@ -51,7 +51,8 @@ class Offered:
         """
         offered = chosen_effects(log.simulator, [LIBRARY] if effects is None else list(effects))
         # Those by name have no range yet: the log gives it.
-        asked = [e for e in offered if isinstance(e, Curve) and e in curves_in(log.simulator)]
+        without_range = curves_in(log.simulator)
+        asked = [e for e in offered if isinstance(e, Curve) and e in without_range]
         if asked and log.simulator.has_contacts:
             raise ValueError(
                 f"{asked[0]} is not looked for in what strikes the ground: leave it out of effects"

@@ -22,7 +22,6 @@ import numpy as np
 from sklearn.base import BaseEstimator
 
 from policy.config import DDPGConfig
-from policy.ddpg import DDPG
 from policy.learner import OURS, Algorithm
 from sims.simulator import Simulator
 from sims.system import EvaluationProtocol, System
@@ -138,13 +137,13 @@ def learn_by_difference(
         raise TypeError(f"seed is {seed!r}, expected a whole number from 0, such as seed=0")
     from residual.gaussian_process import GaussianProcess
 
-    if ddpg is not None and learner != OURS and learner is not DDPG:
-        raise ValueError("ddpg has settings of policy.DDPG, but another learner is given")
     path = learner if isinstance(learner, str) else f"{learner.__module__}.{learner.__qualname__}"
     system = System(
         name, nominal, true, task, evaluation or EvaluationProtocol(), state_of=state_of
     )
     algorithm = Algorithm(path, ddpg or DDPGConfig(), learner_options or {})
+    if ddpg is not None and path != OURS:
+        raise ValueError(f"ddpg has settings of {OURS}, but another learner is given")
     budget = budget or Budget(samples, updates, steps, steps)
     budget.check(algorithm, replay == "all")
     system.check()

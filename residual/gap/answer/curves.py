@@ -74,13 +74,13 @@ def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
     # A simulator's own damping moves like friction at its joint.
     alike = [one.effect for number in key for one in search.twins_of(number)]
     named = [search.candidates[number].effect for number in key]
-    found: list[Curve] = []
+    found = []
     for curve in curves:
         if named and not any(_of_its_kind(curve, effect) for effect in (*named, *alike)):
             continue
         low, high = _values(curve, fitter, search.simulator)
-        if not _counts_turns(curve, search.simulator, high - low):
-            found += over_the_log(curve, fitter, search.simulator)
+        if high > low and not _counts_turns(curve, search.simulator, high - low):
+            found.append(curve.suited_to(low, high))
     return found
 
 

@@ -71,19 +71,12 @@ def add_pairs_exchanged(search: Search, key: Key) -> None:
         search: What is tried goes there.
         key: A fitted set.
     """
-    pool = range(len(search.candidates))
-    screened = [n for n in pool if n < search.screened and len(search.candidates[n].knobs) == 1]
     for two in itertools.combinations(key, 2):
         rest, theta = search.merged(key, (), drop=two)
         search.add({rest: theta})
-        if search.late or rest not in search.tried:
+        if search.late:
             return
-        around = search.signatures(rest)
-        without = [n for n in pool if n in rest or n not in screened]
-        for pair in pair_gains(around, PAIRS, without=without):
-            numbers = [around.variants[v].candidate for v in pair.variants]
-            fresh, theta = search.merged(rest, zip(numbers, pair.values, strict=True))
-            search.add({fresh: theta} if search.fits_in(fresh) else {})
+        _add_pairs(search, rest, PAIRS)
 
 
 def _rivals(search: Search, key: Key, gone: int, most: int) -> list[tuple[int, Array]]:
@@ -134,9 +127,14 @@ def _add_plainer(search: Search, key: Key, gone: int) -> None:
 
 def _add_split(search: Search, rest: Key, gone: int) -> None:
     """Fit sets in which two effects of one number each stand for one of two."""
+    _add_pairs(search, rest, SPLITS, gone)
+
+
+def _add_pairs(search: Search, rest: Key, most: int, *without: int) -> None:
+    """Fit a set with each of the pairs of effects of one number that gain most beside it."""
     around = search.signatures(rest)
     larger = [n for n, one in enumerate(search.candidates) if len(one.knobs) != 1]
-    for pair in pair_gains(around, SPLITS, without=[*larger, *rest, gone]):
+    for pair in pair_gains(around, most, without=[*larger, *rest, *without]):
         numbers = [around.variants[v].candidate for v in pair.variants]
         fresh, theta = search.merged(rest, zip(numbers, pair.values, strict=True))
         search.add({fresh: theta} if search.fits_in(fresh) else {})

@@ -114,7 +114,8 @@ def explain(
             alone = noise_floor(fitter, search.nominal, floor.sigma)
             search.currency = search.currency.only_where_wrong(alone)
         if not seeds:
-            search.add(carried(earlier, search) if earlier is not None else {})
+            if earlier is not None:
+                search.add(carried(earlier, search))
             search.add(curves_in_place(search, near_best(search)))
         run(search, seeds, functools.partial(_quiet, search, floor))
         key = choose(search).key
@@ -185,7 +186,8 @@ def settle(search: Search, floor: Noise) -> Explanation:
             extend(search, search.best())
         if not (search.simulator.has_contacts or search.late):
             add_handed_over(search, key)
-            add_pairs_exchanged(search, () if quiet else key)
+            if not quiet:
+                add_pairs_exchanged(search, key)
         if len(search.tried) == before or search.late:
             break
         if not quiet and choose(search, enough).key == key:
