@@ -7,6 +7,7 @@ start states and effects already chosen can imitate is projected out.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,6 +18,14 @@ from residual.gap.fitting.intervals import at_bound
 from residual.gap.model.candidates import Candidate, Trial
 
 Array = NDArray[np.float64]
+
+#: Part of what a pair leaves that a third effect has to take off for the three to be tried at once.
+TOGETHER = 0.2
+#: What a triple leaves over that of the best one, up to which it is tried, too: sizes are such that
+#: the linear picture is a rough one.
+MATCH = 2.0
+#: The pairs of a triple.
+_SIDES = ([0, 1], [0, 2], [1, 2])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -211,3 +220,55 @@ def pair_gains(
             starts = (first.start(c[:k]), second.start(c[k:]))
             out.append(Gain((i, j), value, starts))
     return sorted(out, key=lambda g: -g.value)[:top]
+
+
+def triple_gains(found: Signatures, top: int, without: Sequence[int] = ()) -> list[Gain]:
+    """Linear gain of three effects of one number each that help most together, best first.
+
+    A triple counts if it leaves clearly less than each of the pairs in it: any third effect beside
+    a good pair gains a trifle; and not much more than the best triple does. One with a coefficient
+    of a forbidden sign is a pair, and left out.
+
+    Args:
+        found: Signatures.
+        top: How many triples are returned at the most.
+        without: Candidates that take no part.
+    """
+    ones = [
+        number
+        for number, variant in enumerate(found.variants)
+        if len(variant.columns) == 1 and variant.candidate not in without
+    ]
+    columns = [found.variants[number].columns[0] for number in ones]
+    own = np.array([found.variants[number].candidate for number in ones], dtype=int)
+    one_sided = np.array([found.variants[n].trial.one_sided[0] for n in ones], dtype=bool)
+    matrix = found.matrix[:, columns]
+    size = np.maximum(np.sqrt(np.einsum("rc,rc->c", matrix, matrix)), 1e-150)
+    gram = matrix.T @ matrix / np.outer(size, size) + 1e-9 * np.eye(len(ones))
+    right = matrix.T @ found.residual / size
+    triples = np.array(list(itertools.combinations(range(len(ones)), 3)), dtype=int).reshape(-1, 3)
+    differ = [own[triples[:, i]] != own[triples[:, j]] for i, j in _SIDES]
+    triples = triples[np.logical_and.reduce(differ)]
+    value, c = _solved(gram, right, triples)
+    allowed = ~(one_sided[triples] & (c < 0)).any(axis=1)
+    pairs = np.max([_solved(gram, right, triples[:, side])[0] for side in _SIDES], axis=0)
+    left = float(found.residual @ found.residual)
+    together = left - value < (1 - TOGETHER) * (left - pairs)
+    rows = np.flatnonzero(allowed & together)
+    best = rows[np.argsort(-value[rows], kind="stable")][:top]
+    best = best[left - value[best] <= MATCH * np.maximum(left - value[best[:1]], 1e-9 * left)]
+    out = []
+    for row in best:
+        variants = tuple(ones[place] for place in triples[row])
+        sizes = c[row] / size[triples[row]]
+        starts = [found.variants[v].start(sizes[i : i + 1]) for i, v in enumerate(variants)]
+        out.append(Gain(variants, float(value[row]), tuple(starts)))
+    return out
+
+
+def _solved(gram: Array, right: Array, places: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Falls of the cost and coefficients of many sets of columns, (n,) and (n, k)."""
+    its = right[places]
+    solved = np.linalg.solve(gram[places[:, :, None], places[:, None, :]], its[..., None])
+    c = np.asarray(solved[..., 0], float)
+    return np.asarray(np.einsum("nk,nk->n", c, its), float), c

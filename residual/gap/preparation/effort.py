@@ -12,6 +12,7 @@ class Effort:
     Args:
         singles: Effects of the screen that are fitted alone.
         pairs: Pairs of the screen that are fitted.
+        triples: And those of three that help only together, at the most.
         beam: Sets that are grown further, beside the one that forecasts best.
         grown: Effects that each of these is grown by, one at a time.
         most: Largest number of effects in a set.
@@ -20,6 +21,7 @@ class Effort:
 
     singles: int = 8
     pairs: int = 2
+    triples: int = 6
     beam: int = 2
     grown: int = 4
     most: int = 8

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.fitting.screening import Gain, Signatures, gains, pair_gains
+from residual.gap.fitting.screening import Gain, Signatures, gains, pair_gains, triple_gains
 from residual.gap.search.exchange import spelt_out
 from residual.gap.search.redundant import by_points
 from residual.gap.search.sets import Key, Proposals, Search
@@ -126,12 +126,22 @@ def grow(search: Search, key: Key) -> list[Key]:
         if not search.simulator.has_contacts:
             found += boldly(search, parameters=False)
             found += driven(search)
-        alone = by_points(search)
-        for pair in [] if search.late else pair_gains(around, search.effort.pairs, without=alone):
-            numbers = [around.variants[v].candidate for v in pair.variants]
-            fresh, theta = search.merged(key, zip(numbers, pair.values, strict=True))
-            found += sound(search, fresh, theta)
+        found += at_once(search, around)
     return list(dict.fromkeys(found))
+
+
+def at_once(search: Search, around: Signatures) -> list[Key]:
+    """Fit the best pairs and triples of the linear screen: an inflow that was forgotten hides that
+    all outflows are too small, and none of the three takes anything off alone."""
+    alone = by_points(search)
+    found: list[Key] = []
+    pairs = pair_gains(around, search.effort.pairs, without=alone)
+    for several in [*pairs, *triple_gains(around, search.effort.triples, without=alone)]:
+        numbers = [around.variants[v].candidate for v in several.variants]
+        fresh, theta = search.merged((), zip(numbers, several.values, strict=True))
+        if search.fits_in(fresh) and not search.late:
+            found += sound(search, fresh, theta)
+    return found
 
 
 def sound(search: Search, key: Key, theta: Array) -> list[Key]:

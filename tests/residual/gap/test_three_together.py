@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from residual.gap import find_gap
 from residual.gap.model.candidates import candidates
 from residual.gap.preparation.prepare import prepare
+from residual.gap.search.beam import grow
 from residual.gap.search.exchange import add_pairs_exchanged
 from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
@@ -57,8 +58,20 @@ def levels(seed):
     return Trajectory(f"run {seed}", DT * np.arange(len(seen)), seen, pump[:, None])
 
 
-def test_three_that_help_only_together_are_found():
-    found = find_gap(Tanks(), [levels(0)])
+def cut(log, row):
+    """One record as two."""
+    first, second = slice(0, row + 1), slice(row, None)
+    parts = (first, slice(0, row)), (second, slice(row, None))
+    return [
+        Trajectory(f"{log.name}, {n}", log.times[a], log.states[a], log.actions[b])
+        for n, (a, b) in enumerate(parts)
+    ]
+
+
+@pytest.mark.parametrize("row", [None, 90], ids=["one record", "cut in two"])
+def test_three_that_help_only_together_are_found(row):
+    log = levels(0)
+    found = find_gap(Tanks(), cut(log, row) if row else [log])
     sizes = {str(effect): effect for effect in found.effects}
     assert {"upper_hole", "lower_hole"} <= set(sizes)
     assert {"constant_load@upper", "actuator_bias@pump"} & set(sizes)
@@ -66,19 +79,33 @@ def test_three_that_help_only_together_are_found():
     assert found.gap.share.value > 0.9
 
 
-def test_two_of_a_wrong_set_are_exchanged_at_once():
+@pytest.fixture
+def offered():
+    """A search in which all three are candidates among others, and the three."""
     simulator, names = Tanks(), ("constant_load@upper", "upper_hole", "lower_hole")
-    wrong = ("proportional_loss@upper", "sensor_scale@lower", "upper_hole")
     ready = prepare(simulator, [levels(0)], 100.0)
-    offered = (
+    chosen = (
         "constant_load", "proportional_loss", "sensor_scale", "sensor_offset", "actuator_gain",
         "upper_hole", "lower_hole",
     )  # fmt: skip
-    pool = candidates(simulator, chosen_effects(simulator, offered), ready.fitter.samples)
-    search = Search(simulator, pool, ready.fitter)
-    place = {candidate.label: number for number, candidate in enumerate(pool)}
-    key, right = (tuple(sorted(place[name] for name in those)) for those in (wrong, names))
-    search.add({key: np.concatenate([0.0 * pool[n].trials[0].values[0] for n in key])})
+    pool = candidates(simulator, chosen_effects(simulator, chosen), ready.fitter.samples)
+    places = {candidate.label: number for number, candidate in enumerate(pool)}
+    return Search(simulator, pool, ready.fitter), places, tuple(sorted(places[n] for n in names))
+
+
+def test_two_of_a_wrong_set_are_exchanged_at_once(offered):
+    search, places, right = offered
+    wrong = ("proportional_loss@upper", "sensor_scale@lower", "upper_hole")
+    key = tuple(sorted(places[name] for name in wrong))
+    start = np.concatenate([0.0 * search.candidates[n].trials[0].values[0] for n in key])
+    search.add({key: start})
     assert right not in search.tried
     add_pairs_exchanged(search, key)
     assert search.tried[right].merit < 0.5 * search.tried[key].merit
+
+
+def test_a_search_begins_with_three_at_once(offered):
+    search, _, right = offered
+    grow(search, ())
+    others = [key for key in search.tried if len(key) < len(right)]
+    assert search.tried[right].merit < 0.5 * min(search.tried[key].merit for key in others)

@@ -1,5 +1,6 @@
 """What a candidate adds to a fit: least squares with signs, start states projected out."""
 
+import itertools
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,16 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, nnls
 
 from residual.gap.fitting.bounded import bounded_step
-from residual.gap.fitting.screening import constrained, project_out, signatures
+from residual.gap.fitting.screening import (
+    Signatures,
+    Variant,
+    constrained,
+    pair_gains,
+    project_out,
+    signatures,
+    triple_gains,
+)
+from residual.gap.model.candidates import Trial
 
 
 @given(st.integers(0, 10_000), st.integers(1, 3))
@@ -55,6 +65,51 @@ def test_a_bounded_step_of_one_number_agrees_with_scipy(seed):
     found = bounded_step(column.T @ column, column.T @ residual, low, high, 1e-12)
     best = lsq_linear(column, residual, (low, high), method="bvls").x
     np.testing.assert_allclose(found, best, atol=1e-6)
+
+
+def shown(matrix, residual, one_sided=()):
+    """Signatures of candidates with one column each."""
+    variants = [
+        Variant(n, Trial(np.ones((1, 1)), np.array([n in one_sided])), (n,), np.ones(1, dtype=bool))
+        for n in range(matrix.shape[1])
+    ]
+    return Signatures(tuple(variants), matrix, residual)
+
+
+@given(st.integers(0, 10_000))
+def test_three_together_gain_what_least_squares_says(seed):
+    rng = np.random.default_rng(seed)
+    matrix, residual = rng.normal(size=(40, 6)) * [1, 1, 1, 1, 1, 1e-4], rng.normal(size=40)
+
+    def left(places):
+        basis = matrix[:, list(places)]
+        rest = residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0]
+        return float(rest @ rest)
+
+    for gain in triple_gains(shown(matrix, residual), 50):
+        np.testing.assert_allclose(residual @ residual - gain.value, left(gain.variants), rtol=1e-6)
+        pairs = min(left(pair) for pair in itertools.combinations(gain.variants, 2))
+        assert left(gain.variants) < 0.8 * pairs * (1 + 1e-6)
+
+
+def test_what_helps_only_together_is_found_among_much_that_helps_a_bit():
+    rng = np.random.default_rng(0)
+    hidden = rng.normal(size=200)
+    first, second = rng.normal(size=(2, 200))
+    three = np.stack([hidden + first, second - first, hidden - second], axis=1)
+    bits = 3.0 * rng.normal(size=(200, 20)) + 0.6 * hidden[:, None]
+    found = shown(np.hstack([bits, three]), 0.5 * hidden)
+    assert {20, 21, 22} not in [set(gain.variants) for gain in pair_gains(found, 3)]
+    best = triple_gains(found, 1)[0]
+    assert set(best.variants) == {20, 21, 22}
+    assert triple_gains(found, 1, without=[21]) != [best]
+    forbidden = shown(found.matrix, -found.residual, one_sided=[20])
+    assert {20, 21, 22} not in [set(gain.variants) for gain in triple_gains(forbidden, 50)]
+
+
+@pytest.mark.parametrize("count", [0, 2])
+def test_of_fewer_than_three_there_are_no_three(count):
+    assert triple_gains(shown(np.ones((5, count)), np.ones(5)), 2) == []
 
 
 def test_projection_removes_what_the_basis_can_imitate():
