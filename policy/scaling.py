@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 # Sizes that networks learn from as they are.
 _LEAST, _MOST = 0.1, 10.0
+# A middle of so many spreads does not hide how a column changes.
+_CENTRED = 2.0
 _STEPS, _EPISODES = 2000, 8
 # Less is rounding, and nothing that moved.
 _MOVED = 1e-9
@@ -50,10 +52,11 @@ class Scaling:
     def measured(cls, env: gymnasium.Env[Any, Any], seed: int = 0) -> Scaling:
         """The scaling that an environment needs, by some episodes of random actions.
 
-        Columns with finite bounds (cosine and sine of an angle) and those that spread over
-        0.1 to 10 around a middle of at most 10 are left as they are, so are rewards of that size:
+        Columns with finite bounds (cosine and sine of an angle) are left as they are, and so are
+        a spread of 0.1 to 10, a middle of at most twice the spread, and rewards of that size:
         whoever chose their units knows better than random actions where a policy will go. All
-        others come to middle 0 and spread 1, rewards to a root mean square of 1.
+        others come to spread 1 and middle 0 (far from it a network sees one large number and
+        little of its changes), rewards to a root mean square of 1.
 
         Args:
             env: Stepped a few thousand times.
@@ -67,12 +70,13 @@ class Scaling:
         low, middle, high = np.percentile(observations, [16, 50, 84], axis=0)
         spread = 0.5 * (high - low)
         spread = np.where(spread > _MOVED, spread, observations.std(axis=0))
-        good = (spread >= _LEAST) & (spread <= _MOST) & (np.abs(middle) <= _MOST)
+        good = (spread >= _LEAST) & (spread <= _MOST)
+        centred = good & (np.abs(middle) <= _CENTRED * spread)
         # A column that never moved, such as a set point, only loses its middle.
         moved = spread > _MOVED * np.maximum(np.abs(middle), 1.0)
         size = float(np.sqrt(np.mean(np.square(rewards))))
         return cls(
-            np.where(bounded | good, 0.0, middle),
+            np.where(bounded | centred, 0.0, middle),
             np.where(bounded | good | ~moved, 1.0, spread),
             1.0 if _LEAST <= size <= _MOST or size == 0 else 1 / size,
         )

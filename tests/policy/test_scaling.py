@@ -68,17 +68,18 @@ def test_another_librarys_algorithm_is_scaled_too(tmp_path):
 
 
 class Columns(gymnasium.Env):
-    """Kelvin, micrometres in m, a set point, cosine of an angle, and a column of usual size."""
+    """Kelvin, micrometres in m, a set point, cosine of an angle, a column of usual size, and one
+    that is far from zero."""
 
     observation_space = gymnasium.spaces.Box(
-        np.array([-np.inf, -np.inf, -np.inf, -1.0, -np.inf], np.float32),
-        np.array([np.inf, np.inf, np.inf, 1.0, np.inf], np.float32),
+        np.array([-np.inf, -np.inf, -np.inf, -1.0, -np.inf, -np.inf], np.float32),
+        np.array([np.inf, np.inf, np.inf, 1.0, np.inf, np.inf], np.float32),
     )
     action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,))
 
     def _seen(self):
-        kelvin, small, cosine, usual = self.np_random.normal([350, 0, 1, 0], [20, 1e-6, 0, 2])
-        return np.array([kelvin, small, 7.0, cosine, usual])
+        drawn = self.np_random.normal([350, 0, 1, 0, 4], [20, 1e-6, 0, 2, 1])
+        return np.insert(drawn, 2, 7.0)
 
     def reset(self, **options):
         super().reset(**options)
@@ -93,6 +94,7 @@ def test_only_what_networks_could_not_learn_from_is_scaled():
     assert scaling.middle[0] == pytest.approx(350, abs=5)
     assert scaling.spread[:2] == pytest.approx([20, 1e-6], rel=0.2)
     assert scaling.middle[2] == 7.0 and scaling.spread[2] == 1.0
-    np.testing.assert_array_equal(scaling.middle[3:], 0)
+    np.testing.assert_array_equal(scaling.middle[3:5], 0)
+    assert scaling.middle[5] == pytest.approx(4, abs=0.1)
     np.testing.assert_array_equal(scaling.spread[3:], 1)
     assert scaling.reward == pytest.approx(5000, rel=1e-2)

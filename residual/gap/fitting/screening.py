@@ -24,6 +24,8 @@ TOGETHER = 0.2
 #: What a triple leaves over that of the best one, up to which it is tried, too: sizes are such that
 #: the linear picture is a rough one.
 MATCH = 2.0
+#: Cosine between what two effects do from which on they say something of each other.
+ALIKE = 0.1
 #: The pairs of a triple.
 _SIDES = ([0, 1], [0, 2], [1, 2])
 
@@ -226,7 +228,8 @@ def triple_gains(found: Signatures, top: int, without: Sequence[int] = ()) -> li
     """Linear gain of three effects of one number each that help most together, best first.
 
     A triple counts if it leaves clearly less than each of the pairs in it: any third effect beside
-    a good pair gains a trifle; and not much more than the best triple does. One with a coefficient
+    a good pair gains a trifle; and not much more than the best triple does. Effects that move
+    different things, as those of two joints may, add up and need no triple. One with a coefficient
     of a forbidden sign is a pair, and left out.
 
     Args:
@@ -250,7 +253,8 @@ def triple_gains(found: Signatures, top: int, without: Sequence[int] = ()) -> li
     differ = [own[triples[:, i]] != own[triples[:, j]] for i, j in _SIDES]
     triples = triples[np.logical_and.reduce(differ)]
     value, c = _solved(gram, right, triples)
-    allowed = ~(one_sided[triples] & (c < 0)).any(axis=1)
+    linked = np.sum([np.abs(gram[tuple(triples[:, s].T)]) > ALIKE for s in _SIDES], axis=0) >= 2
+    allowed = linked & ~(one_sided[triples] & (c < 0)).any(axis=1)
     pairs = np.max([_solved(gram, right, triples[:, side])[0] for side in _SIDES], axis=0)
     left = float(found.residual @ found.residual)
     together = left - value < (1 - TOGETHER) * (left - pairs)

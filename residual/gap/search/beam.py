@@ -55,6 +55,8 @@ def run(
         if (level > 1 or seeds) and not _pays(search, frontier[0], reached):
             break
         reached = min(reached, now)
+    if not (seeds or search.late or search.simulator.has_contacts or _alone(search, quiet)):
+        three_at_once(search)
     return search.best()
 
 
@@ -126,22 +128,34 @@ def grow(search: Search, key: Key) -> list[Key]:
         if not search.simulator.has_contacts:
             found += boldly(search, parameters=False)
             found += driven(search)
-        found += at_once(search, around)
+        pairs = pair_gains(around, search.effort.pairs, without=by_points(search))
+        found += several(search, pairs)
     return list(dict.fromkeys(found))
 
 
-def at_once(search: Search, around: Signatures) -> list[Key]:
-    """Fit the best pairs and triples of the linear screen: an inflow that was forgotten hides that
-    all outflows are too small, and none of the three takes anything off alone."""
-    alone = by_points(search)
+def several(search: Search, ranked: list[Gain]) -> list[Key]:
+    """Fit what the linear screen of the nominal simulator ranks, several effects at once."""
+    variants = search.signatures(()).variants
     found: list[Key] = []
-    pairs = pair_gains(around, search.effort.pairs, without=alone)
-    for several in [*pairs, *triple_gains(around, search.effort.triples, without=alone)]:
-        numbers = [around.variants[v].candidate for v in several.variants]
-        fresh, theta = search.merged((), zip(numbers, several.values, strict=True))
+    for gain in ranked:
+        numbers = [variants[v].candidate for v in gain.variants]
+        fresh, theta = search.merged((), zip(numbers, gain.values, strict=True))
         if search.fits_in(fresh) and not search.late:
             found += sound(search, fresh, theta)
     return found
+
+
+def three_at_once(search: Search) -> None:
+    """Try the best threes of the linear screen, and more beside what is better than anything yet.
+
+    An inflow that was forgotten hides that all outflows are too small, and none of the three takes
+    anything off alone, nor does every two of them.
+    """
+    reached = search.error(search.best())
+    ranked = triple_gains(search.signatures(()), search.effort.triples, by_points(search))
+    found = min(several(search, ranked), key=search.error, default=())
+    if improves(search, found, reached):
+        extend(search, found)
 
 
 def sound(search: Search, key: Key, theta: Array) -> list[Key]:
