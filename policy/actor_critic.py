@@ -70,7 +70,7 @@ class ActorCritic:
         self.critic.forward(now)
         ascent = self.critic.d_actions(self._mean_value)
         self._critic_adam.step(c.tau)
-        self.actor.backward(now, ascent)
+        self.actor.backward(now, ascent, c.saturation_penalty)
         self._actor_adam.step(c.tau)
 
     def _goal(self, batch: Batch) -> Array:

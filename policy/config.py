@@ -8,7 +8,7 @@ import math
 
 @dataclasses.dataclass(frozen=True)
 class DDPGConfig:
-    """Settings of ``DDPG``; the defaults are the paper's.
+    """Settings of ``DDPG``; the defaults are the paper's, but for ``saturation_penalty``.
 
     Args:
         hidden: Widths of the two hidden layers of the actor and of the critic.
@@ -25,6 +25,9 @@ class DDPGConfig:
         noise_theta: Exploration noise: share forgotten per step.
         reward_scale: Factor on the rewards that the critic learns; returns are reported
             without it.
+        saturation_penalty: Weight of the squared part of the actor's outputs before tanh that is
+            beyond 2, where an action is 0.96 of its bound. An actor that has come to a bound in
+            all states has no gradient left that would bring it back. 0 in the paper.
         warm_up: Transitions that must be in the replay before updates start; until then the
             current policy acts, with noise.
 
@@ -44,6 +47,7 @@ class DDPGConfig:
     noise_sigma: float = 0.12
     noise_theta: float = 0.15
     reward_scale: float = 0.1
+    saturation_penalty: float = 0.05
     warm_up: int = 1000
 
     def __repr__(self) -> str:
@@ -65,6 +69,7 @@ class DDPGConfig:
             ("critic_lr", 0, math.inf),
             ("critic_weight_decay", 0, math.inf),
             ("noise_sigma", 0, math.inf),
+            ("saturation_penalty", 0, math.inf),
             ("batch", 1, math.inf),
             ("warm_up", 0, math.inf),
             ("replay", self.batch, math.inf),

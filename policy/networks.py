@@ -19,6 +19,8 @@ from policy.memory import zeros
 
 Array = NDArray[np.float32]
 LAST_HALF_WIDTH = 3e-3
+#: Output of the actor before tanh beyond which it is saturated.
+SATURATED = np.float32(2)
 
 
 class Inputs:
@@ -122,14 +124,20 @@ class Actor(FlatNetwork):
         passes.forward(self.weights, inputs.observed, self._buffers)
         np.tanh(self._buffers.output, out=inputs.actions)
 
-    def backward(self, inputs: Inputs, d_actions: Array) -> None:
+    def backward(self, inputs: Inputs, d_actions: Array, penalty: float = 0.0) -> None:
         """Fill ``gradient`` after ``forward`` of the same columns.
 
         Args:
             inputs: n columns.
             d_actions: Gradient of the loss with respect to the actions, (n_a, n).
+            penalty: Added to the loss times the mean over columns of the squared part of the
+                outputs before tanh that is beyond ``SATURATED``.
         """
         d_output = d_actions * (1 - inputs.actions**2)
+        if penalty:
+            output = self._buffers.output
+            beyond = output - np.clip(output, -SATURATED, SATURATED)
+            d_output += np.float32(2 * penalty / output.shape[1]) * beyond
         passes.backward(self.weights, d_output, self._buffers)
         passes.weight_gradients(self.d_weights, inputs.observed, d_output, self._buffers)
 

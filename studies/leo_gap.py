@@ -47,7 +47,9 @@ class LeoTrial(Trial):
         )
     )
     # As in the authors' code; docs/leo.md says what each choice brought.
-    ddpg: DDPGConfig = dataclasses.field(default_factory=lambda: DDPGConfig(action_layer=2))
+    ddpg: DDPGConfig = dataclasses.field(
+        default_factory=lambda: DDPGConfig(action_layer=2, saturation_penalty=0.0)
+    )
     # With the paper's rule walks collapse at every update before they recover.
     replay: ReplayRule = "all"
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import dataclasses
 
+from policy.config import DDPGConfig
 from sims.system import System
 from studies.learning.command import command
 from studies.learning.study import Study, Trial
@@ -36,6 +37,8 @@ class PendulumTrial(Trial):
             code, and the default here, keeps it.
     """
 
+    # The paper's.
+    ddpg: DDPGConfig = dataclasses.field(default_factory=lambda: DDPGConfig(saturation_penalty=0.0))
     inertia_follows_mass: bool = False
 
 

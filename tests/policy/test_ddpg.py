@@ -35,9 +35,23 @@ def test_learns_to_reach_a_target(changes, good):
     assert trained > good
 
 
+@pytest.mark.parametrize("penalty", [None, 0.0])
+def test_an_actor_at_a_bound_everywhere_comes_back(penalty):
+    config = dataclasses.replace(SMALL, reward_scale=1.0)
+    if penalty is not None:
+        config = dataclasses.replace(config, saturation_penalty=penalty)
+    agent = DDPG.for_env(Reach(), config, seed=1)
+    agent._networks.actor.weights.bias3[:] = 12.0
+    agent.learn(Reach(), 3000)
+    learnt = evaluate(agent.policy, Reach(), 20, seed=100).mean()
+    assert (learnt > -10) == (penalty != 0)
+
+
 def test_one_update_is_algorithm_1_of_the_paper():
     """The targets, losses and moving averages, with autograd and torch's Adam as the oracle."""
-    config = dataclasses.replace(SMALL, warm_up=10**6, tau=0.1, critic_weight_decay=1e-2)
+    config = dataclasses.replace(
+        SMALL, warm_up=10**6, tau=0.1, critic_weight_decay=1e-2, saturation_penalty=0.0
+    )
     agent = DDPG.for_env(Reach(5, terminal=True), config, seed=3)
     agent.learn(Reach(5, terminal=True), 60)
     generator = np.random.default_rng(0)

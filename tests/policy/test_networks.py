@@ -52,22 +52,24 @@ def assert_gradient(network: FlatNetwork, weights: list[torch.Tensor]) -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(sizes)
-def test_actor_matches_autograd(size):
+@given(sizes, st.sampled_from([0.0, 0.3]))
+def test_actor_matches_autograd(size, penalty):
     n_o, n_a, hidden, batch, seed = size
     rng = np.random.default_rng(seed)
     actor = Actor(n_o, n_a, hidden, batch, rng)
     spread(actor, rng)
     inputs, d_actions = filled(rng, n_o, n_a, batch), normal(rng, n_a, batch)
     weights = autograd_weights(actor)
-    expected = torch.tanh(autograd(weights, torch.tensor(inputs.observed.T)))
-    expected.backward(torch.tensor(d_actions.T))
+    output = autograd(weights, torch.tensor(inputs.observed.T))
+    expected = torch.tanh(output)
+    beyond = penalty * (torch.relu(output.abs() - 2) ** 2).sum() / batch
+    ((expected * torch.tensor(d_actions.T)).sum() + beyond).backward()
 
     observations = inputs.observations.copy()
     actor.forward(inputs)
     np.testing.assert_allclose(inputs.actions.T, expected.detach(), rtol=1e-4, atol=1e-5)
     np.testing.assert_array_equal(inputs.observations, observations)
-    actor.backward(inputs, d_actions)
+    actor.backward(inputs, d_actions, penalty)
     assert_gradient(actor, weights)
 
 
