@@ -6,12 +6,15 @@ gain of a hundredth, a dead zone wider than the input, an inertia a thousand tim
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.samples import Samples
 from residual.gap.fitting.contract import Fit, Fitter
 from residual.gap.fitting.intervals import at_bound, deviations
+from residual.gap.fitting.screening import flatten
 from residual.gap.model.model import Model
 from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
 from sims.effects.aliases import probes, shortly_after
@@ -28,6 +31,8 @@ FACTOR = 10.0
 MINOR = 0.1
 #: Least part of the input's variation that its way to the actuator leaves.
 THROUGH = 0.1
+#: Part of two effects that is left of both together, below which they undo each other.
+UNDONE = 0.25
 
 
 def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
@@ -109,13 +114,25 @@ def gross(effect: Effect, simulator: HostSimulator, samples: Samples) -> bool:
 
 
 def surprises(fit: Fit) -> int:
-    """Effects of a fitted set that are larger than their kind usually is, or end at a bound.
+    """Effects of a fitted set that are larger than their kind usually is, end at a bound, or undo
+    nearly all of another.
 
     What a bound has stopped is no optimum: the data would have it elsewhere.
     """
     ended = {int(fit.model.owner[j]) for j in range(len(fit.theta)) if at_bound(fit, j)}
     own = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
-    return sum(effect.surprising or i in ended for i, effect in enumerate(own))
+    return sum(effect.surprising or i in ended for i, effect in enumerate(own)) + undone(fit)
+
+
+def undone(fit: Fit) -> int:
+    """Pairs of a fitted set that undo all but a quarter of each other: a zero that is far off and
+    the load that holds it there bend a motion a bit, and so does much less of something else."""
+    moved = flatten(fit.by_knob * fit.theta, fit.weights)
+    of_effect = [moved[:, fit.model.owner == i].sum(axis=1) for i in range(len(fit.model.chosen))]
+    return sum(
+        bool(np.linalg.norm(a + b) < UNDONE * max(np.linalg.norm(a), np.linalg.norm(b)))
+        for a, b in itertools.combinations(of_effect, 2)
+    )
 
 
 def _acts_on(effect: Effect, actuator: str) -> bool:

@@ -177,8 +177,11 @@ def _better_fit(search: Search, keys: list[Key]) -> Key:
 
 
 def _does_as_well(search: Search, key: Key, best: Key) -> bool:
-    """Whether a set is as good as the best within chance, or surprises less and is next to it."""
+    """Whether a set is as good as the best within chance, or surprises less and is next to it; of
+    what undoes itself an imperfect simulator may make use, so that next to it is farther."""
     error, least = search.error(key), search.error(best)
+    if search.undone(key) < search.undone(best) and error <= NEAR * least:
+        return search.surprises(key) < search.surprises(best)
     if search.surprises(key) < search.surprises(best) and error <= (1 + ALIKE) * least:
         return True
     return as_good(search, key, best) and error < NEAR * least

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.fitting.contract import UNCONVERGED, Fit, Fitter
-from residual.gap.fitting.plausible import absurd, nearly, surprises
+from residual.gap.fitting.plausible import absurd, nearly, surprises, undone
 from residual.gap.fitting.screening import Signatures, signatures, trials
 from residual.gap.fitting.validation import Validated, validate
 from residual.gap.model.candidates import Candidate
@@ -131,8 +131,13 @@ class Search:
         return max(3, len(self.fitter.blocks.windows) // 2)
 
     def surprises(self, key: Key) -> int:
-        """Effects of a set that are larger than their kind usually is, or end at a bound."""
+        """Effects of a set that are larger than their kind usually is, end at a bound, or undo
+        nearly all of another."""
         return surprises(self.tried[key])
+
+    def undone(self, key: Key) -> int:
+        """Pairs of a set that undo nearly all of each other."""
+        return undone(self.tried[key])
 
     def usable(self) -> list[Key]:
         """Sets that converged and may be right."""

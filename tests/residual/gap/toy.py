@@ -41,14 +41,15 @@ class Toy:
         scatter: Relative spread of the blocks' errors about the given ones.
         half: Errors at half the horizon, if not the same.
         surprising: Numbers of effects that are larger than usual.
+        undoing: Sets of which two members undo each other.
         mass: Change of the mass, in kg.
     """
 
     def __init__(
         self, errors, merits=None, joints=1, blocks=20, scatter=0.0, half=None, surprising=(),
-        mass=0.02,
+        mass=0.02, undoing=(),
     ):  # fmt: skip
-        self.surprising = set(surprising)
+        self.surprising, self.undoing = set(surprising), set(undoing)
         fitted = (ParameterChange("mass", mass), *EFFECTS[1:])
         rng = np.random.default_rng(0)
         drive = rng.uniform(0.5, 2.0, (blocks, joints))
@@ -100,7 +101,10 @@ class Toy:
         )
 
     def surprises(self, key):
-        return len(self.surprising & set(key))
+        return len(self.surprising & set(key)) + self.undone(key)
+
+    def undone(self, key):
+        return int(key in self.undoing)
 
     def usable(self):
         return [k for k in self.validated if k not in self.unfit and k not in self.refused]

@@ -7,7 +7,7 @@ import pytest
 
 from residual.gap.data.samples import Samples
 from residual.gap.fitting import plausible
-from residual.gap.fitting.plausible import absurd, gross, nearly, surprises
+from residual.gap.fitting.plausible import absurd, gross, nearly, surprises, undone
 from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
 from residual.trajectories import Trajectory
@@ -97,9 +97,36 @@ def test_what_ends_at_a_bound_surprises():
     """It is no optimum: the bound has stopped it."""
     model, theta, _ = built(LinearSpring("pivot"), stiffness=0.1, rest=0.2)
     rest = [knob.field for knob in model.knobs].index("rest")
-    assert surprises(SimpleNamespace(model=model, theta=theta)) == 0
+
+    def fit():
+        return SimpleNamespace(
+            model=model, theta=theta, by_knob=np.ones((1, 5, len(theta))), weights=np.ones(1)
+        )
+
+    assert surprises(fit()) == 0
     theta[rest] = model.knobs[rest].low
-    assert surprises(SimpleNamespace(model=model, theta=theta)) == 1
+    assert surprises(fit()) == 1
+
+
+@pytest.mark.parametrize(("sizes", "pairs"), [
+    ((7.0, -6.0), 1), ((7.0, -4.0), 0), ((7.0, 6.0), 0), ((7.0, -6.0, 6.5), 2),
+    ((-6.0, 7.0), 1), ((0.0, 0.0), 0), ((5.0,), 0),
+])  # fmt: skip
+def test_what_undoes_nearly_all_of_another_is_counted(sizes, pairs):
+    """Units of the numbers do not matter, and of two numbers of one effect none is counted."""
+    rng = np.random.default_rng(0)
+    push, other = rng.normal(size=(2, 3, 40))
+    units = np.array([10.0 ** (3 * i) for i in range(len(sizes))])
+    moved = push[..., None] / units
+    owner = np.arange(len(sizes))
+    given = {"theta": np.array(sizes) * units, "weights": np.array([1.0, 0.2, 3.0])}
+    model = SimpleNamespace(owner=owner, chosen=[None] * len(sizes))
+    assert undone(SimpleNamespace(model=model, by_knob=moved, **given)) == pairs
+    across = np.stack([push, other], axis=-1)[..., : len(sizes)] / units[:2]
+    if len(sizes) == 2:
+        assert undone(SimpleNamespace(model=model, by_knob=across, **given)) == 0
+    model = SimpleNamespace(owner=0 * owner, chosen=[None])
+    assert undone(SimpleNamespace(model=model, by_knob=moved, **given)) == 0
 
 
 @pytest.mark.parametrize(("effect", "far"), [

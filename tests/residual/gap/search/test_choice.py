@@ -89,6 +89,14 @@ def test_a_surprise_has_to_be_better_by_more_than_a_tenth():
     assert choose(Toy({(0,): 0.225, (3,): 0.2}, surprising={3})).key == (3,)
 
 
+def test_what_undoes_itself_has_to_be_better_by_half():
+    """A zero far off, and a load that holds it there, bend a motion as a bit of length does."""
+    for error, key in ((0.28, (0, 2)), (0.32, (1, 3))):
+        toy = Toy({(0,): 0.5, (0, 2): error, (1, 3): 0.2}, undoing=[(1, 3)])
+        assert choose(toy).key == key
+    assert choose(Toy({(0,): 0.5, (0, 2): 0.28, (1, 3): 0.2})).key == (1, 3)
+
+
 def test_a_set_that_shrank_is_exchanged_for_one_that_surprises_less():
     """The pair does best, but either member alone does about as well."""
     errors = {(3,): 0.1000, (0,): 0.1001, (1, 3): 0.0999}
