@@ -8,9 +8,29 @@ from typing import ClassVar, Literal, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
+from sklearn.utils import get_tags
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 Array = NDArray[np.float64]
+
+
+def check_regressor(estimator: object) -> None:
+    """Refuse what cannot learn a difference, before anything is computed for it.
+
+    Args:
+        estimator: Of any library.
+
+    Raises:
+        ValueError: It says of itself that it is no regressor, or does not predict.
+    """
+    name = type(estimator).__name__
+    kind = get_tags(estimator).estimator_type if isinstance(estimator, BaseEstimator) else None
+    if kind not in (None, "regressor") or not callable(getattr(estimator, "predict", None)):
+        what = (kind or "it has no predict").replace("_", " ")
+        raise ValueError(
+            f"estimator is {name}, which is no regressor ({what}); expected one, such as "
+            "residual.GaussianProcess or sklearn.ensemble.ExtraTreesRegressor"
+        )
 
 
 class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):

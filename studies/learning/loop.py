@@ -23,6 +23,7 @@ from sklearn.base import BaseEstimator
 
 from policy.config import DDPGConfig
 from policy.learner import OURS, Algorithm
+from residual.estimator import check_regressor
 from sims.simulator import Simulator
 from sims.system import EvaluationProtocol, System
 from sims.tasks import Task
@@ -130,6 +131,8 @@ def learn_by_difference(
         ValueError: The parts do not fit together, or a budget is too small to learn anything.
     """
     _expect("estimator", estimator, Regressor, "residual.Linear()")
+    if estimator is not None:
+        check_regressor(estimator)
     _expect("evaluation", evaluation, EvaluationProtocol, "EvaluationProtocol(every=1000)")
     _expect("ddpg", ddpg, DDPGConfig, "DDPGConfig(hidden=(64, 64))")
     _expect("budget", budget, Budget, "Budget(450, 2, 20_000, 20_000)")

@@ -15,6 +15,7 @@ from sklearn.base import BaseEstimator
 from policy.config import DDPGConfig
 from policy.learner import OURS, Algorithm
 from residual import DropoutNet
+from residual.estimator import check_regressor
 from sims.measured import Measurement
 from sims.same_channels import check_same_channels
 from sims.simulator import Simulator
@@ -30,7 +31,8 @@ class Trial:
     """One trial: everything that its result depends on. A command adds its own settings.
 
     Args:
-        estimator: Learns the difference; any scikit-learn regressor by import path.
+        estimator: Learns the difference: residual.GaussianProcess, DropoutNet, Linear, Ensemble
+            or NamedEffects, or any scikit-learn regressor by import path.
         seed: Everything random follows from it.
         budget: Samples and training steps.
         learner: What learns the policies: policy.DDPG, or an off-policy algorithm of
@@ -120,6 +122,7 @@ class Study:
                 f"ddpg has settings of {OURS}, but {trial.learner} learns: give its own as "
                 "learner_options"
             )
+        check_regressor(trial.estimator)
         if trial.seed < 0:
             raise ValueError(f"seed is {trial.seed}, expected a whole number from 0")
         trial.budget.check(trial.algorithm, trial.replay == "all", trial.corrected is not None)

@@ -24,11 +24,17 @@ from studies.running.ending import DEBUG, DEBUG_VARIABLE, TRUST, typed
 _SIMULATORS = ("--simulator", "--corrected")
 _CLASSES = (*_SIMULATORS, "--estimator")
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+# How jsonargparse begins a list of all classes that it knows.
+_LISTED = ", known subclasses: "
 _IMPORT_PATH = re.compile(r"\w+(\.\w+)+")
 
 
 class HelpFormatter(jsonargparse.DefaultHelpFormatter, RawDescriptionHelpFormatter):
-    """Keeps the line breaks of the description."""
+    """Keeps the line breaks of the description, and lists no classes that happen to be imported."""
+
+    def _expand_help(self, action: Any) -> str:
+        before, listed, _ = super()._expand_help(action).partition(_LISTED)
+        return f"{before})" if listed else before
 
 
 class Parser(jsonargparse.ArgumentParser):

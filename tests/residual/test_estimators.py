@@ -11,14 +11,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.base import clone
+from sklearn.cluster import KMeans
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.cross_decomposition import PLSRegression
+from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import NotFittedError
+from sklearn.linear_model import LogisticRegression, Ridge
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from residual.dropout_net import DropoutNet
-from residual.estimator import NotFinite
+from residual.ensemble import Ensemble
+from residual.estimator import NotFinite, check_regressor
 from residual.features import ChannelFeatures
 from residual.gaussian_process import GaussianProcess
 from residual.linear import Linear
+from residual.named_effects import NamedEffects
 
 CHECKED = [
     Linear(),
@@ -200,3 +210,35 @@ def test_no_prediction_is_ever_nan():
     with pytest.raises(NotFinite, match=r"no finite number for 1 of 2 rows.*1e\+200"):
         model.predict([[0.0, 0.0], [1e200, -1e200]])
     assert np.isfinite(model.predict([[1e3, -1e3]])).all()
+
+
+class Mean:
+    """A regressor of no library's class."""
+
+    def fit(self, X, y):
+        self.mean = np.mean(y, axis=0)
+        return self
+
+    def predict(self, X):
+        return np.tile(self.mean, (len(X), 1))
+
+
+@pytest.mark.parametrize("given", [
+    Linear(), GaussianProcess(), DropoutNet(), NamedEffects(), Ensemble(), Mean(),
+    PLSRegression(), TransformedTargetRegressor(), make_pipeline(StandardScaler(), Ridge()),
+    make_pipeline(StandardScaler(), GridSearchCV(Ridge(), {"alpha": [1.0]})),
+], ids=str)  # fmt: skip
+def test_regressors_of_any_library_may_learn_a_difference(given):
+    check_regressor(given)
+
+
+@pytest.mark.parametrize(("given", "says"), [
+    (LogisticRegression(), "classifier"), (KMeans(), "clusterer"),
+    (IsolationForest(), "outlier detector"), (StandardScaler(), "it has no predict"),
+    (make_pipeline(StandardScaler(), LogisticRegression()), "classifier"),
+    (object(), "it has no predict"),
+], ids=str)  # fmt: skip
+def test_what_is_no_regressor_is_refused_before_anything_is_computed(given, says):
+    name = type(given).__name__
+    with pytest.raises(ValueError, match=rf"estimator is {name}, which is no regressor \({says}\)"):
+        check_regressor(given)

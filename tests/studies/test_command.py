@@ -254,6 +254,7 @@ SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
         ("find_gap", (*SIMULATOR, "--logs", "none.csv"), "none.csv: there is no such file"),
         ("learn", (*SYSTEM, "--corrected", "none.yaml"), "--corrected none.yaml: there is no"),
         ("learn", (*SYSTEM, "--estimator", "residual.No"), "--estimator: there is no class res"),
+        ("learn", (*SYSTEM, "--estimator", "sklearn.cluster.KMeans"), "is no regressor (clus"),
         ("learn", ("--system", "sims.simulator.wrap"), "cannot be called without argu"),
         ("learn", (*SYSTEM, "--backend", "dask"), "--backend dask runs the trials of a grid"),
     ],
