@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -17,8 +18,13 @@ from sims.unsound import Unsound, cannot_call, refuse_not_finite
 #: Reads the state, shape (n_s,), from the environment and its last observation.
 StateOf = Callable[[Any, Any], ArrayLike]
 
-# Start states of a task that tell where they usually are.
-_STARTS = 20
+# Start states of a task that tell where they usually are, and the part of a channel's scale by
+# which an environment may begin elsewhere.
+_STARTS, _NEARBY = 20, 0.1
+
+_log = logging.getLogger("simgap")
+# What was said of which environment: every training makes a new one.
+_said: set[tuple[str, str]] = set()
 
 
 class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -26,7 +32,8 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     Rewards are the task's, of the states reached; an episode ends where the task or the
     environment ends it. Angles begin within half a turn of the middle of the task's own start
-    states, and are continued over whole turns.
+    states, and are continued over whole turns. Where the environment begins elsewhere than the
+    task, or ends an episode early without saying that it is terminated, a warning says so once.
 
     Args:
         env: Reports its state in ``info["state"]``, or ``state_of`` reads it.
@@ -82,7 +89,7 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             )
         self._name = f"the true environment {type(env.unwrapped).__name__}"
         self._angles = np.array([channel.angle for channel in nominal.state_channels])
-        self._usual_start = _middle(task, len(self._angles)) if self._angles.any() else 0.0
+        self._starts = _starts(task, len(self._angles))
         self._state: Array = np.zeros(0)
         self._steps = 0
 
@@ -100,8 +107,9 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         observation, info = begun
         self._steps = 0
         start = self._read(observation, info)
-        turned = self._usual_start + wrap(start - self._usual_start)
-        self._state = np.where(self._angles, turned, start)
+        middle = 0.5 * (self._starts.min(axis=0) + self._starts.max(axis=0))
+        self._state = np.where(self._angles, middle + wrap(start - middle), start)
+        self._compare_start()
         return observe(self.nominal, self._state[None])[0], {"state": self._state.copy()}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
@@ -127,6 +135,15 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         refuse_not_finite(self._name, self.nominal.state_channels, reached, self._steps, reward)
         self._state = reached
         truncated = bool(cut or self._steps >= self.task.horizon)
+        if cut and not terminated and self._steps < self.task.horizon:
+            _warn_once(
+                self._name,
+                "end",
+                f"ended an episode after {self._steps} of {self.task.horizon} steps "
+                "without terminating it: its returns are sums over fewer steps than those on "
+                "the simulator; let the task end there too (terminal), or give it "
+                f"horizon={self._steps}",
+            )
         seen = observe(self.nominal, after)[0]
         return seen, reward, terminated, truncated, {"state": reached.copy()}
 
@@ -137,6 +154,23 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def close(self) -> None:
         """End the environment."""
         self.env.close()
+
+    def _compare_start(self) -> None:
+        """Say where an episode begins far from all starts of the task."""
+        low, high = self._starts.min(axis=0), self._starts.max(axis=0)
+        channels = self.nominal.state_channels
+        slack = high - low + _NEARBY * np.array([channel.scale for channel in channels])
+        far = (self._state < low - slack) | (self._state > high + slack)
+        if far.any():
+            c = int(np.argmax(far))
+            name, unit = channels[c].name, channels[c].unit
+            _warn_once(
+                self._name,
+                "start",
+                f"begins episodes at {name} {self._state[c]:.3g} {unit}, the task "
+                f"from {low[c]:.3g} to {high[c]:.3g} {unit}: policies learn from other starts "
+                "than they are tested at; let start of the task draw what reset gives",
+            )
 
     def _read(self, observation: Any, info: dict[str, Any]) -> Array:
         if self._state_of is not None:
@@ -179,7 +213,13 @@ def _refuse_call(function: Callable[..., Any], such_as: str, *given: Any, **name
         )
 
 
-def _middle(task: Task, width: int) -> Array:
-    """The middle of where a task's episodes start, shape (n_s,)."""
-    starts = [task.start(np.random.default_rng(seed))[:width] for seed in range(_STARTS)]
-    return 0.5 * (np.min(starts, axis=0) + np.max(starts, axis=0))
+def _starts(task: Task, width: int) -> Array:
+    """Where episodes of a task start, shape (n, n_s)."""
+    return np.array([task.start(np.random.default_rng(n))[:width] for n in range(_STARTS)], float)
+
+
+def _warn_once(name: str, what: str, says: str) -> None:
+    """Warn of something about an environment, and of the same no second time."""
+    if (name, what) not in _said:
+        _said.add((name, what))
+        _log.warning("%s %s", name, says)
