@@ -121,6 +121,8 @@ class Trajectory:
         states: Measured state channels, shape (T + 1, n_s); angles unwrapped; a channel
             that was not measured is NaN throughout, a missing sample is NaN in its row.
         actions: Action from sample k to sample k + 1, shape (T, n_a).
+        before: Action that was held for long before the first sample, shape (n_a,), which delays
+            and lags remember; by default the first one.
 
     Raises:
         ValueError: The arrays do not belong together.
@@ -130,6 +132,7 @@ class Trajectory:
     times: Array
     states: Array
     actions: Array
+    before: Array | None = None
 
     def __post_init__(self) -> None:
         samples = len(self.times)
@@ -139,6 +142,11 @@ class Trajectory:
                 f"{len(self.actions)} actions; expected as many states as times and one action "
                 "less, each held from one sample to the next"
             )
+        if self.before is not None and self.before.shape != self.actions.shape[1:]:
+            raise ValueError(
+                f"{self.name}: before has shape {self.before.shape}, expected "
+                f"{self.actions.shape[1:]}, an entry for each input"
+            )
 
     def piece(self, start: int, stop: int, name: str | None = None) -> Trajectory:
         """The samples from ``start`` to before ``stop``, under this or another name."""
@@ -147,6 +155,7 @@ class Trajectory:
             self.times[start:stop],
             self.states[start:stop],
             self.actions[start : stop - 1],
+            self.before if start == 0 else None,
         )
 
     @property

@@ -19,6 +19,7 @@ from residual.gap.preparation.numerics import held_as, stride_for
 from residual.gap.result import GapResult
 from residual.gap.search.finals import on_more_windows
 from residual.gap.search.known import KNOWN
+from residual.gap.search.rest import from_rest
 from residual.trajectories import Trajectory
 from sims.contract import refuse_unsound
 from sims.effects.base import Effect
@@ -95,6 +96,7 @@ def find_gap(
         on_hold: list[str] = []
         if hold is None:
             prepared, found, on_hold = inquiry.other_hold(log, prepared, found)
+        log, prepared, found, on_rest = inquiry.begun_from_rest(log, prepared, found)
         with clock.besides():
             prepared, found, on_more = on_more_windows(prepared, found, clock.confirm_until, tell)
         clock.lap("search")
@@ -113,10 +115,12 @@ def find_gap(
             others, _ = excerpt(
                 examine(simulator, held).trajectories, stride_for(held, log.horizon)
             )
+            if on_rest:
+                others = tuple(from_rest(simulator, others))
             apart = judged_apart(answer, known.prepared, others, table)
         clock.lap("forecast")
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
-    quality = [*log.findings, *log.left_out, *other, *on_hold, *on_more, *known.says]
+    quality = [*log.findings, *log.left_out, *other, *on_hold, *on_rest, *on_more, *known.says]
     quality += inquiry.untried(answer)
     result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)
     return dataclasses.replace(result, conventions=conventions)

@@ -21,6 +21,7 @@ from residual.gap.offered import Offered
 from residual.gap.preparation.numerics import held_otherwise, how_held
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.search.explain import Explanation, explain
+from residual.gap.search.rest import fits_better_from_rest
 from residual.gap.search.sets import Search
 from sims.effects.base import Effect
 from sims.host import HostSimulator
@@ -147,6 +148,35 @@ class Inquiry:
             "search so: set hold to say which it is, or give more --minutes"
         )
         return prepared, found, [says]
+
+    def begun_from_rest(
+        self, log: Log, prepared: Prepared, found: Explanation
+    ) -> tuple[Log, Prepared, Explanation, list[str]]:
+        """Once more with records that begin from rest, if what was found fits better so.
+
+        Returns:
+            What was recorded, prepared and found, with the beginning that forecasts clearly
+            better, and what is to be said of it.
+        """
+        if found.search.late:
+            return log, prepared, found, []
+        runs = fits_better_from_rest(found.search, found.key, log.runs)
+        if runs is None:
+            return log, prepared, found, []
+        self.tell("what came before the records fits better as no input: once more so")
+        begun = dataclasses.replace(log, runs=runs)
+        ready = prepare(found.search.simulator, runs, log.horizon)
+        again = self.explained(found.search.simulator, ready, earlier=found.search)
+        errors = [forecast_error(one.search, one.key) for one in (again, found)]
+        if CLEARLY**2 * errors[0] >= errors[1]:
+            return log, prepared, found, []
+        late = [run.name for run in runs if run.before is not None]
+        more = f" and {len(late) - 3} more" if len(late) > 3 else ""
+        says = (
+            f"{', '.join(late[:3])}{more}: the first input is on, and what came before is taken to "
+            "be rest, which the data fit better; log some samples from before to be sure"
+        )
+        return begun, ready, again, [says]
 
     def confirmed(
         self, log: Log, prepared: Prepared, found: Explanation, matters: bool, tolerance: float

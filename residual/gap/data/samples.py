@@ -25,11 +25,18 @@ class Recorded:
         actions: Action held from each sample to the next, shape (n, n_a).
         durations: Seconds to the next sample, shape (n,).
         rows: Which of the samples are rows of the table.
+        before: Action held before the first sample, shape (n_a,), if not the first one.
     """
 
     actions: Array
     durations: Array
     rows: NDArray[np.int64]
+    before: Array | None = None
+
+    @property
+    def first(self) -> Array:
+        """Action that was held for long when the run began, shape (n_a,)."""
+        return self.actions[0] if self.before is None else self.before
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,8 +76,7 @@ class Samples:
         Raises:
             ValueError: There is no trajectory with a step.
         """
-        # The order of files must not matter, so runs are put in an order of their own.
-        usable = sorted((t for t in trajectories if len(t) >= stride), key=_content)
+        usable = in_order(trajectories, stride)
         if not usable:
             raise ValueError("no trajectory to look at: give at least one with a step")
         parts, ends, kept = [], [0], []
@@ -96,6 +102,7 @@ class Samples:
                     np.vstack([t.actions, t.actions[-1:]]),
                     np.append(t.durations, t.durations[-1]),
                     rows,
+                    t.before,
                 )
                 for t, rows in zip(usable, kept, strict=True)
             ),
@@ -145,6 +152,11 @@ class Samples:
         last = np.repeat(driven[:, -1:, -1:], width * fine, axis=2)
         each = np.vstack([durations, np.ones((1, width))])
         return merged(np.concatenate([whole, last], axis=1), each, self.substeps)
+
+
+def in_order(trajectories: Sequence[Trajectory], stride: int) -> list[Trajectory]:
+    """Runs of a row at least, in an order of their own: that of the files must not matter."""
+    return sorted((t for t in trajectories if len(t) >= stride), key=_content)
 
 
 def _rows(states: Array, stride: int) -> NDArray[np.int64]:

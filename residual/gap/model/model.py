@@ -92,8 +92,8 @@ class Model:
         if len(host.integrated_channels) == self.width:
             # The play lies where the input before the sample has pushed it.
             before = np.vstack([samples.actions[:1], samples.actions[:-1]])
-            for start, _ in samples.runs:
-                before[start] = samples.actions[start]
+            for (start, _), recorded in zip(samples.runs, samples.recorded, strict=True):
+                before[start] = recorded.first
             pushed = host.augment(states, before)[:, self.physical : self.width]
             full[:, self.physical :] = pushed / _halves(host, 1)
         return full
@@ -118,7 +118,10 @@ class Model:
             parts = []
             fine = max(1, samples.substeps // samples.stride)
             for run, recorded in enumerate(samples.recorded):
-                part = host.drive(recorded.actions, recorded.durations, fine, rises=True)
+                before = None if recorded.before is None else recorded.before[None]
+                part = host.drive(
+                    recorded.actions, recorded.durations, fine, before=before, rises=True
+                )
                 parts.append(samples.in_intervals(run, part if part.ndim == 5 else part[None]))
             rows = max(len(part) for part in parts)
             parts = [np.broadcast_to(p, (rows, *p.shape[1:])) for p in parts]

@@ -178,7 +178,11 @@ def _error(simulator: HostSimulator, fitter: SmoothFitter, convention: Conventio
     samples = dataclasses.replace(
         samples, seen=factor * samples.seen + offset, actions=gain * samples.actions + bias,
         recorded=tuple(
-            dataclasses.replace(run, actions=gain * run.actions + bias) for run in samples.recorded
+            dataclasses.replace(
+                run, actions=gain * run.actions + bias,
+                before=None if run.before is None else gain * run.before + bias,
+            )
+            for run in samples.recorded
         ),
     )  # fmt: skip
     model, none = Model(simulator), np.zeros((1, 0))

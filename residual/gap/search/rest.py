@@ -1,0 +1,103 @@
+"""Records that begin with a step: what delays and lags remember of the time before them.
+
+A log says nothing of the input before its first sample. Mostly that was the first one, or the log
+would begin earlier; but a step test is often logged from the step on, and begins from rest.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.data.samples import in_order
+from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.search.sets import Key, Search
+from residual.trajectories import Trajectory
+from sims.effects.actuator import ActuatorLag, Delay
+from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
+
+#: Part of an input's largest reading from rest below which it rests.
+STILL = 0.05
+#: Part of the misfit that a beginning from rest must take off to be believed.
+CLEARER = 0.05
+
+
+def rest(simulator: HostSimulator) -> Array:
+    """Inputs that do nothing, as far as their bounds allow, (n_a,)."""
+    channels = simulator.action_channels
+    return np.array([np.clip(0.0, channel.low, channel.high) for channel in channels])
+
+
+def from_rest(simulator: HostSimulator, runs: Sequence[Trajectory]) -> list[Trajectory]:
+    """The runs, those that begin while an input is on taken to have begun from rest."""
+    still = rest(simulator)
+    most = np.max([np.abs(run.actions - still).max(axis=0) for run in runs], axis=0)
+    return [
+        dataclasses.replace(run, before=still)
+        if (np.abs(run.actions[0] - still) > STILL * most).any()
+        else run
+        for run in runs
+    ]
+
+
+def fits_better_from_rest(
+    search: Search, key: Key, runs: Sequence[Trajectory]
+) -> list[Trajectory] | None:
+    """The runs, those taken to have begun from rest that fit clearly better so, with what was found
+    and a lag of every input; None if none does.
+
+    Args:
+        search: Fitted sets.
+        key: What was chosen.
+        runs: What was searched.
+    """
+    fitter = search.fitter
+    if not isinstance(fitter, SmoothFitter) or any(run.before is not None for run in runs):
+        return None
+    ordered = in_order(runs, fitter.samples.stride)
+    rested = from_rest(search.simulator, ordered)
+    if all(run.before is None for run in rested):
+        return None
+    lagging = _with_lags(search, key)
+    if lagging is None:
+        return None
+    model, theta = search.model(lagging[0]), lagging[1]
+
+    def fit(runs: Sequence[Trajectory]) -> Fit:
+        recorded = tuple(
+            dataclasses.replace(one, before=run.before)
+            for one, run in zip(fitter.samples.recorded, runs, strict=True)
+        )
+        samples = dataclasses.replace(fitter.samples, recorded=recorded)
+        begun = dataclasses.replace(fitter, samples=samples)
+        return begun.fit(model, theta, search.tried[key])
+
+    usual, begun = fit(ordered), fit(rested)
+    gained = np.bincount(fitter.blocks.windows.run, usual.loss - begun.loss, minlength=len(ordered))
+    chosen = [
+        late if won > 0 else run for late, run, won in zip(rested, ordered, gained, strict=True)
+    ]
+    if all(run.before is None for run in chosen):
+        return None
+    least = min(usual.merit, search.tried[key].merit)
+    needed = max(CLEARER * least, fitter.tie(search.tried[()]))
+    return chosen if least - fit(chosen).merit > needed else None
+
+
+def _with_lags(search: Search, key: Key) -> tuple[Key, Array] | None:
+    """A set with a lag at every input that it leaves without memory, and where its fit begins;
+    None if it holds none then."""
+    chosen = [search.candidates[number].effect for number in key]
+    remembers = {e.where for e in chosen if isinstance(e, ActuatorLag | Delay)}
+    more = [
+        (number, candidate.trials[0].values[0])
+        for number, candidate in enumerate(search.candidates[: search.screened])
+        if isinstance(candidate.effect, ActuatorLag) and candidate.effect.where not in remembers
+    ]
+    return search.merged(key, more) if more or remembers else None

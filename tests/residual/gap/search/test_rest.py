@@ -1,0 +1,101 @@
+"""Step tests that were logged from the step on: what came before is in no log."""
+
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from residual.gap import find_gap
+from residual.trajectories import Trajectory
+from sims.equations import FirstOrderSystem
+from sims.simulator import Channel, Parameter
+
+GAIN, SLOW, LAG = 80.0, 40.0, 8.0
+
+
+class Oven(FirstOrderSystem):
+    """Warms up as a first-order system; that its heater lags is missing."""
+
+    dt = 1.0
+    state_channels = (Channel("level", "K", "other", scale=30.0),)
+    action_channels = (Channel("duty", "1", "input", scale=0.5, low=0.0, high=1.0),)
+    parameters: ClassVar = {
+        "gain": Parameter(GAIN, "K", "level at full duty", low=1.0),
+        "slow": Parameter(SLOW, "s", "time constant", low=1.0),
+    }
+
+    def derivative(self, x, u, p):
+        return ((p.gain * u[:, 0] - x[:, 0]) / p.slow)[:, None]
+
+
+def steps(seed, duties, before, lag=LAG, hold=60):
+    """A record in closed form: steps through a lag and the oven, settled at ``before`` at first."""
+    times = np.arange(hold * len(duties), dtype=float)
+    level = np.full(len(times), GAIN * before)
+    for i, change in enumerate(np.diff([before, *duties])):
+        t = np.maximum(times - i * hold, 0.0)
+        late = lag * np.exp(-t / lag) if lag else 0.0
+        level += GAIN * change * (1 - (SLOW * np.exp(-t / SLOW) - late) / (SLOW - lag))
+    seen = level + np.random.default_rng(seed).normal(0, 0.05, len(times))
+    actions = np.repeat(duties, hold)[:-1, None]
+    return Trajectory(f"run {seed}", times, seen[:, None], actions)
+
+
+def lag_of(found):
+    """The lag that is certain, in s."""
+    (verdict,) = [v for v in found.verdicts if v.kind == "confirmed"]
+    assert verdict.effect == "actuator_lag"
+    (effect,) = [e for e in found.effects if str(e).startswith("actuator_lag")]
+    return effect.time_constant
+
+
+def told(found):
+    """Whether it is said that records are taken to begin from rest."""
+    return [text for text in found.quality if "taken to be rest" in text]
+
+
+TESTS = [steps(s, [duty], 0.0, hold=120) for s, duty in enumerate((0.4, 0.8, 0.6, 1.0))]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_lag_shows_in_step_tests_that_begin_with_the_step(turned):
+    found = find_gap(Oven(), TESTS[::-1] if turned else TESTS)
+    assert lag_of(found) == pytest.approx(LAG, rel=0.05)
+    assert told(found)
+    assert found.gap.after.value < 0.1 * found.gap.before.value
+
+
+def test_what_was_settled_at_its_first_input_stays_so():
+    runs = [steps(s, [d, 1 - d / 2, 0.3], d) for s, d in enumerate((0.4, 0.8, 0.6, 1.0))]
+    found = find_gap(Oven(), runs)
+    assert lag_of(found) == pytest.approx(LAG, rel=0.05)
+    assert not told(found)
+
+
+def test_records_of_both_kinds_are_told_apart():
+    runs = [steps(s, [d, 1 - d / 2, 0.3], d * (s % 2)) for s, d in enumerate((0.4, 0.8, 0.6, 1.0))]
+    found = find_gap(Oven(), runs)
+    assert lag_of(found) == pytest.approx(LAG, rel=0.05)
+    (said,) = told(found)
+    assert {"run 0", "run 2"} == {name for name in ("run 0", "run 1", "run 2") if name in said}
+
+
+def test_without_a_lag_it_makes_no_difference_and_is_not_told():
+    runs = [steps(s, [duty], 0.0, lag=0.0, hold=120) for s, duty in enumerate((0.4, 0.8, 0.6))]
+    found = find_gap(Oven(), runs)
+    assert [v.kind for v in found.verdicts if v.kind != "needs_data"] == ["no_gap"]
+    assert not told(found)
+
+
+def test_records_set_aside_are_judged_likewise():
+    found = find_gap(Oven(), TESTS[:3], held=TESTS[3:])
+    assert found.held_out.after.value < 0.1 * found.held_out.before.value
+
+
+def test_what_came_before_a_record_has_an_entry_for_each_input():
+    one = TESTS[0]
+    with pytest.raises(ValueError, match=r"run 0: before has shape \(2,\), expected \(1,\)"):
+        Trajectory(one.name, one.times, one.states, one.actions, np.zeros(2))
+    begun = Trajectory(one.name, one.times, one.states, one.actions, np.zeros(1))
+    assert begun.piece(0, 9).before is begun.before
+    assert begun.piece(1, 9).before is None
