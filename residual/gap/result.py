@@ -23,7 +23,7 @@ Kind = Literal[
 #: holds zero, few blocks of data leave much without a name, or an effect of another kind does as
 #: well.
 Doubt = Literal[
-    "not_needed", "unsteady", "numerics", "at_bound", "calibration", "slight",
+    "not_needed", "unsteady", "creeps", "numerics", "at_bound", "calibration", "slight",
     "no_time", "clock", "gross", "conventions", "may_be_zero", "share_may_be_zero", "few_blocks",
     "rivals",
 ]  # fmt: skip

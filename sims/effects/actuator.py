@@ -82,6 +82,7 @@ class ActuatorBias(StaticActuatorEffect):
     sentence: ClassVar[str] = "The actuator adds a constant to every command."
     needs: ClassVar[str] = "motion in both directions"
     family: ClassVar[str] = "constant push"
+    creeps: ClassVar[bool] = True
     stage: ClassVar[int] = 0
 
     def shape(self, u: Value) -> Value:

@@ -128,6 +128,7 @@ class Effect(abc.ABC):
             output, so that such a record holds its consequence already.
         holds_still: True if up to a size of its own nothing moves: forces of friction, or inputs.
         drives: True if it makes an input stronger or weaker in proportion.
+        creeps: True if it is a constant that is seldom one for long, as zeros of sensors are.
     """
 
     name: ClassVar[str]
@@ -140,6 +141,7 @@ class Effect(abc.ABC):
     upstream_of_sensor: ClassVar[bool] = False
     holds_still: ClassVar[bool] = False
     drives: ClassVar[bool] = False
+    creeps: ClassVar[bool] = False
 
     @property
     def where(self) -> str:

@@ -143,6 +143,7 @@ class ConstantLoad(JointEffect):
     sentence: ClassVar[str] = "A force that pulls with constant strength in one direction."
     needs: ClassVar[str] = "motion in both directions"
     family: ClassVar[str] = "constant push"
+    creeps: ClassVar[bool] = True
     mechanical: ClassVar[bool] = False
     follows_rate: ClassVar[bool] = False
 

@@ -64,6 +64,7 @@ class SensorOffset(SensorEffect):
     sentence: ClassVar[str] = "The sensor's zero is wrong: it reads too much by a constant."
     needs: ClassVar[str] = "a force that depends on the true position, such as gravity"
     family: ClassVar[str] = "constant push"
+    creeps: ClassVar[bool] = True
     stage: ClassVar[int] = 1
 
     def read(self, x: Value) -> Value:

@@ -19,7 +19,8 @@ from studies.gap.words import (
 
 #: Rivals that are listed.
 FEW_RIVALS = 2
-#: Part of the gap that calibrated parameters take off alone, below which they only serve the rest.
+#: Part of the gap that calibrated parameters take off alone, below which, or below that of what is
+#: not certain, they only serve the rest.
 TRIFLE = 0.05
 #: Error on records set aside, over that of the nominal simulator, from which on it is worse.
 WORSE = 1.05
@@ -134,7 +135,8 @@ def _what(result: GapResult) -> str:
     moved = [verdict for verdict in result.verdicts if verdict.kind == "calibrated"]
     words = by_place([_briefly(verdict, result) for verdict in certain])
     beside = ""
-    if moved and (moved[0].share.value > TRIFLE or not (certain or others)):
+    least = max([TRIFLE, *(verdict.share.value for verdict in others)])
+    if moved and (moved[0].share.value > least or not (certain or others)):
         words.append("parameters that are off within their tolerance")
     elif moved:
         beside = ", beside parameters that are moved within their tolerance"

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.confirmation.claim import Claim, other_than
+from residual.gap.confirmation.constancy import creeps
 from residual.gap.confirmation.numerics import at_half_step
 from residual.gap.fitting.intervals import bounded, deviations, ended
 from residual.gap.fitting.plausible import gross
@@ -86,6 +87,7 @@ def claims(
                 brief=brief(search, number, fit.theta[own]),
                 gross=not adequate and not twins and gross_fault(search, key, place),
                 by_fit=by_fit(search, key, number),
+                creeps=creeps(search, key, number),
             )
         )
     return sorted(found, key=lambda claim: -claim.share[0])

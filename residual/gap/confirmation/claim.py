@@ -32,6 +32,7 @@ class Claim:
         needed: Whether forecasts are clearly worse without it; where chance decides, also whether
             its share is above zero in its interval.
         steady: Whether its strength is about the same in every fold.
+        creeps: Whether it is a constant that changes along the records, or from one to another.
         sound: Whether it survives other numerics.
         bounded: Whether a strength lies at its bound.
         share: Part of the nominal squared error that it takes off, with a 95 % interval.
@@ -68,6 +69,7 @@ class Claim:
     counted: bool = False
     by_fit: bool = False
     there: bool = False
+    creeps: bool = False
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
 
@@ -93,6 +95,7 @@ class Claim:
             self.rivals,
             self.alike,
             self.unasked,
+            self.creeps,
         )
         return self.needed and self.gains and self.steady and self.sound and not any(against)
 

@@ -34,12 +34,18 @@ def significant(search: Search, needed: float) -> Key:
     """The set of least score, of which every effect lowers the cost by what chance does not.
 
     Costs of what strikes the ground hang on luck in finding start states, so there the best
-    forecasts decide among such sets that fit as well.
+    forecasts decide among such sets that fit as well. A set that forecasts worse than the nominal
+    simulator is none, however well it fits: noise that is not white passes for an effect.
 
     Args:
         search: Fitted sets, residuals in units of the noise.
-        needed: See ``threshold``.
+        needed: Fall of the cost that earns a name.
     """
+    key = _likeliest(search, needed)
+    return key if search.error(key) <= search.error(()) else ()
+
+
+def _likeliest(search: Search, needed: float) -> Key:
     key = pruned(search, min(search.usable(), key=lambda k: score(search, k)), needed)
     if not key:
         return key

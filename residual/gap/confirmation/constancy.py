@@ -1,0 +1,83 @@
+"""Whether a constant stays the same over the log: zeros of sensors creep, and loads come and go.
+
+Folds interpolate, so that a number which creeps is about the same in each of them. Here every
+number may differ between records, and change along them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t
+
+from residual.gap.fitting.contract import Fit
+from residual.gap.search.sets import Key, Search
+
+Array = NDArray[np.float64]
+
+#: Part of a constant by which it may differ in one record, or change along them, up and down.
+SAME = 0.33
+#: Blocks below which nothing is said.
+FEW = 6
+
+
+def creeps(search: Search, key: Key, number: int) -> bool:
+    """Whether a constant push is clearly another one in one of the records, or changes on the way.
+
+    Args:
+        search: With the fitted set.
+        key: The set.
+        number: Its member; of other than constants nothing is asked.
+    """
+    fit = search.tried[key]
+    if not search.candidates[number].effect.creeps or len(search.fitter.blocks) < FEW:
+        return False
+    own = [int(j) for j in np.flatnonzero(fit.model.owner == key.index(number))]
+    return any(
+        _changes(fit, search.fitter.blocks.block, j, course)
+        for j in own
+        if fit.model.knobs[j].strength
+        for course in _courses(search)
+    )
+
+
+def _courses(search: Search) -> Iterator[Array]:
+    """How a number may go over the windows, each (W,): along every record from -1/2 to 1/2, and
+    otherwise in one of the records."""
+    samples, windows = search.fitter.samples, search.fitter.blocks.windows
+    begins = samples.times[windows.index[:, 0]]
+    along = np.zeros(len(windows))
+    records = np.unique(windows.run)
+    for run in records:
+        own = windows.run == run
+        span = float(np.ptp(begins[own]))
+        along[own] = (begins[own] - begins[own].min()) / span - 0.5 if span > 0 else 0.0
+    yield along
+    if len(records) > 1:
+        for run in records:
+            yield (windows.run == run).astype(float)
+
+
+def _changes(fit: Fit, block: NDArray[np.int64], j: int, course: Array) -> bool:
+    """Whether a number clearly follows a course over the windows, by more than a part of itself.
+
+    By one Gauss-Newton step with the course as one more unknown, and the sandwich over blocks, as
+    ``residual.gap.fitting.intervals`` has it.
+    """
+    root = np.sqrt(fit.weights)[:, None]
+    rows = np.concatenate([fit.by_knob, (fit.by_knob[..., j] * course[:, None])[..., None]], axis=2)
+    rows, residual = rows * root[..., None], fit.projected * root
+    scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
+    rows = rows / scale
+    inverse = np.linalg.pinv(np.einsum("wri,wrj->ij", rows, rows), rcond=1e-9)
+    step = inverse @ np.einsum("wri,wr->i", rows, residual)
+    per_window = np.einsum("wri,wr->wi", rows, residual - rows @ step)
+    count = int(block.max()) + 1
+    scores = np.stack([per_window[block == b].sum(axis=0) for b in range(count)])
+    freedom = max(count - len(step), 1)
+    meat = scores.T @ scores * count / freedom
+    error = np.sqrt(max(float((inverse @ meat @ inverse)[-1, -1]), 0.0)) * t.ppf(0.995, freedom)
+    change = abs(float(step[-1]))
+    return bool(change > error and change / scale[-1] > SAME * abs(float(fit.theta[j])))
