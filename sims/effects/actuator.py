@@ -196,6 +196,7 @@ class Delay(ActuatorEffect):
         "Commands arrive late by a fixed time, or all sensors do, which looks the same."
     )
     needs: ClassVar[str] = "sudden changes of the input"
+    looks_like: ClassVar[str] = "sensors that are late by as much"
     family: ClassVar[str] = "delay or lag"
     stage: ClassVar[int] = 5
 
@@ -209,6 +210,7 @@ class ActuatorLag(ActuatorEffect):
     name: ClassVar[str] = "actuator_lag"
     sentence: ClassVar[str] = "The actuator follows its command gradually, not at once."
     needs: ClassVar[str] = "sudden changes of the input, then rest"
+    looks_like: ClassVar[str] = "a filter of that time constant in the sensors"
     family: ClassVar[str] = "delay or lag"
     upstream_of_sensor: ClassVar[bool] = True
     stage: ClassVar[int] = 6

@@ -128,6 +128,7 @@ class Effect(abc.ABC):
             output, so that such a record holds its consequence already.
         holds_still: True if up to a size of its own nothing moves: forces of friction, or inputs.
         drives: True if it makes an input stronger or weaker in proportion.
+        looks_like: What outside the library moves a system of one input in the same way, in words.
         creeps: True if it is a constant that is seldom one for long, as zeros of sensors are.
     """
 
@@ -142,6 +143,7 @@ class Effect(abc.ABC):
     holds_still: ClassVar[bool] = False
     drives: ClassVar[bool] = False
     creeps: ClassVar[bool] = False
+    looks_like: ClassVar[str] = ""
 
     @property
     def where(self) -> str:

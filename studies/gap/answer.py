@@ -140,7 +140,8 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.kind not in ("confirmed", "ambiguous"):
         return []
     found = [f"without it, {percent(verdict.share.value)} of the gap would be back"]
-    curved = isinstance(known_effects(result)[verdict.label], Curve)
+    effect = known_effects(result)[verdict.label]
+    curved = isinstance(effect, Curve)
     surer = {f: n for f, n in verdict.parameters.items() if much_surer(n) and not curved}
     if surer:
         single = len(verdict.parameters) == 1
@@ -149,7 +150,7 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     doubts = [DOUBTS[doubt] for doubt in verdict.doubts if doubt != "rivals"]
     own = verdict.label
     if own in rivals(verdict):
-        found.append("not certain: of another order it would do nearly as well")
+        found.append("of another order it would do nearly as well")
     others = [label for label in rivals(verdict) if label != own]
     if others:
         found.append(f"one of {names_of((own, *others))}: these data cannot tell which")
@@ -161,6 +162,8 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         known = {o.effect: f" ({_values(o)})" for o in verdict.meant}
         names = [f"{effect_name(name)}{known.get(name, '')}" for name in verdict.same_motion]
         found.append(f"no motion can tell it from {listed(names, 'or')}")
+    if effect.looks_like and len(result.corrected.action_channels) == 1:
+        found.append(f"{effect.looks_like} would look the same")
     for other in verdict.beside:
         twin = next(v for v in result.verdicts if other.effect in v.same_motion)
         meant, named = effect_name(other.effect), effect_name(twin.label)
