@@ -19,8 +19,10 @@ Array = NDArray[np.float64]
 
 #: Part of a constant by which it may differ in one record, or change along them, up and down.
 SAME = 0.33
-#: Blocks below which nothing is said.
-FEW = 6
+#: Chance that any such change of a true constant is taken for one.
+CHANCE = 0.01
+#: Blocks below which nothing is said, and the same of a record.
+FEW, FEW_OF_ONE = 6, 2
 
 
 def creeps(search: Search, key: Key, number: int) -> bool:
@@ -35,18 +37,20 @@ def creeps(search: Search, key: Key, number: int) -> bool:
     if not search.candidates[number].effect.creeps or len(search.fitter.blocks) < FEW:
         return False
     own = [int(j) for j in np.flatnonzero(fit.model.owner == key.index(number))]
+    courses = list(_courses(search))
     return any(
-        _changes(fit, search.fitter.blocks.block, j, course)
+        _changes(fit, search.fitter.blocks.block, j, course, CHANCE / len(courses))
         for j in own
         if fit.model.knobs[j].strength
-        for course in _courses(search)
+        for course in courses
     )
 
 
 def _courses(search: Search) -> Iterator[Array]:
     """How a number may go over the windows, each (W,): along every record from -1/2 to 1/2, and
     otherwise in one of the records."""
-    samples, windows = search.fitter.samples, search.fitter.blocks.windows
+    samples, blocks = search.fitter.samples, search.fitter.blocks
+    windows = blocks.windows
     begins = samples.times[windows.index[:, 0]]
     along = np.zeros(len(windows))
     records = np.unique(windows.run)
@@ -55,12 +59,13 @@ def _courses(search: Search) -> Iterator[Array]:
         span = float(np.ptp(begins[own]))
         along[own] = (begins[own] - begins[own].min()) / span - 0.5 if span > 0 else 0.0
     yield along
-    if len(records) > 1:
-        for run in records:
-            yield (windows.run == run).astype(float)
+    for run in records if len(records) > 1 else ():
+        own = windows.run == run
+        if len(np.unique(blocks.block[own])) >= FEW_OF_ONE:
+            yield own.astype(float)
 
 
-def _changes(fit: Fit, block: NDArray[np.int64], j: int, course: Array) -> bool:
+def _changes(fit: Fit, block: NDArray[np.int64], j: int, course: Array, chance: float) -> bool:
     """Whether a number clearly follows a course over the windows, by more than a part of itself.
 
     By one Gauss-Newton step with the course as one more unknown, and the sandwich over blocks, as
@@ -73,11 +78,14 @@ def _changes(fit: Fit, block: NDArray[np.int64], j: int, course: Array) -> bool:
     rows = rows / scale
     inverse = np.linalg.pinv(np.einsum("wri,wrj->ij", rows, rows), rcond=1e-9)
     step = inverse @ np.einsum("wri,wr->i", rows, residual)
-    per_window = np.einsum("wri,wr->wi", rows, residual - rows @ step)
+    left = residual - rows @ step
+    per_window = np.einsum("wri,wr->wi", rows, left)
     count = int(block.max()) + 1
     scores = np.stack([per_window[block == b].sum(axis=0) for b in range(count)])
     freedom = max(count - len(step), 1)
     meat = scores.T @ scores * count / freedom
-    error = np.sqrt(max(float((inverse @ meat @ inverse)[-1, -1]), 0.0)) * t.ppf(0.995, freedom)
-    change = abs(float(step[-1]))
-    return bool(change > error and change / scale[-1] > SAME * abs(float(fit.theta[j])))
+    sandwich = float((inverse @ meat @ inverse)[-1, -1])
+    plain = float((left**2).sum() / max((left != 0).sum() - len(step), 1) * inverse[-1, -1])
+    change, error = abs(float(step[-1])), np.sqrt(max(sandwich, plain, 0.0))
+    clear = change > error * t.ppf(1 - chance / 2, freedom)
+    return bool(clear and change / scale[-1] > SAME * abs(float(fit.theta[j])))

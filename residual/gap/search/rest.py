@@ -36,6 +36,8 @@ def rest(simulator: HostSimulator) -> Array:
 
 def from_rest(simulator: HostSimulator, runs: Sequence[Trajectory]) -> list[Trajectory]:
     """The runs, those that begin while an input is on taken to have begun from rest."""
+    if not runs:
+        return []
     still = rest(simulator)
     most = np.max([np.abs(run.actions - still).max(axis=0) for run in runs], axis=0)
     return [

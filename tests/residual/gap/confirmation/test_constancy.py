@@ -9,7 +9,7 @@ from oven import Oven, steps
 from residual.gap import find_gap
 
 DUTIES = [np.random.default_rng(seed).uniform(0.1, 1.0, 12) for seed in (0, 1)]
-RUNS = [steps(seed, list(duties), 0.3, lag=0.0) for seed, duties in enumerate(DUTIES)]
+RUNS = [steps(seed, list(duties), 0.3, lag=0.0, hold=30) for seed, duties in enumerate(DUTIES)]
 
 
 def shifted(run, first, last):
