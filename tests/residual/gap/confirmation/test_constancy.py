@@ -9,7 +9,9 @@ from oven import Oven, steps
 from residual.gap import find_gap
 
 DUTIES = [np.random.default_rng(seed).uniform(0.1, 1.0, 12) for seed in (0, 1)]
-RUNS = [steps(seed, list(duties), 0.3, lag=0.0, hold=30) for seed, duties in enumerate(DUTIES)]
+RUNS = [steps(seed, list(duties), 0.3, lag=0.0) for seed, duties in enumerate(DUTIES)]
+
+OFFERED = ("constant_load", "sensor_offset", "actuator_gain")
 
 
 def shifted(run, first, last):
@@ -24,7 +26,7 @@ def shifted(run, first, last):
 ])  # fmt: skip
 def test_a_push_is_certain_only_while_it_is_a_constant(zeros, creeps):
     runs = [shifted(run, *ends) for run, ends in zip(RUNS, zeros, strict=True)]
-    (named,) = [v for v in find_gap(Oven(), runs).verdicts if v.label]
+    (named,) = [v for v in find_gap(Oven(), runs, effects=OFFERED).verdicts if v.label]
     assert named.effect in ("constant_load", "sensor_offset")
     assert ("creeps" in named.doubts) == creeps
     assert (named.kind == "confirmed") == (not creeps)

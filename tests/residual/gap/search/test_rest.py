@@ -21,6 +21,7 @@ def told(found):
     return [text for text in found.quality if "taken to be rest" in text]
 
 
+OFFERED = ("actuator_lag", "delay", "actuator_gain", "constant_load", "slow")
 TESTS = [steps(s, [duty], 0.0, hold=120) for s, duty in enumerate((0.4, 0.8, 0.6, 1.0))]
 
 
@@ -34,14 +35,14 @@ def test_a_lag_shows_in_step_tests_that_begin_with_the_step(turned):
 
 def test_what_was_settled_at_its_first_input_stays_so():
     runs = [steps(s, [d, 1 - d / 2, 0.3], d) for s, d in enumerate((0.4, 0.8, 0.6, 1.0))]
-    found = find_gap(Oven(), runs)
+    found = find_gap(Oven(), runs, effects=OFFERED)
     assert lag_of(found) == pytest.approx(LAG, rel=0.05)
     assert not told(found)
 
 
 def test_records_of_both_kinds_are_told_apart():
     runs = [steps(s, [d, 1 - d / 2, 0.3], d * (s % 2)) for s, d in enumerate((0.4, 0.8, 0.6, 1.0))]
-    found = find_gap(Oven(), runs)
+    found = find_gap(Oven(), runs, effects=OFFERED)
     assert lag_of(found) == pytest.approx(LAG, rel=0.05)
     (said,) = told(found)
     assert {"run 0", "run 2"} == {name for name in ("run 0", "run 1", "run 2") if name in said}
@@ -49,13 +50,13 @@ def test_records_of_both_kinds_are_told_apart():
 
 def test_without_a_lag_it_makes_no_difference_and_is_not_told():
     runs = [steps(s, [duty], 0.0, lag=0.0, hold=120) for s, duty in enumerate((0.4, 0.8, 0.6))]
-    found = find_gap(Oven(), runs)
+    found = find_gap(Oven(), runs, effects=OFFERED)
     assert [v.kind for v in found.verdicts if v.kind != "needs_data"] == ["no_gap"]
     assert not told(found)
 
 
 def test_records_set_aside_are_judged_likewise():
-    found = find_gap(Oven(), TESTS[:3], held=TESTS[3:])
+    found = find_gap(Oven(), TESTS[:3], held=TESTS[3:], effects=OFFERED)
     assert found.held_out.after.value < 0.1 * found.held_out.before.value
 
 
