@@ -227,7 +227,7 @@ class Mean:
     Linear(), GaussianProcess(), DropoutNet(), NamedEffects(), Ensemble(), Mean(),
     PLSRegression(), TransformedTargetRegressor(), make_pipeline(StandardScaler(), Ridge()),
     make_pipeline(StandardScaler(), GridSearchCV(Ridge(), {"alpha": [1.0]})),
-], ids=str)  # fmt: skip
+], ids=lambda v: type(v).__name__)  # fmt: skip
 def test_regressors_of_any_library_may_learn_a_difference(given):
     check_regressor(given)
 
@@ -237,7 +237,7 @@ def test_regressors_of_any_library_may_learn_a_difference(given):
     (IsolationForest(), "outlier detector"), (StandardScaler(), "it has no predict"),
     (make_pipeline(StandardScaler(), LogisticRegression()), "classifier"),
     (object(), "it has no predict"),
-], ids=str)  # fmt: skip
+], ids=lambda v: v if isinstance(v, str) else type(v).__name__)  # fmt: skip
 def test_what_is_no_regressor_is_refused_before_anything_is_computed(given, says):
     name = type(given).__name__
     with pytest.raises(ValueError, match=rf"estimator is {name}, which is no regressor \({says}\)"):
