@@ -89,7 +89,7 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             )
         self._name = f"the true environment {type(env.unwrapped).__name__}"
         self._angles = np.array([channel.angle for channel in nominal.state_channels])
-        self._starts = _starts(task, len(self._angles))
+        self._lowest, self._highest = _starts(task, len(self._angles))
         self._state: Array = np.zeros(0)
         self._steps = 0
 
@@ -107,7 +107,7 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         observation, info = begun
         self._steps = 0
         start = self._read(observation, info)
-        middle = 0.5 * (self._starts.min(axis=0) + self._starts.max(axis=0))
+        middle = 0.5 * (self._lowest + self._highest)
         self._state = np.where(self._angles, middle + wrap(start - middle), start)
         self._compare_start()
         return observe(self.nominal, self._state[None])[0], {"state": self._state.copy()}
@@ -157,7 +157,7 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _compare_start(self) -> None:
         """Say where an episode begins far from all starts of the task."""
-        low, high = self._starts.min(axis=0), self._starts.max(axis=0)
+        low, high = self._lowest, self._highest
         channels = self.nominal.state_channels
         slack = high - low + _NEARBY * np.array([channel.scale for channel in channels])
         far = (self._state < low - slack) | (self._state > high + slack)
@@ -213,9 +213,10 @@ def _refuse_call(function: Callable[..., Any], such_as: str, *given: Any, **name
         )
 
 
-def _starts(task: Task, width: int) -> Array:
-    """Where episodes of a task start, shape (n, n_s)."""
-    return np.array([task.start(np.random.default_rng(n))[:width] for n in range(_STARTS)], float)
+def _starts(task: Task, width: int) -> tuple[Array, Array]:
+    """The ends of where episodes of a task start, each (n_s,)."""
+    starts = [task.start(np.random.default_rng(seed))[:width] for seed in range(_STARTS)]
+    return np.min(starts, axis=0), np.max(starts, axis=0)
 
 
 def _warn_once(name: str, what: str, says: str) -> None:

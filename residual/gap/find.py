@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from residual.gap.answer.answer import judged_apart, matters, summed_up, told
+from residual.gap.confirmation.rest import from_rest
 from residual.gap.data.examine import examine
 from residual.gap.data.excerpt import excerpt
 from residual.gap.inquiry import Clock, Inquiry
@@ -19,7 +20,6 @@ from residual.gap.preparation.numerics import held_as, stride_for
 from residual.gap.result import GapResult
 from residual.gap.search.finals import on_more_windows
 from residual.gap.search.known import KNOWN
-from residual.gap.search.rest import from_rest
 from residual.trajectories import Trajectory
 from sims.contract import refuse_unsound
 from sims.effects.base import Effect

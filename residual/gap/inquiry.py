@@ -13,6 +13,7 @@ from residual.gap.answer.free_parameters import better, worth_freeing
 from residual.gap.answer.lone import explains_the_rest, lone_stretch
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
+from residual.gap.confirmation.rest import fits_better_from_rest
 from residual.gap.confirmation.twins import exact_twins, with_twins
 from residual.gap.fitting.smooth import LEAD, SmoothFitter
 from residual.gap.log import Log
@@ -21,7 +22,6 @@ from residual.gap.offered import Offered
 from residual.gap.preparation.numerics import held_otherwise, how_held
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.search.explain import Explanation, explain
-from residual.gap.search.rest import fits_better_from_rest
 from residual.gap.search.sets import Search
 from sims.effects.base import Effect
 from sims.host import HostSimulator
@@ -134,8 +134,7 @@ class Inquiry:
         self.tell("inputs held the other way fit better: once more so")
         ready = prepare(other, log.runs, log.horizon)
         again = self.explained(other, ready, earlier=found.search)
-        errors = [forecast_error(one.search, one.key) for one in (again, found)]
-        if CLEARLY**2 * errors[0] < errors[1]:
+        if _clearly_better(again, found):
             says = (
                 f"inputs were taken to {how_held(other)}: the data fit better so; set hold to say "
                 "otherwise"
@@ -167,8 +166,7 @@ class Inquiry:
         begun = dataclasses.replace(log, runs=runs)
         ready = prepare(found.search.simulator, runs, log.horizon)
         again = self.explained(found.search.simulator, ready, earlier=found.search)
-        errors = [forecast_error(one.search, one.key) for one in (again, found)]
-        if CLEARLY**2 * errors[0] >= errors[1]:
+        if not _clearly_better(again, found):
             return log, prepared, found, []
         late = [run.name for run in runs if run.before is not None]
         more = f" and {len(late) - 3} more" if len(late) > 3 else ""
@@ -275,3 +273,9 @@ class Inquiry:
         if not explains_the_rest(answer):
             return known.and_says(stretch.says(left_out=False))
         return Confirmed(ready, answer, (stretch.says(left_out=True),))
+
+
+def _clearly_better(again: Explanation, found: Explanation) -> bool:
+    """Whether what was found in another reading of the log forecasts clearly better."""
+    errors = [forecast_error(one.search, one.key) for one in (again, found)]
+    return CLEARLY**2 * errors[0] < errors[1]

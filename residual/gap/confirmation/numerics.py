@@ -15,7 +15,8 @@ from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
-#: Part of the misfit that the other hold must take off to be believed.
+#: Part of the misfit that another way to read the log, such as the other hold, must take off to be
+#: believed.
 CLEARER = 0.05
 #: Sub-steps of a corrected simulator, at most, over the nominal one's.
 FINEST = 32

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.confirmation.numerics import CLEARER
 from residual.gap.data.samples import in_order
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.smooth import SmoothFitter
@@ -24,8 +25,6 @@ Array = NDArray[np.float64]
 
 #: Part of an input's largest reading from rest below which it rests.
 STILL = 0.05
-#: Part of the misfit that a beginning from rest must take off to be believed.
-CLEARER = 0.05
 
 
 def rest(simulator: HostSimulator) -> Array:
