@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.fitting.screening import Gain, Signatures, gains, pair_gains, triple_gains
-from residual.gap.search.exchange import spelt_out
+from residual.gap.search.exchange import from_screen, spelt_out
 from residual.gap.search.redundant import by_points
 from residual.gap.search.sets import Key, Proposals, Search
 from residual.gap.search.significance import score
@@ -135,11 +135,9 @@ def grow(search: Search, key: Key) -> list[Key]:
 
 def several(search: Search, ranked: list[Gain]) -> list[Key]:
     """Fit what the linear screen of the nominal simulator ranks, several effects at once."""
-    variants = search.signatures(()).variants
     found: list[Key] = []
     for gain in ranked:
-        numbers = [variants[v].candidate for v in gain.variants]
-        fresh, theta = search.merged((), zip(numbers, gain.values, strict=True))
+        fresh, theta = from_screen(search, (), gain)
         if search.fits_in(fresh) and not search.late:
             found += sound(search, fresh, theta)
     return found

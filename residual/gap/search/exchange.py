@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.fitting.screening import gains, pair_gains
+from residual.gap.fitting.screening import Gain, gains, pair_gains
 from residual.gap.search.redundant import doubles
 from residual.gap.search.sets import Key, Search, all_but
 
@@ -135,9 +135,15 @@ def _add_pairs(search: Search, rest: Key, most: int, *without: int) -> None:
     around = search.signatures(rest)
     larger = [n for n, one in enumerate(search.candidates) if len(one.knobs) != 1]
     for pair in pair_gains(around, most, without=[*larger, *rest, *without]):
-        numbers = [around.variants[v].candidate for v in pair.variants]
-        fresh, theta = search.merged(rest, zip(numbers, pair.values, strict=True))
+        fresh, theta = from_screen(search, rest, pair)
         search.add({fresh: theta} if search.fits_in(fresh) else {})
+
+
+def from_screen(search: Search, rest: Key, gain: Gain) -> tuple[Key, Array]:
+    """The set with what the linear screen around another one ranks, and where its fit begins."""
+    variants = search.signatures(rest).variants
+    numbers = [variants[v].candidate for v in gain.variants]
+    return search.merged(rest, zip(numbers, gain.values, strict=True))
 
 
 def both_hold_still(search: Search, one: int, other: int) -> bool:
