@@ -55,7 +55,7 @@ class Motion:
 
     def load(self, q: Array, v: Array, force: Array | None = None) -> Array:
         """Force of the smooth effects on every joint, and a further force."""
-        total = np.zeros_like(q) if force is None else force
+        total = np.zeros(q.shape) if force is None else force
         for j, effect in self.smooth:
             total[j] += effect.force(q[j], v[j])
         return total
@@ -115,7 +115,7 @@ class Motion:
 
     def limits(self, v: Array) -> Array:
         """Size of the dry friction on every joint."""
-        size = np.zeros_like(v)
+        size = np.zeros(v.shape)
         for j, effect in self.dry:
             size[j] += effect.limit(np.abs(v[j]))
         return size

@@ -80,7 +80,7 @@ def _limits(motion: Motion, state: State) -> Limits:
     for i, (_, play) in enumerate(motion.plays):
         edges[i] = 0.5 * play.width
     joints = np.array([j for j, _ in motion.plays], np.intp)
-    return Limits(motion.limits(np.zeros_like(state.v)), edges, joints)
+    return Limits(motion.limits(np.zeros(state.v.shape)), edges, joints)
 
 
 def _attempt(motion: Motion, limits: Limits, state: State, u: Array, h: Array) -> Attempt:
@@ -147,7 +147,7 @@ def _loads(
 ) -> tuple[Array, Array]:
     """Forces of effects, friction and open plays on the joints, and speeds in the play."""
     force = -mode.slip * (limits.rest if motion.even else motion.limits(v))
-    running = np.zeros_like(x)
+    running = np.zeros(x.shape)
     if motion.plays and mode.open.any():
         push, free = motion.drive_and_free(q, v, u)
         for i, (j, _) in enumerate(motion.plays):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import functools
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
@@ -167,21 +168,19 @@ class Effect(abc.ABC):
     @classmethod
     def numbers(cls) -> tuple[str, ...]:
         """Names of the numeric fields."""
-        return tuple(f.name for f in dataclasses.fields(cls) if "dimension" in f.metadata)
+        return tuple(name for name, known in _known(cls).items() if "dimension" in known)
 
     @classmethod
     def strengths(cls) -> tuple[str, ...]:
         """Names of the fields that make the effect vanish at their nominal value."""
-        return tuple(
-            f.name for f in dataclasses.fields(cls) if f.metadata.get("role") == "strength"
-        )
+        return tuple(name for name, known in _known(cls).items() if known.get("role") == "strength")
 
     def present(self) -> Any:
         """Whether it does anything: a bool, or per row an array of them."""
-        nominal = {f.name: f.metadata.get("nominal") for f in dataclasses.fields(self)}
+        known = _known(type(self))
         there: Any = False
         for name in self.strengths():
-            there = there | (np.asarray(getattr(self, name)) != nominal[name])
+            there = there | (np.asarray(getattr(self, name)) != known[name].get("nominal"))
         return there
 
     @property
@@ -253,6 +252,12 @@ class Effect(abc.ABC):
 
     def __str__(self) -> str:
         return f"{self.name}@{self.where}"
+
+
+@functools.cache
+def _known(kind: type[Effect]) -> dict[str, Mapping[str, Any]]:
+    """What the fields of a class say of themselves; asked for at every step of a simulation."""
+    return {field.name: field.metadata for field in dataclasses.fields(kind)}
 
 
 def _tidy(value: float) -> float:
