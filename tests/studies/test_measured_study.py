@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
+import quick_gap
 
 from residual.trajectories import Transitions
 from simgap_files.npz import write_npz
-from studies import pendulum_gap
 
 TINY = [
     "--estimator", "residual.Linear",
@@ -31,7 +31,7 @@ TINY = [
 )
 def test_a_run_ends_and_runs_on_from_what_it_kept(sensors, tmp_path, capsys):
     for _ in range(2):
-        pendulum_gap.main([*TINY, *sensors, "--output", str(tmp_path / "run")])
+        quick_gap.main([*TINY, *sensors, "--output", str(tmp_path / "run")])
         found = json.loads((tmp_path / "run" / "results.json").read_text())
         (accuracy,) = found["accuracy"]
         assert np.isfinite(accuracy["visited"]["one_step"]["rate"])
