@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from sims.checks import check_simulator
 from sims.effects.library import library
 from sims.loading import chosen_effects
+from studies.hidden.dirty import sets
 from studies.hidden.dirty.measure import Sensors, records
 from studies.hidden.dirty.report import headlines, judged, misses
 from studies.hidden.dirty.score import oracle, same_as
@@ -169,7 +170,9 @@ def test_an_effect_that_cannot_be_hidden_is_one_line(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-def test_fast_subset(tmp_path, capsys):
+def test_fast_subset(tmp_path, capsys, monkeypatch):
+    """With a quarter of the records."""
+    monkeypatch.setattr(sets, "SECONDS", {name: 0.25 * s for name, s in sets.SECONDS.items()})
     main(["--config", "studies/configs/hidden_effects/dirty_fast.yaml", "--output", str(tmp_path)])
     assert "or its family" in capsys.readouterr().out
     text = (tmp_path / "dirty.md").read_text()
