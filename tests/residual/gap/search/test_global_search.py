@@ -50,9 +50,16 @@ def ramps(fine: int = 100) -> Trajectory:
     return Trajectory("ramps", times, states, commands[:-1, None])
 
 
+#: Enough to be wrong with.
+OFFERED = (
+    "stribeck_friction", "coulomb_friction", "viscous_friction", "actuator_gain", "gain",
+    "time_constant", "dead_zone", "delay", "sensor_scale",
+)  # fmt: skip
+
+
 @pytest.fixture(scope="module")
 def motor() -> GapResult:
-    return find_gap(Motor(), [ramps()])
+    return find_gap(Motor(), [ramps()], effects=OFFERED)
 
 
 def test_a_motor_has_stribeck_friction_and_another_gain(motor: GapResult) -> None:
