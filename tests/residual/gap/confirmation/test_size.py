@@ -35,7 +35,7 @@ class Cart(EquationOfMotion):
         return ((p.force_per_count * u[:, 0] + force[:, 0]) / p.mass)[:, None]
 
 
-def pushed(friction, gain, rows=600, noise=5e-4, wave=0.03):
+def pushed(friction, gain, rows=360, noise=5e-4, wave=0.03):
     """Positions of the true cart, whose motor also gets weaker and stronger in turn."""
     rng = np.random.default_rng(0)
     pwm = np.repeat(rng.uniform(-200, 200, rows // 12 + 1), 12)[:rows]
