@@ -57,7 +57,7 @@ def test_play_moves_as_in_the_simulator():
 
 
 def test_play_is_named_with_its_width():
-    logs = make_logs(Truth(backlash=0.35), 8, "strong", "A", 8)
+    logs = make_logs(Truth(backlash=0.35), 8, "strong", "A", 4)
     (verdict,) = find_gap(PendulumEquation(), logs).verdicts
     assert (verdict.kind, verdict.effect) == ("confirmed", "backlash")
     assert verdict.parameters["width"].low <= 0.35 <= verdict.parameters["width"].high
