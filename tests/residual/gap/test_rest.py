@@ -10,6 +10,8 @@ from sims.effects import ViscousFriction
 from sims.pendulum_equation import PendulumEquation
 
 RUNS, SWINGING, REST = 3, 60, 500
+#: Enough to be wrong with.
+OFFERED = ("viscous_friction", "coulomb_friction", "quadratic_drag", "mass", "sensor_offset")
 
 
 def kicked_and_left_alone(load: float) -> list[Trajectory]:
@@ -30,7 +32,7 @@ def kicked_and_left_alone(load: float) -> list[Trajectory]:
 
 
 def test_a_gap_of_short_motions_is_named_amid_long_rest():
-    result = find_gap(PendulumEquation(), kicked_and_left_alone(0.0006))
+    result = find_gap(PendulumEquation(), kicked_and_left_alone(0.0006), effects=OFFERED)
     first = result.verdicts[0]
     assert (first.kind, first.effect) in {
         ("confirmed", "viscous_friction"), ("ambiguous", "viscous_friction"),
