@@ -12,6 +12,13 @@ from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
 
 MIDDLE, LONG = 125, 50
+#: What is hidden among others.
+OFFERED = ("sensor_offset", "mass", "coulomb_friction", "viscous_friction", "delay")
+
+
+def ask(logs):
+    options = {"effects": OFFERED, "hold": "zero", "minutes": 20.0}
+    return find_gap(PendulumEquation(), logs, **options)
 
 
 def reset(run, other):
@@ -37,7 +44,7 @@ def by_hand(run, _):
 def test_what_the_rest_of_the_log_shows_is_named(what, begin, end):
     logs = list(make_logs(Truth(sensor_offset=0.1), 11, "strong", "A", 5))
     logs[2] = what(logs[2], logs[3])
-    found = find_gap(PendulumEquation(), logs, hold="zero", minutes=20.0)
+    found = ask(logs)
     first = found.verdicts[0]
     assert first.effect == "sensor_offset"
     assert first.parameters["offset"].value == pytest.approx(0.1, rel=0.05)
@@ -47,8 +54,7 @@ def test_what_the_rest_of_the_log_shows_is_named(what, begin, end):
 
 
 def test_no_stretch_is_told_of_a_log_without_one():
-    logs = make_logs(Truth(sensor_offset=0.1), 11, "strong", "A", 5)
-    found = find_gap(PendulumEquation(), logs, hold="zero", minutes=20.0)
+    found = ask(make_logs(Truth(sensor_offset=0.1), 11, "strong", "A", 5))
     assert not [one for one in found.quality if "one stretch" in one]
 
 
