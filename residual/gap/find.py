@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from residual.gap.answer.answer import judged_apart, matters, summed_up, told
+from residual.gap.answer.records import unlike
 from residual.gap.confirmation.rest import from_rest
 from residual.gap.data.examine import examine
 from residual.gap.data.excerpt import excerpt
@@ -105,6 +106,8 @@ def find_gap(
         asked = matters(found, tolerance)
         known = inquiry.confirmed(log, prepared, found, asked, parameter_tolerance)
         answer = known.answer
+        tell("do the records differ?")
+        differ = unlike(answer) if asked and not clock.late else ()
         clock.lap("confirm")
 
         if conventions is not None:  # it is asked first, so that nothing is certain before
@@ -123,4 +126,4 @@ def find_gap(
     quality = [*log.findings, *log.left_out, *other, *on_hold, *on_rest, *on_more, *known.says]
     quality += inquiry.untried(answer)
     result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)
-    return dataclasses.replace(result, conventions=conventions)
+    return dataclasses.replace(result, conventions=conventions, unlike=differ)

@@ -48,6 +48,11 @@ class Clock:
         yield
         self.confirm_until += time.process_time() - begin
 
+    @property
+    def late(self) -> bool:
+        """Whether the time for confirming is over, too."""
+        return time.process_time() > self.confirm_until
+
     def lap(self, step: str) -> None:
         """End of a step."""
         now = time.perf_counter()

@@ -224,6 +224,30 @@ class Blind:
 
 
 @dataclasses.dataclass(frozen=True)
+class Unlike:
+    """An effect that every record wants in a size of its own.
+
+    Attributes:
+        effect, where: Its name and place.
+        field, unit: The number, and its unit.
+        sizes: By record, of those with data enough.
+        share: Part of the nominal simulator's cross-validated squared error that has a name then.
+    """
+
+    effect: str
+    where: str
+    field: str
+    unit: str
+    sizes: Mapping[str, float]
+    share: float
+
+    @property
+    def label(self) -> str:
+        """``name@where``, or the name alone of a parameter."""
+        return self.effect if self.where == self.effect else f"{self.effect}@{self.where}"
+
+
+@dataclasses.dataclass(frozen=True)
 class Conventions:
     """What the log may count otherwise than the simulator.
 
@@ -259,6 +283,8 @@ class GapResult:
         seconds: Time spent, by stage.
         substeps: Sub-steps per control period of ``corrected``, if it needs more than it had.
         conventions: What to look at first, None where nothing is counted otherwise.
+        unlike: Effects that would take much of what is left off with a size of their own in each
+            record, best first.
     """
 
     verdicts: tuple[Verdict, ...]
@@ -277,6 +303,7 @@ class GapResult:
     seconds: dict[str, float]
     substeps: int | None = None
     conventions: Conventions | None = None
+    unlike: tuple[Unlike, ...] = ()
 
     def __repr__(self) -> str:
         kinds = "; ".join(f"{v.effect} {v.kind}".strip() for v in self.verdicts[:4])

@@ -148,6 +148,7 @@ def gap_record(
     return {
         "says": lead(result, config.get("tolerance")),
         "conventions": dataclasses.asdict(result.conventions) if result.conventions else None,
+        "unlike": [dataclasses.asdict(one) for one in result.unlike],
         "verdicts": [dataclasses.asdict(verdict) for verdict in result.verdicts],
         "gap": dataclasses.asdict(result.gap),
         "held_out": dataclasses.asdict(result.held_out) if result.held_out else None,

@@ -6,6 +6,7 @@ from residual.gap import GapResult
 from residual.gap.fitting.forecasts import own_channels
 from residual.gap.result import ChannelGap, Verdict
 from studies.gap.answer import rivals
+from studies.gap.records import beside_lead
 from studies.gap.words import (
     ahead,
     by_place,
@@ -39,7 +40,7 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
         result: What was found.
         tolerance: Forecast error that does not matter.
     """
-    return _conventions(result) + _named_share(result, tolerance)
+    return _conventions(result) + _named_share(result, tolerance) + beside_lead(result)
 
 
 def _conventions(result: GapResult) -> str:

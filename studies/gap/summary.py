@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from residual.gap import GapResult
 from residual.gap.result import ChannelGap, Gap
 from residual.logs import Finding
+from studies.gap import records
 from studies.gap.answer import headline, is_footnote, kind_text, notes
 from studies.gap.lead import lead, own_errors
 from studies.gap.words import CROSS_VALIDATED, ahead, found_once, gap_rows, span_text, unit_text
@@ -33,13 +34,9 @@ def summary(result: GapResult, tolerance: float | None = None) -> str:
         if is_footnote(verdict):
             lines += wrapped(f"{text[:-1]}; {'; '.join(notes(verdict, result))}.", "")
             continue
-        kind = kind_text(verdict).upper()
-        if len(kind) >= KIND:
-            lines += [kind, *wrapped(text, " " * KIND)]
-        else:
-            lines += wrapped(text, " " * KIND, kind)
-        for note in notes(verdict, result):
-            lines += wrapped(note, " " * KIND)
+        lines += paragraph(kind_text(verdict), text, notes(verdict, result))
+    if result.unlike:
+        lines += paragraph(records.LABEL, records.headline(result), records.notes(result))
     if lines[-1]:
         lines.append("")
     gap = result.gap
@@ -61,6 +58,18 @@ def summary(result: GapResult, tolerance: float | None = None) -> str:
     if len(result.quality) > NOTES:
         lines.append(f"      and {len(result.quality) - NOTES} more in the report")
     return "\n".join(lines)
+
+
+def paragraph(kind: str, text: str, more: Sequence[str]) -> list[str]:
+    """A kind of answer in the margin, what it says, and what there is to know of it."""
+    kind = kind.upper()
+    if len(kind) >= KIND:
+        lines = [kind, *wrapped(text, " " * KIND)]
+    else:
+        lines = wrapped(text, " " * KIND, kind)
+    for note in more:
+        lines += wrapped(note, " " * KIND)
+    return lines
 
 
 def wrapped(text: str, indent: str, first: str = "") -> list[str]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 from residual.gap import GapResult
 from residual.gap.result import Verdict as Answer
+from studies.gap import records
 from studies.gap.answer import (
     experiment,
     headline,
@@ -16,7 +18,7 @@ from studies.gap.answer import (
     sentence,
 )
 from studies.gap.lead import lead
-from studies.gap.words import effect_name, names_of, set_name, unit_text
+from studies.gap.words import capitalized, effect_name, names_of, set_name, unit_text
 from studies.reporting.sections import Cell, Prose, Section, Table, Verdict
 
 Tone = Literal["good", "warning", "bad", "neutral"]
@@ -51,6 +53,13 @@ def banners(result: GapResult, tolerance: float | None) -> list[Section]:
         elif verdict.kind == "minor" or is_footnote(verdict):
             says = headline(verdict, result)
             small.append("; ".join([says[:-1], *notes(verdict, result)]) + ".")
+    if result.unlike:
+        sections.append(
+            Verdict(
+                records.headline(result), _sentences(records.notes(result)), tone="warning",
+                label=records.LABEL,
+            )
+        )  # fmt: skip
     if small:
         minor = any(verdict.kind == "minor" for verdict in result.verdicts)
         why = (
@@ -66,11 +75,15 @@ def banners(result: GapResult, tolerance: float | None) -> list[Section]:
 def banner(answer: Answer, result: GapResult) -> Verdict:
     """One verdict."""
     text = [sentence(answer.label, result)] if answer.effect else []
-    text += [f"{note[:1].upper()}{note[1:]}." for note in notes(answer, result)]
+    text.append(_sentences(notes(answer, result)))
     return Verdict(
         headline(answer, result), " ".join(filter(None, text)), tone=TONES[answer.kind],
         label=kind_text(answer),
     )  # fmt: skip
+
+
+def _sentences(clauses: Sequence[str]) -> str:
+    return " ".join(f"{capitalized(clause)}." for clause in clauses)
 
 
 def evidence(result: GapResult) -> Table:

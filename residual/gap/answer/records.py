@@ -1,0 +1,187 @@
+"""What differs between records: an effect of which every record wants a size of its own.
+
+A number has one value in all records, so that an effect which changed from one record to the next
+(another load, a slope up and down, a supply that sagged) helps none of them and is not named. If
+it takes much of the error off once each record has its own size, forecasts of blocks that did not
+fit that size say so; which effect it is they seldom tell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.answer.answer import Answer
+from residual.gap.fitting.bounded import bounded_step
+from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.forecasts import noise_floor
+from residual.gap.fitting.screening import beside_starts, constrained, flatten, trials
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.fitting.validation import by_block, validate
+from residual.gap.result import Unlike
+from residual.gap.search.sets import Key, Search, all_but
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Part of the squared error with one size for all, less what noise makes, that sizes by record may
+#: leave.
+HALF = 0.5
+#: Standard errors over blocks by which they have to be better at one joint.
+CLEARLY = 3.0
+#: Blocks from which a record has a size of its own.
+ENOUGH = 2
+#: Effects that are asked beside those that were found, and of all that help so many are told.
+ASKED, TOLD = 4, 3
+#: Error over that of the best one up to which another does nearly as well.
+NEARLY = 1.15
+
+
+def unlike(answer: Answer) -> tuple[Unlike, ...]:
+    """Effects that take much of what is left off with a size of their own in each record.
+
+    Args:
+        answer: What was found with one size for all.
+
+    Returns:
+        Best first; none of a single record, where only noise is left, or if records agree.
+    """
+    search, key = answer.found.search, answer.key
+    fitter = search.fitter
+    if not isinstance(fitter, SmoothFitter):
+        return ()
+    names, group = _records(fitter)
+    if len(names) < 2 or fitter.left(search.tried[key], answer.found.floor).adequate:
+        return ()
+    noise = noise_floor(fitter, search.tried[key], answer.found.floor.sigma)
+    asked = _worth(search, key, group)
+    found = [_asked(search, key, number, names, group, noise) for number in asked]
+    helping = sorted((pair for pair in found if pair), key=lambda pair: pair[0])
+    return tuple(one for error, one in helping if error <= NEARLY * helping[0][0])[:TOLD]
+
+
+def _records(fitter: SmoothFitter) -> tuple[tuple[str, ...], Integers]:
+    """Names of the records with data enough, and the record of every window, (W,), by number;
+    all others count as one more."""
+    blocks = fitter.blocks
+    run = blocks.windows.run
+    enough = [r for r in np.unique(run) if len(np.unique(blocks.block[run == r])) >= ENOUGH]
+    group = np.full(len(run), len(enough))
+    for number, r in enumerate(enough):
+        group[run == r] = number
+    return tuple(fitter.samples.names[r] for r in enough), group
+
+
+def _worth(search: Search, key: Key, group: Integers) -> list[int]:
+    """Members of a set, and the candidates that take most off in the linear picture."""
+    fit = search.tried[key]
+    screened = search.candidates[: search.screened]
+    columns = beside_starts(fit, search.fitter.columns(fit, screened))
+    residual = flatten(fit.projected, fit.weights)
+    gains: dict[int, float] = {}
+    for variant in trials(screened):
+        if len(variant.columns) != 1 or variant.candidate in key:
+            continue
+        apart = _by_group(columns[..., list(variant.columns)], group)
+        rows = flatten(np.concatenate([fit.by_knob, apart], axis=2), fit.weights)
+        sides = np.append(
+            np.zeros(len(fit.theta), bool), np.repeat(variant.trial.one_sided, apart.shape[2])
+        )
+        gain, _ = constrained(rows, residual, sides)
+        gains[variant.candidate] = max(gain, gains.get(variant.candidate, 0.0))
+    return [*key, *sorted(gains, key=lambda number: -gains[number])[:ASKED]]
+
+
+def _by_group(columns: Array, group: Integers) -> Array:
+    """Columns (W, R, 1) once for every group of windows and zero elsewhere, (W, R, G)."""
+    return columns * (group[:, None] == np.arange(group.max() + 1))[:, None, :]
+
+
+def _asked(
+    search: Search,
+    key: Key,
+    number: int,
+    names: tuple[str, ...],
+    group: Integers,
+    noise: Array,
+) -> tuple[float, Unlike] | None:
+    """The error of forecasts with a size of its own in each record, and these sizes.
+
+    None if that is not clearly better than one size for all, and than nothing.
+
+    Args:
+        search: With the fitted set ``key``.
+        key: What was found.
+        number: The effect that is asked about.
+        names: Records with data enough, and ``group``, the record of every window, (W,).
+        noise: Mean squared errors of blocks by noise alone, (B, m).
+    """
+    fitter, candidate = search.fitter, search.candidates[number]
+    rest = all_but(key, number)
+    fit = search.tried[key] if number in key else _with(search, key, number)
+    (own,) = np.flatnonzero([c is candidate for c in fit.model.chosen])
+    places = np.flatnonzero(fit.model.owner == own)
+    if len(places) != 1:  # of several numbers a record tells too little
+        return None
+    place = int(places[0])
+    blocks = fitter.blocks
+    without = [blocks.fold_of_window != fold for fold in range(blocks.folds)]
+    thetas = np.concatenate([_sizes(fit, place, group, rows) for rows in without])
+    which = blocks.fold_of_window * (group.max() + 1) + group
+    apart = by_block(fitter.foretell(fit.model, thetas, which, fit).squares, blocks)
+    others = [validate(fitter, fit).squares]
+    if rest == key:
+        others.append(search.validated[key].squares)
+    currency = search.currency
+    error, least = currency.error(apart), currency.error(noise) ** 2
+    for squares in others:
+        left = currency.error(squares) ** 2 - least
+        surely = max(currency.clearly(squares, apart, g) for g in range(len(currency.groups)))
+        if error**2 - least > HALF * left or surely < CLEARLY:
+            return None
+    sizes = _sizes(fit, place, group, np.ones(len(group), bool))[: len(names), place]
+    by_record = dict(zip(names, map(float, sizes), strict=True))
+    taken, *_ = currency.share(search.before.squares, apart, np.random.default_rng(0))
+    knob, effect = candidate.knobs[0], candidate.effect
+    return error, Unlike(effect.name, effect.where, knob.field, knob.unit, by_record, taken)
+
+
+def _with(search: Search, key: Key, number: int) -> Fit:
+    """A set and one candidate more, fitted with one size for all."""
+    larger = tuple(sorted((*key, number)))
+    if larger in search.tried:
+        return search.tried[larger]
+    _, theta = search.merged(key, [(number, 0.1 * search.candidates[number].trials[0].values[0])])
+    theta = np.append(theta, search.tried[key].theta[search.numbers(key) :])
+    return search.fitter.fit(search.model(larger), theta, search.tried[key])
+
+
+def _sizes(fit: Fit, place: int, group: Integers, rows: NDArray[np.bool_]) -> Array:
+    """Numbers of every group of windows, (G, p), of which one differs between them.
+
+    One Gauss-Newton step from those of all.
+
+    Args:
+        fit: With one size for all.
+        place: The number that differs.
+        group: The group of every window, (W,).
+        rows: The windows that are fitted.
+    """
+    model, theta = fit.model, fit.theta
+    count = int(group.max()) + 1
+    apart = _by_group(fit.by_knob[..., [place]], group)
+    columns = np.concatenate([np.delete(fit.by_knob, place, axis=2), apart], axis=2)[rows]
+    weights = fit.weights[rows]
+
+    def spread(values: Array) -> Array:
+        return np.append(np.delete(values, place), np.repeat(values[place], count))
+
+    step = bounded_step(
+        np.einsum("wri,wrj,w->ij", columns, columns, weights),
+        np.einsum("wri,wr,w->i", columns, fit.projected[rows], weights),
+        spread(np.maximum(model.low - theta, -model.leap(theta))),
+        spread(np.minimum(model.high - theta, model.leap(theta))),
+    )
+    found = theta + np.insert(step[:-count], place, 0.0)[None].repeat(count, axis=0)
+    found[:, place] += step[-count:]
+    return found

@@ -1,0 +1,63 @@
+"""What the records want differently, in words."""
+
+from __future__ import annotations
+
+import re
+
+from residual.gap import GapResult
+from residual.gap.result import Unlike
+from studies.gap.words import capitalized, effect_name, minus, names_of, percent, unit_text
+
+#: What the terminal and the report call it.
+LABEL = "records differ"
+#: Records up to which the size in each is told.
+FEW = 8
+
+
+def beside_lead(result: GapResult) -> str:
+    """For the first sentence: how much would have a name if records may differ."""
+    if not result.unlike:
+        return ""
+    first = result.unlike[0]
+    return (
+        f" The records differ: with {effect_name(first.label)} of its own size in each of them, "
+        f"{percent(first.share)} of the gap would have a name."
+    )
+
+
+def headline(result: GapResult) -> str:
+    """Sizes by record of the effect that helps most."""
+    first = result.unlike[0]
+    return f"{capitalized(effect_name(first.label))}: {_sizes(first)}."
+
+
+def notes(result: GapResult) -> list[str]:
+    """What that means, each a clause without a full stop."""
+    found = [
+        "something changed from one record to the next that the simulator does not know (a load, "
+        "a slope, a supply, warmth): search the records one by one, or log it as an input"
+    ]
+    if others := [other.label for other in result.unlike[1:]]:
+        found.append(f"{names_of(others)} of its own size in each would do nearly as well")
+    return found
+
+
+def _sizes(one: Unlike) -> str:
+    """``0.2 N in a, -0.1 N in b``, or the span of many."""
+    named = sorted(one.sizes.items(), key=lambda pair: _natural(pair[0]))
+    if len(named) > FEW:
+        named.sort(key=lambda pair: pair[1])
+        (least, low), (most, high) = named[0], named[-1]
+        span = f"from {_size(one, low)} in {least} to {_size(one, high)} in {most}"
+        return f"{span}, {len(named)} records"
+    return ", ".join(f"{_size(one, size)} in {name}" for name, size in named)
+
+
+def _size(one: Unlike, value: float) -> str:
+    sign = "+" if one.effect == one.where else ""  # a parameter's change
+    return minus(f"{value:{sign}.3g}{unit_text(one.unit)}")
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """For an order in which run 10 comes after run 9."""
+    return [(int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name)]

@@ -1,0 +1,72 @@
+"""What differs between records: told with its size in each, and only where records do differ."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from residual.gap import find_gap
+from sims.pendulum_equation import PendulumEquation
+from studies.gap.lead import lead
+from studies.gap.summary import summary
+from studies.hidden.data import Truth, make_logs
+
+#: Not all of the library, so that each takes a few seconds.
+OFFERED = ("mass", "constant_load", "viscous_friction", "actuator_gain", "sensor_offset")
+
+
+def logs(*truths, seed=3):
+    """A record of each truth, a name each."""
+    found = []
+    for i, truth in enumerate(truths):
+        (run,) = make_logs(truth, [seed, i], "strong", "A", runs=1)
+        found.append(dataclasses.replace(run, name=f"day {i + 1}"))
+    return found
+
+
+def ask(runs):
+    return find_gap(PendulumEquation(), runs, effects=OFFERED, hold="zero")
+
+
+@pytest.fixture(scope="module")
+def payloads():
+    """The swinging mass is another one on each of four days."""
+    return ask(logs(*(Truth(mass=share) for share in (0.0, 0.15, 0.3, 0.45))))
+
+
+def test_a_payload_of_each_record_is_found_with_its_size(payloads):
+    first = payloads.unlike[0]
+    assert (first.label, first.field, first.unit) == ("mass", "change", "kg")
+    sizes = [first.sizes[f"day {i}"] for i in (1, 2, 3, 4)]
+    assert np.allclose(sizes, 0.055 * np.array([0.0, 0.15, 0.3, 0.45]), atol=0.002)
+    assert first.share > 0.95 > payloads.gap.share.value + 0.2
+
+
+def test_the_answer_says_so(payloads):
+    assert "The records differ: with mass of its own size in each of them" in lead(payloads)
+    told = " ".join(summary(payloads).split())
+    assert "RECORDS DIFFER Mass: " in told and "search the records one by one" in told
+    days = [told.index(f" in day {i}") for i in (1, 2, 3, 4)]
+    assert days == sorted(days)
+
+
+def test_what_is_the_same_in_all_records_is_named_beside_what_differs():
+    truths = [Truth(viscous_friction=2e-4, constant_load=sign * 1e-3) for sign in (1, -1, 1, -1)]
+    found = ask(logs(*truths))
+    assert "viscous_friction" in [verdict.effect for verdict in found.verdicts]
+    first = found.unlike[0]
+    assert first.label == "constant_load@pivot"
+    assert np.allclose([first.sizes[f"day {i}"] for i in (1, 2, 3, 4)], [1e-3, -1e-3] * 2, rtol=0.2)
+
+
+@pytest.mark.parametrize(
+    "truth", [Truth(), Truth(mass=0.2), Truth(wind=4e-3)], ids=["nothing", "mass", "wind"]
+)
+def test_records_that_agree_are_not_said_to_differ(truth):
+    """Also where something has no name: a wind that no library holds."""
+    assert ask(logs(*[truth] * 4)).unlike == ()
+
+
+def test_nothing_is_said_of_a_single_record():
+    (run,) = make_logs(Truth(wind=4e-3), 5, "strong", "A", runs=1, steps=600)
+    assert ask([run]).unlike == ()
