@@ -45,6 +45,10 @@ class ActuatorEffect(Effect):
         """The inputs that it acts on."""
         return tuple(self.actuator.split(AND))
 
+    def meets(self, other: ActuatorEffect) -> bool:
+        """Whether the two act on one input."""
+        return not set(self.actuators).isdisjoint(other.actuators)
+
     def covers(self, other: Effect) -> bool:
         """Also the same effect on some of its inputs."""
         part = isinstance(other, ActuatorEffect) and set(other.actuators) < set(self.actuators)
@@ -68,7 +72,7 @@ class StaticActuatorEffect(ActuatorEffect):
         """What the actuator receives for the command ``u``, by row."""
 
     def shows(self, u: Array) -> NDArray[np.bool_]:
-        """Where it changes the command beyond what other effects of the actuator do, by row."""
+        """Where it changes what comes in beyond what other effects of the actuator do, by row."""
         return np.ones(np.shape(u), bool)
 
 
@@ -181,7 +185,7 @@ class Saturation(StaticActuatorEffect):
         return np.clip(u, -self.level, self.level)
 
     def shows(self, u: Array) -> NDArray[np.bool_]:
-        """Where the command goes beyond the level."""
+        """Where what comes in goes beyond the level."""
         return np.abs(u) > self.level
 
 

@@ -91,7 +91,7 @@ def _of_its_kind(curve: Curve, effect: Effect) -> bool:
     if isinstance(curve, ActuatorEffect):
         if not isinstance(effect, StaticActuatorEffect):
             return False
-        return not set(effect.actuators).isdisjoint(curve.actuators)
+        return effect.meets(curve)
     alike = curve.family and curve.family == effect.family
     return curve.contains(effect) or bool(alike and curve.where == effect.where)
 

@@ -17,7 +17,7 @@ from residual.gap.confirmation.claim import Claim
 from residual.gap.data.samples import Samples
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.plausible import absurd
-from residual.gap.model.candidates import Candidate, candidates
+from residual.gap.model.candidates import Candidate, Knob, candidates
 from residual.gap.model.model import Model
 from residual.gap.result import Meant
 from residual.gap.search.continuation import handed_over, in_place
@@ -78,12 +78,13 @@ def with_twins(search: Search, key: Key, claims: Sequence[Claim]) -> tuple[Claim
             continue
         rest = [i for i in key if i != number]
         mine = fit.theta[fit.model.owner == len(rest)]
-        meant = Meant(twin.label, _units(twin, mine))
+        meant = Meant(twin.label, _units(twin.knobs, mine))
         told[number] = dataclasses.replace(told[number], meant=(*told[number].meant, meant))
         for place, other in enumerate(rest):
             values = fit.theta[fit.model.owner == place]
-            candidate = search.candidates[other]
-            told[other] = _beside(told[other], given[other], candidate, values, twin.label)
+            own = search.tried[key].model
+            knobs = [own.knobs[j] for j in np.flatnonzero(own.owner == key.index(other))]
+            told[other] = _beside(told[other], given[other], knobs, values, twin.label)
     return tuple(told.values())
 
 
@@ -104,25 +105,24 @@ def _reached(search: Search, key: Key) -> float:
     return REACHED * search.tried[key].merit + search.fitter.tie(search.nominal)
 
 
-def _units(candidate: Candidate, values: Array) -> dict[str, tuple[float, str]]:
+def _units(knobs: Sequence[Knob], values: Array) -> dict[str, tuple[float, str]]:
     return {
-        knob.field: (float(value), knob.unit)
-        for knob, value in zip(candidate.knobs, values, strict=True)
+        knob.field: (float(value), knob.unit) for knob, value in zip(knobs, values, strict=True)
     }
 
 
-def _beside(claim: Claim, before: Claim, candidate: Candidate, values: Array, twin: str) -> Claim:
+def _beside(claim: Claim, before: Claim, knobs: Sequence[Knob], values: Array, twin: str) -> Claim:
     """A claim with the numbers that it has beside a twin of another, where they differ.
 
     Args:
         claim: What is known so far.
         before: The claim without any twin: its interval goes along in proportion.
-        candidate: Whose claim it is.
-        values: Its numbers beside the twin.
+        knobs: Its numbers beside the other members of the set.
+        values: What they are beside the twin.
         twin: That one's label.
     """
     numbers, differs = dict(claim.numbers), False
-    for field, (value, _) in _units(candidate, values).items():
+    for field, (value, _) in _units(knobs, values).items():
         number, own = numbers[field], before.numbers[field]
         if abs(value - own.value) <= DIFFERS * (own.high - own.low):
             continue
@@ -130,7 +130,7 @@ def _beside(claim: Claim, before: Claim, candidate: Candidate, values: Array, tw
         low, high = own.low + value - own.value, own.high + value - own.value
         if value * own.value > 0:
             low, high = sorted((own.low * value / own.value, own.high * value / own.value))
-        knob = next(knob for knob in candidate.knobs if knob.field == field)
+        knob = next(knob for knob in knobs if knob.field == field)
         numbers[field] = dataclasses.replace(
             number,
             low=max(min(number.low, low), knob.low),
@@ -139,5 +139,5 @@ def _beside(claim: Claim, before: Claim, candidate: Candidate, values: Array, tw
         )
     if not differs:
         return claim
-    meant = Meant(twin, _units(candidate, values))
+    meant = Meant(twin, _units(knobs, values))
     return dataclasses.replace(claim, numbers=numbers, beside=(*claim.beside, meant))

@@ -7,6 +7,7 @@ gain of a hundredth, a dead zone wider than the input, an inertia a thousand tim
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from residual.gap.fitting.contract import Fit, Fitter
 from residual.gap.fitting.intervals import at_bound, deviations
 from residual.gap.fitting.screening import flatten
 from residual.gap.model.model import Model
+from sims.drive import shaped
 from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
 from sims.effects.aliases import probes, shortly_after
 from sims.effects.base import Effect
@@ -148,12 +150,21 @@ def _shows_once(host: HostSimulator, samples: Samples, own: int) -> int | None:
     for number, effect in enumerate(host.effects[own:]):
         if not isinstance(effect, StaticActuatorEffect):
             continue
-        columns = [inputs.index(name) for name in effect.actuators]
-        shown = [effect.shows(run.actions[:, c]) for run in samples.recorded for c in columns]
+        shown = [
+            effect.shows(_coming_in(effect, host.actuator_effects(name), commands))
+            for run in samples.recorded
+            for name, commands in zip(inputs, run.actions.T, strict=True)
+            if name in effect.actuators
+        ]
         stretches = sum(int(s[0]) + int((s[1:] & ~s[:-1]).sum()) for s in shown)
         if stretches == 1 and not all(s.all() for s in shown):
             return number
     return None
+
+
+def _coming_in(effect: ActuatorEffect, others: Sequence[ActuatorEffect], commands: Array) -> Array:
+    """What an effect gets of the commands (T,): what those before it leave."""
+    return shaped(commands[None], [one for one in others if one.stage < effect.stage])[0]
 
 
 def _minor(simulator: HostSimulator, parameter: str, ratio: float) -> bool:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.samples import Samples
-from residual.gap.model.candidates import Candidate
+from residual.gap.model.candidates import Candidate, Knob
 from residual.gap.model.workers import integrate
+from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
 from sims.host import HostSimulator
 
@@ -35,7 +37,7 @@ class Model:
     def __init__(self, simulator: HostSimulator, chosen: Sequence[Candidate] = ()) -> None:
         self.simulator = simulator
         self.chosen = tuple(chosen)
-        self.knobs = tuple(knob for candidate in self.chosen for knob in candidate.knobs)
+        self.knobs = tuple(knob for candidate in self.chosen for knob in self._numbers(candidate))
         self.owner = np.array([i for i, c in enumerate(self.chosen) for _ in c.knobs], int)
         self.low = np.array([knob.low for knob in self.knobs])
         self.high = np.array([knob.high for knob in self.knobs])
@@ -57,6 +59,19 @@ class Model:
 
     def __len__(self) -> int:
         return len(self.knobs)
+
+    def _numbers(self, candidate: Candidate) -> tuple[Knob, ...]:
+        """Numbers of one of the candidates.
+
+        A saturation cuts what comes out of a gain: beside one, its level is not among commands.
+        """
+        gains = [c.effect for c in self.chosen if c.effect.drives]
+        effect = candidate.effect
+        if not (candidate.fixed_level and isinstance(effect, ActuatorEffect)):
+            return candidate.knobs
+        if not any(isinstance(g, ActuatorEffect) and effect.meets(g) for g in gains):
+            return candidate.knobs
+        return tuple(dataclasses.replace(knob, high=np.inf) for knob in candidate.knobs)
 
     def leap(self, theta: Array) -> Array:
         """How far each unknown may go at once, (p,): further, no slope is believed."""
