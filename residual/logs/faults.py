@@ -22,6 +22,8 @@ WILD = 8.0
 _OFF_PATH, _ALONE = 20.0, 3.0
 # More of them than this share are noise with heavy tails, no accidents.
 RARE = 0.01
+# But so many may be accidents in a short log, up to that share of it.
+_ACCIDENTS, _OF_SHORT = 3, 0.03
 # But none reaches out of nine tenths of all samples by so many times their range, in up to so many.
 _ABSURD, _SOME = 100.0, 0.1
 # Samples in a row at the end of a sensor's range.
@@ -64,7 +66,8 @@ def wild_samples(runs: Sequence[Array]) -> list[Mask]:
                     & (np.abs(before + after) < 0.3 * least)
                 )
         found.append(mask)
-    if _share(found) <= RARE:
+    samples, wild = sum(map(len, found)), sum(int(mask.sum()) for mask in found)
+    if wild <= max(RARE * samples, min(_ACCIDENTS, _OF_SHORT * samples)):
         return found
     absurd = [mask & far for mask, far in zip(found, _absurd(runs), strict=True)]
     return absurd if _share(absurd) <= _SOME else [np.zeros(len(own), bool) for own in runs]

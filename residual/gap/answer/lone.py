@@ -73,7 +73,7 @@ def lone_stretch(answer: Answer) -> Stretch | None:
     """
     search = answer.found.search
     fitter = search.fitter
-    if not isinstance(fitter, SmoothFitter) or len(fitter.blocks) <= ENOUGH:
+    if not isinstance(fitter, SmoothFitter) or len(fitter.blocks) < ENOUGH:
         return None
     nominal = search.before.squares
     stakes = search.currency.by_block(nominal).mean(axis=1)
