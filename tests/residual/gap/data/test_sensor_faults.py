@@ -226,3 +226,12 @@ def test_a_frozen_reading_of_what_rises_amid_noise_is_told_when_it_catches_up(se
 
 def test_stairs_are_not_frozen():
     assert not frozen_samples([np.repeat(np.arange(20.0), 12)])[0].any()
+
+
+def test_two_accidents_in_a_short_log_are_no_heavy_tails():
+    values = pressure(0)[:150]
+    values[[40, 111]] += 200.0
+    (wild,) = wild_samples([values])
+    assert np.flatnonzero(wild).tolist() == [40, 111]
+    values[[20, 60, 90, 130]] += 200.0
+    assert not wild_samples([values])[0].any()
