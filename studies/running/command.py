@@ -42,8 +42,8 @@ class Parser(jsonargparse.ArgumentParser):
 
     def __init__(self, *given: Any, **options: Any) -> None:
         says = (
-            f"{DEBUG}, or {DEBUG_VARIABLE}=1, shows where errors arise. {TRUST} PACKAGE: files "
-            "of simulators, such as corrected.yaml, may name classes of that package."
+            f"{DEBUG}, or {DEBUG_VARIABLE}=1, shows where errors arise. {TRUST} PACKAGE, or A,B: "
+            "files of simulators, such as corrected.yaml, may name classes of these packages."
         )
         if Path(sys.argv[0]).stem == "simgap" and "prog" in options:
             # The command simgap calls itself what the user typed.

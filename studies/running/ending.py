@@ -40,7 +40,7 @@ def _trusted(arguments: list[str]) -> tuple[list[str], set[str]]:
     for text in waiting:
         name, equals, value = text.partition("=")
         if name == TRUST:
-            trusted.update((value if equals else next(waiting, "")).split(","))
+            trusted.update((value if equals else next(waiting, "")).strip("[]").split(","))
         else:
             given.append(text)
     values = [text.partition("=")[2] if text.startswith("--") else text for text in given]
