@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,6 +55,7 @@ def exact_aliases(
     rng: np.random.Generator | None = None,
     most: int = 4,
     seen: tuple[Array, Array] | None = None,
+    among: Collection[str] | None = None,
 ) -> tuple[Alias, ...]:
     """Sets of effects that are exactly dependent in the simulator's own equations.
 
@@ -70,10 +71,12 @@ def exact_aliases(
         most: Largest set that is looked for.
         seen: States (n, n_s) and inputs (n, n_a) of a log, where what is alike has to be so, too:
             random states are as large as channels' scales, and equations may change beyond.
+        among: Labels of the effects that are compared; by default all of the library.
     """
     plain = simulator.with_effects(())
-    columns, blurs = linear_columns(plain, *probes(plain, rng or np.random.default_rng(0)))
-    there = linear_columns(plain, *seen) if seen is not None else ({}, {})
+    drawn = probes(plain, rng or np.random.default_rng(0))
+    columns, blurs = linear_columns(plain, *drawn, among)
+    there = linear_columns(plain, *seen, among) if seen is not None else ({}, {})
 
     def alike_there(names: Sequence[str]) -> bool:
         return not all(name in there[0] for name in names) or _dependent(names, *there)
@@ -151,14 +154,15 @@ def _read_after(
 
 
 def linear_columns(
-    plain: HostSimulator, states: Array, inputs: Array
+    plain: HostSimulator, states: Array, inputs: Array, among: Collection[str] | None = None
 ) -> tuple[dict[str, Array], dict[str, float]]:
-    """Change of the motion per strength of every effect that is linear in one, of unit length."""
+    """Change of the motion per strength of every effect that is linear in one, of unit length;
+    ``among``: of these labels only."""
     near: dict[str, Array] = {}
     far: dict[str, Array] = {}
     # Of twins the first is named: what moves is more often off than what reads it.
     for effect in sorted(library(plain), key=lambda e: isinstance(e, SensorOffset | SensorScale)):
-        if not _is_linear(plain, effect):
+        if not _is_linear(plain, effect) or (among is not None and str(effect) not in among):
             continue
         response = _response(plain, effect, states, inputs, 1e-4)
         if np.any(response):

@@ -39,7 +39,7 @@ def aliases(
     effects = {str(effect): effect for effect in offered}
     groups: dict[str, tuple[str, ...]] = {}
     sets = []
-    for alias in exact_aliases(simulator, seen=_rows_of(simulator, runs)):
+    for alias in exact_aliases(simulator, seen=_rows_of(simulator, runs), among=effects):
         inside = tuple(name for name in alias.effects if name in effects)
         if len(inside) < 2:
             continue
