@@ -130,7 +130,8 @@ def test_the_grid_takes_every_effect_in_turn():
 def scored(**changes):
     row = {
         "block": "hidden", "system": "arm", "layout": "ramp", "hidden": "mass", "seed": 1,
-        "named": ["mass"], "sure": ["mass"], "wrong_sure": [], "truly_off": [], "first": True,
+        "named": ["mass"], "sure": ["mass"], "wrong_sure": [], "truly_off": [], "unlike": [],
+        "first": True,
         "family": True, "among": True, "nominal": 1.0, "corrected": 0.2, "oracle": 0.2,
         "covered": True, "seconds": 3.0,
     }  # fmt: skip
@@ -141,7 +142,7 @@ def test_misses_are_told_in_words():
     rows = [
         scored(),
         scored(seed=2, family=False, first=False, named=["delay@torque"], corrected=1.5),
-        scored(seed=3, wrong_sure=["length"], truly_off=["length"]),
+        scored(seed=3, wrong_sure=["length"], truly_off=["length"], unlike=["mass"]),
     ]
     data = judged([{"config": {}, "answers": {"find_gap": row}} for row in rows])
     told = "\n".join(misses(data))
@@ -149,6 +150,7 @@ def test_misses_are_told_in_words():
     assert "7.50 times the oracle's error" in told
     assert "1.50 times as bad as the nominal" in told
     assert "seed 3: mass: confirmed length (truly off)" in told
+    assert "seed 3: mass: records are said to differ in mass" in told
     assert "seed 1" not in told
     table = {what: found for what, _, found in headlines(data).itertuples(index=False)}
     assert table["or its family"].startswith("67 % (2/3")

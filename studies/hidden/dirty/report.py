@@ -33,6 +33,7 @@ def judged(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
         clear=errors["nominal"] >= 1.5 * errors["oracle"],
         either=data["covered"].where(data["covered"].eq(True), data["covered_truth"]),
         any_name=data["named"].map(bool),
+        differ=data["unlike"].map(bool),
         any_sure=data["sure"].map(bool),
         wrong=data["wrong_sure"].map(bool),
         wrong_else=[bool(set(names) - o) for names, o in zip(data["wrong_sure"], off, strict=True)],
@@ -69,6 +70,7 @@ def headlines(data: pd.DataFrame) -> pd.DataFrame:
         ("dirt alone: a confirmed name", "at most 2 %", dirt["any_sure"]),
         (but_off, "", dirt["sure_else"]),
         ("dirt alone: any name", "", dirt["any_name"]),
+        ("records said to differ, which are alike", "at most 2 %", data["differ"]),
         ("corrected worse than the nominal, held out", "0 %", data["worse"]),
     ]  # fmt: skip
     return asked(rows, data["seconds"], "")
@@ -118,6 +120,8 @@ def misses(data: pd.DataFrame) -> list[str]:
             off = row["truly_off"]
             wrong = [f"{n} (truly off)" if n in off else n for n in row["wrong_sure"]]
             lines.append(f"{what}: confirmed {', '.join(wrong)}")
+        if row["unlike"]:
+            lines.append(f"{what}: records are said to differ in {', '.join(row['unlike'])}")
         if row["close"] is False:
             lines.append(f"{what}: {row['ratio']:.2f} times the oracle's error (named {named})")
         if row["worse"]:

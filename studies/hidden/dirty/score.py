@@ -104,6 +104,7 @@ def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, An
         "named": named,
         "sure": sure,
         "kinds": [v.kind for v in result.verdicts],
+        "unlike": [one.label for one in result.unlike],
         "truly_off": [verdict.label for verdict in chosen if truly_off(verdict, made)],
     }
     if not made.label:
