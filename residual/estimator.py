@@ -57,7 +57,8 @@ class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
     what it learns is a simulator itself, ``corrected()`` returns that.
 
     One that is at home with noisy rows that follow each other sets ``reads_noise = True`` and is
-    then fitted to what was measured, not to smoothed paths (``residual.measured``).
+    then fitted to what was measured, not to smoothed paths (``residual.measured``). If it has a
+    parameter ``noisy``, that is true then.
 
     A subclass names the attributes it learns in ``_learned`` and implements ``_fit`` and
     ``_predict``.

@@ -14,6 +14,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from sklearn.base import clone
 
 from residual.corrected import CorrectedSimulator
 from residual.difference import DifferenceModel
@@ -34,7 +35,8 @@ def fit_measured(
     """Fit a difference model to measured transitions.
 
     An estimator with ``reads_noise`` true is fitted to the measured path itself where every
-    channel of it was measured: it knows what to do with noise.
+    channel of it was measured: it knows what to do with noise, and if it has a parameter
+    ``noisy``, that is set.
 
     Args:
         model: Unfitted, with its simulator; is fitted.
@@ -52,6 +54,8 @@ def fit_measured(
     if nominal is None:
         raise ValueError("the difference model has no simulator to compare with")
     knows = getattr(model.estimator, "reads_noise", False)
+    if knows and "noisy" in model.estimator.get_params():
+        model.estimator = clone(model.estimator).set_params(noisy=True)
     if knows and np.isfinite(measured.states).all():
         model.fit(measured)
         return measured

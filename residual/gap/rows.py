@@ -25,7 +25,7 @@ from sims.simulator import Array, wrap
 
 #: Rows that must follow each other before anything is looked for, and the longest piece.
 SHORTEST, LONGEST = 8, 50
-#: Control periods that forecasts last.
+#: Control periods that forecasts last; of exact states that strike the ground one says more.
 HORIZON = 9
 
 
@@ -101,8 +101,8 @@ def pieces(runs: list[Trajectory], most_rows: int) -> list[Trajectory]:
     return [cut[i] for i in chosen]
 
 
-def look(simulator: HostSimulator, runs: list[Trajectory]) -> Named:
-    """Search for missing effects without memory."""
+def look(simulator: HostSimulator, runs: list[Trajectory], exact: bool = True) -> Named:
+    """Search for missing effects without memory; ``exact``: states are known to the last digit."""
     width = len(simulator.state_channels)
     offered = [
         effect
@@ -111,7 +111,8 @@ def look(simulator: HostSimulator, runs: list[Trajectory]) -> Named:
     ]
     groups, _ = aliases(simulator, offered)
     kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
-    prepared = prepare(simulator, runs, HORIZON * simulator.dt)
+    periods = 1 if exact and simulator.has_contacts else HORIZON
+    prepared = prepare(simulator, runs, periods * simulator.dt, exact)
     pool = prepared.pool(candidates(simulator, kept, prepared.fitter.samples))
     found = explain(
         simulator, pool, prepared.fitter, prepared.floor, prepared.weigh, prepared.effort,

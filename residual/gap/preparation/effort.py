@@ -17,6 +17,7 @@ class Effort:
         grown: Effects that each of these is grown by, one at a time.
         most: Largest number of effects in a set.
         stale: Share of the error that one more effect must take off for the search to go on.
+        partners: Best single effects of which every two are fitted together.
     """
 
     singles: int = 8
@@ -26,3 +27,4 @@ class Effort:
     grown: int = 4
     most: int = 8
     stale: float = 0.05
+    partners: int = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -128,9 +129,21 @@ def grow(search: Search, key: Key) -> list[Key]:
         if not search.simulator.has_contacts:
             found += boldly(search, parameters=False)
             found += driven(search)
+        found += partners(search, found)
         pairs = pair_gains(around, search.effort.pairs, without=by_points(search))
         found += several(search, pairs)
     return list(dict.fromkeys(found))
+
+
+def partners(search: Search, keys: list[Key]) -> list[Key]:
+    """Fit every two of the best single effects together, from their numbers alone."""
+    singles = sorted((key for key in keys if len(key) == 1), key=search.error)
+    found: list[Key] = []
+    for one, other in itertools.combinations(singles[: search.effort.partners], 2):
+        fresh, theta = search.merged(one, [(other[0], search.own(other))])
+        if search.fits_in(fresh) and not search.late:
+            found += sound(search, fresh, theta)
+    return found
 
 
 def several(search: Search, ranked: list[Gain]) -> list[Key]:

@@ -28,9 +28,20 @@ GENTLE = 0.3
 WIDE = 0.5
 
 
-def chosen_changes(model: Model, theta: Array, data: WindowData, fitted: StartFit) -> Array:
-    """Derivative of the whitened output by the unknowns of the model, (W, R, p)."""
-    steps = np.where(theta + WIDE * model.step > model.high, -WIDE, WIDE) * model.step
+def chosen_changes(
+    model: Model, theta: Array, data: WindowData, fitted: StartFit, width: float = WIDE
+) -> Array:
+    """Derivative of the whitened output by the unknowns of the model, (W, R, p).
+
+    Args:
+        model: The fitted simulator with effects.
+        theta: Their numbers, (p,).
+        data: The windows.
+        fitted: The fit to them.
+        width: Step of the finite differences, as a share of usual ones.
+    """
+    widths = width * model.step
+    steps = np.where(theta + widths > model.high, -widths, widths)
     thetas = theta + np.diag(steps)
     jobs = [job(model, t, data, fitted.starts[None]) for t in thetas]
     measured = data.samples.measured

@@ -12,6 +12,7 @@ from residual.gap.data.blocks import Blocks
 from residual.gap.data.samples import Recorded, Samples
 from residual.gap.fitting.contract import Fit, Fitter, Foretold, Left
 from residual.gap.fitting.impacts.columns import candidate_changes, chosen_changes
+from residual.gap.fitting.impacts.known_states import sharpened
 from residual.gap.fitting.impacts.noise import with_noise
 from residual.gap.fitting.impacts.refine import (
     Refined,
@@ -110,6 +111,8 @@ class ImpactFitter:
             zero = [c.linear & (not c.rough and c.bold is None) for c in model.chosen]
             theta = np.where(np.concatenate([*zero, []]) > 0, 0.0, theta)
             found = improved(_first(model, theta, data, near), data, STEPS)
+        if data.known.all():
+            found = sharpened(found, data, self.scale, STEPS)
         if near is None:
             return self._as_fit(found, found.loss)
         found, gain = level(found, near.inner, data)
@@ -201,7 +204,8 @@ class ImpactFitter:
         )  # fmt: skip
         size = self.data.windows.index.shape[1]
         cut = [(k, int(a), int(a) + size) for k, a in enumerate(begins)]
-        data = with_noise(lay_out(fit.model.simulator, drawn, cut), self.sigma, self.scale)
+        exact = bool(self.data.known.all())
+        data = with_noise(lay_out(fit.model.simulator, drawn, cut, exact), self.sigma, self.scale)
         blocks = dataclasses.replace(self.blocks, windows=data.windows)
         return dataclasses.replace(self, data=data, blocks=blocks)
 

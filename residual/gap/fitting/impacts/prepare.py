@@ -24,6 +24,8 @@ from sims.host import HostSimulator
 #: Windows that effects are searched on, each of which costs a simulation for every state and every
 #: effect; and those that decide between sets which these leave open.
 NAMED_ON, DECIDED_ON = 40, 120
+#: Windows of an interval, of states that are known.
+KNOWN_ON = 200
 #: Times as many windows that are worth another look.
 WORTH = 1.5
 
@@ -33,18 +35,22 @@ def impact_fitter(
     trajectories: Sequence[Trajectory],
     horizon: float,
     most: int,
+    exact: bool = False,
 ) -> tuple[ImpactFitter, Noise]:
-    """A fitter of at most so many windows, weighed by the noise around the nominal simulator."""
+    """A fitter of at most so many windows, weighed by the noise around the nominal simulator.
+
+    ``exact``: states are known to the last digit, those that windows begin at, too.
+    """
     longest = max(float(np.quantile(t.durations, 0.95)) for t in trajectories)
     substeps = max(1, int(np.ceil(simulator.substeps * longest / simulator.dt - 1e-6)))
     samples = Samples.join(trajectories, substeps)
     model, none = Model(simulator), np.zeros(0)
     nodes = paths.measured(model, samples, none)
     rates = np.array([i for i, c in enumerate(simulator.physical_channels) if c.kind == "rate"])
-    cut = pieces(samples, steps_for(samples, horizon))
+    cut = pieces(samples, 1 if exact else steps_for(samples, horizon))
     grouped = blocks(samples, Windows.cut(cut), drive(samples, nodes, rates), most)
     scale = scales(simulator)
-    data = lay_out(simulator, samples, grouped.windows.pieces)
+    data = lay_out(simulator, samples, grouped.windows.pieces, exact)
     data, fitted = quieten(model, none, data, scale)
     ahead = max(1, round(horizon / samples.step))
     free = np.full(len(data.sigma), np.inf)

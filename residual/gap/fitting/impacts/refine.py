@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.fitting.impacts.columns import chosen_changes
+from residual.gap.fitting.impacts.columns import WIDE, chosen_changes
 from residual.gap.fitting.impacts.quadratic import Quadratic, minimise
 from residual.gap.fitting.impacts.robust import losses
 from residual.gap.fitting.impacts.single_shooting import (
@@ -126,10 +126,10 @@ def refine(model: Model, theta: Array, data: WindowData, near: StartFit, turns: 
     return improved(settle(model, theta, data, near.starts, 1, near.by_start), data, turns)
 
 
-def improved(best: Refined, data: WindowData, turns: int) -> Refined:
+def improved(best: Refined, data: WindowData, turns: int, width: float = WIDE) -> Refined:
     """At most so many steps of a fit, while the loss falls by more than a share."""
     for _ in range(turns if len(best.theta) else 0):
-        fresh = step(best, data)
+        fresh = step(best, data, width)
         gain = best.total - fresh.total
         if gain > 0:
             fitted = renewed(fresh.model, fresh.theta, data, fresh.fitted)
@@ -174,7 +174,7 @@ def newton(found: Refined, data: WindowData, changes: Array | None = None) -> Ar
     return np.clip(found.theta + change, model.low, model.high) - found.theta
 
 
-def step(best: Refined, data: WindowData) -> Refined:
+def step(best: Refined, data: WindowData, width: float = WIDE) -> Refined:
     """Strengths and start states a step of Gauss and Newton further, a part or a multiple of it;
     the derivative by start states stays that of before.
 
@@ -182,7 +182,7 @@ def step(best: Refined, data: WindowData) -> Refined:
     is doubled while it does.
     """
     model, fitted = best.model, best.fitted
-    changes = chosen_changes(model, best.theta, data, fitted)
+    changes = chosen_changes(model, best.theta, data, fitted, width)
     full = newton(best, data, changes)
     inverse = np.linalg.pinv(fitted.by_start, rcond=1e-8)
 

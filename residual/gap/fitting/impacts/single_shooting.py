@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 PIECE = 200
 #: Steps of start states between two full derivatives.
 TRIES = 10
+#: Doubt about a start state that is known.
+KNOWN = 1e-12
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,7 +39,7 @@ class WindowData:
         sigma: Noise of every measured channel, (m,).
         guess: First guess of every window's physical start state, (W, n_p).
         doubt: How far off the guess of an unmeasured state may be, (n_p,); infinite for a
-            measured one.
+            measured one, ``KNOWN`` for one that is exactly as measured.
         moves: By how much each state is moved to see its influence, (n_p,).
     """
 
@@ -55,6 +57,11 @@ class WindowData:
     def seen(self) -> Array:
         """Measured channels in every window, (W, L, m); NaN where not measured."""
         return self.samples.seen[self.windows.index][..., self.samples.measured]
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which start states are exactly as measured, (n_p,)."""
+        return self.doubt <= KNOWN
 
     @property
     def freedom(self) -> Array:
@@ -194,18 +201,18 @@ def whitened(data: WindowData, change: Array) -> Array:
 def by_start(model: Model, theta: Array, data: WindowData, starts: Array, base: Array) -> Array:
     """Derivative of the whitened output by the start states, (W, R, n_p)."""
     channels = model.simulator.physical_channels
-    moved = [i for i, channel in enumerate(channels) if not channel.invariant]
+    moved = [i for i, c in enumerate(channels) if not (c.invariant or data.known[i])]
     steps = data.moves
     variants = starts[None] + np.zeros((len(moved), 1, 1))
     for row, i in enumerate(moved):
         variants[row, :, i] += steps[i]
-    outputs = simulate(model, theta, data, variants)
+    outputs = simulate(model, theta, data, variants) if moved else variants
     found = np.zeros((len(data), base[0].size + len(steps), len(steps)))
     for row, i in enumerate(moved):
         found[:, :, i] = whitened(data, (outputs[row] - base) / steps[i])
     measured = data.samples.measured
     for i, channel in enumerate(channels):
-        if channel.invariant:
+        if channel.invariant and not data.known[i]:
             # The motion is the same from there, only that much further.
             found[:, :, i] = whitened(data, np.where(measured == i, 1.0, 0.0) + 0.0 * base)
         found[:, base[0].size + i, i] = 1.0 / data.doubt[i]
@@ -249,6 +256,8 @@ def renewed(model: Model, theta: Array, data: WindowData, found: StartFit) -> St
 
 def descend(model: Model, theta: Array, data: WindowData, found: StartFit) -> StartFit:
     """Some steps of every window by the derivative it has, corrected as they go."""
+    if data.known.all():
+        return found
     starts, base, now = found.starts.copy(), found.shown.copy(), found.residual.copy()
     local, damping = found.by_start, np.full(len(data), 1e-3)
     busy = np.ones(len(data), bool)

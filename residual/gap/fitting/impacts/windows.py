@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from residual.gap.data.samples import Samples
 from residual.gap.data.windows import Windows
 from residual.gap.fitting.impacts.noise import first_guess, with_noise
-from residual.gap.fitting.impacts.single_shooting import WindowData
+from residual.gap.fitting.impacts.single_shooting import KNOWN, WindowData
 from residual.gap.model import paths
 from residual.gap.model.model import Model
 from sims.host import HostSimulator
@@ -52,15 +52,15 @@ def pieces(samples: Samples, steps: int) -> list[tuple[int, int, int]]:
 
 
 def lay_out(
-    simulator: HostSimulator, samples: Samples, cut: list[tuple[int, int, int]]
+    simulator: HostSimulator, samples: Samples, cut: list[tuple[int, int, int]], exact: bool
 ) -> WindowData:
-    """Windows with a first guess of start states and noise."""
+    """Windows with a first guess of start states and noise; ``exact``: no guess, but known."""
     model = Model(simulator)
     windows = Windows.cut(cut)
     nodes = paths.measured(model, samples, np.zeros(0))
     scale = scales(simulator)
     measured = np.isin(np.arange(len(scale)), samples.measured)
-    doubt = np.where(measured, np.inf, scale)
+    doubt = np.where(measured, KNOWN if exact else np.inf, scale)
     channels = simulator.physical_channels
     names = [channel.name for channel in channels]
     step = float(np.median(samples.durations))
