@@ -35,7 +35,8 @@ def notes(result: GapResult) -> list[str]:
     """What that means, each a clause without a full stop."""
     found = [
         "something changed from one record to the next that the simulator does not know (a load, "
-        "a slope, a supply, warmth): search the records one by one, or log it as an input"
+        "a slope, a supply, warmth): search the records one by one, or log it as an input; it may "
+        "also be another effect that moves alike"
     ]
     if others := [other.label for other in result.unlike[1:]]:
         found.append(f"{names_of(others)} of its own size in each would do nearly as well")

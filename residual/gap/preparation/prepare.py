@@ -87,7 +87,7 @@ def prepare(
         trajectories: What was recorded.
         horizon: Forecast length in seconds.
         exact: Whether states are known to the last digit, so that past an impact no start state
-            makes up for what is missing.
+            makes up for what is missing; of what does not strike the ground it is not asked.
 
     Raises:
         ValueError: Nothing was measured, or every record is too short.
