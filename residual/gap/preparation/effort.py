@@ -17,6 +17,7 @@ class Effort:
         grown: Effects that each of these is grown by, one at a time.
         most: Largest number of effects in a set.
         stale: Share of the error that one more effect must take off for the search to go on.
+        enough: Error over that of the nominal simulator below which nothing larger is tried.
         partners: Best single effects of which every two are fitted together.
     """
 
@@ -27,4 +28,5 @@ class Effort:
     grown: int = 4
     most: int = 8
     stale: float = 0.05
+    enough: float = 0.0
     partners: int = 0

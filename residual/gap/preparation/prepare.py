@@ -47,8 +47,8 @@ AT_ONCE, BY_ROW = 120, 40
 #: States in all windows of a row together: every state costs a simulation more.
 STATES = 400
 #: Where states are known fits of what strikes the ground are quick, and better than their linear
-#: picture; what takes less than a fifth off would not be chosen.
-KNOWN_STATES = Effort(5, 4, 1, 3, 3, stale=0.2, partners=4)
+#: picture; the few periods in which simulators part at an impact leave a few hundredths.
+KNOWN_STATES = Effort(5, 4, 1, 3, 3, enough=0.05, partners=4)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -39,6 +39,8 @@ def run(
         reached = search.error(frontier[0])
         frontier = _alone(search, quiet) or frontier
     for level in range(1, effort.most + 1):
+        if search.error(search.best()) < effort.enough:
+            break
         fresh: list[Key] = []
         for key in frontier:
             more = grow(search, key)
@@ -72,7 +74,8 @@ def extend(search: Search, key: Key) -> None:
 
 def improves(search: Search, key: Key, reached: float) -> bool:
     """Whether a set's error is so much less than what was reached that the search goes on."""
-    return search.error(key) < (1 - search.effort.stale) * reached
+    effort = search.effort
+    return reached >= effort.enough and search.error(key) < (1 - effort.stale) * reached
 
 
 def _alone(search: Search, quiet: Callable[[Key], bool]) -> list[Key]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from residual.gap.fitting.screening import Gain
-from residual.gap.search.beam import _best, plainer, together
+from residual.gap.search.beam import _best, improves, partners, plainer, together
 
 LAW, CASE, OTHER = 0, 1, 2
 
@@ -50,3 +50,29 @@ def test_a_set_that_stands_for_an_absurd_one_adds_nothing_for_its_joint():
     )
     assert together(search, key, [stand_in, sound]) == []
     assert [number for number, _ in merged[0]] == [4]
+
+
+def test_every_two_of_the_best_single_effects_meet():
+    errors = {(0,): 0.6, (1,): 0.4, (2,): 0.9, (3,): 0.5, (4, 5): 0.1}
+    tried = {}
+
+    def add(proposals):
+        tried.update(proposals)
+        return list(proposals)
+
+    search = SimpleNamespace(
+        error=errors.get, effort=SimpleNamespace(partners=3), late=False, fits_in=lambda key: True,
+        own=lambda key: np.array([10.0 * key[0]]), add=add, tried=tried, sound=lambda key: True,
+        merged=lambda key, more: (
+            tuple(sorted((*key, more[0][0]))), np.array([10.0 * key[0], *more[0][1]])
+        ),
+    )  # fmt: skip
+    assert set(partners(search, list(errors))) == {(0, 1), (1, 3), (0, 3)}
+    assert tried[1, 3].tolist() == [10.0, 30.0]  # each begins from its own numbers
+
+
+@pytest.mark.parametrize(("reached", "goes_on"), [(0.2, True), (0.04, False)])
+def test_nothing_larger_is_tried_once_the_error_is_small_enough(reached, goes_on):
+    effort = SimpleNamespace(stale=0.05, enough=0.05)
+    search = SimpleNamespace(error=lambda key: 0.5 * reached, effort=effort)
+    assert improves(search, (0, 1), reached) is goes_on
