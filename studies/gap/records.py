@@ -19,9 +19,10 @@ def beside_lead(result: GapResult) -> str:
     if not result.unlike:
         return ""
     first = result.unlike[0]
+    name, share = effect_name(first.label), percent(first.share)
     return (
-        f" The records differ: with {effect_name(first.label)} of its own size in each of them, "
-        f"{percent(first.share)} of the gap would have a name."
+        f" The records differ: if {name} may have its own size in each of them, {share} of the gap "
+        "has a name."
     )
 
 
@@ -39,7 +40,7 @@ def notes(result: GapResult) -> list[str]:
         "also be another effect that moves alike"
     ]
     if others := [other.label for other in result.unlike[1:]]:
-        found.append(f"{names_of(others)} of its own size in each would do nearly as well")
+        found.append(f"{names_of(others)} with its own size in each would do nearly as well")
     return found
 
 
