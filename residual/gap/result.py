@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.beside import Blind, Conventions, Unlike
 from residual.gap.fitting.where import Where
 from sims.effects.base import Effect
 from sims.host import HostSimulator
@@ -205,60 +206,6 @@ class Rollout:
     seen: Array
     before: Array
     after: Array
-
-
-@dataclasses.dataclass(frozen=True)
-class Blind:
-    """An effect that this log could hide.
-
-    Attributes:
-        effect: ``name@where``.
-        visible_from: Smallest strength that would have been noticed, in ``unit``.
-        needs: What data would show it.
-    """
-
-    effect: str
-    visible_from: float
-    unit: str
-    needs: str
-
-
-@dataclasses.dataclass(frozen=True)
-class Unlike:
-    """An effect that every record wants in a size of its own.
-
-    Attributes:
-        effect, where: Its name and place.
-        field, unit: The number, and its unit.
-        sizes: By record, of those with data enough.
-        share: Part of the nominal simulator's cross-validated squared error that has a name then.
-    """
-
-    effect: str
-    where: str
-    field: str
-    unit: str
-    sizes: Mapping[str, float]
-    share: float
-
-    @property
-    def label(self) -> str:
-        """``name@where``, or the name alone of a parameter."""
-        return self.effect if self.where == self.effect else f"{self.effect}@{self.where}"
-
-
-@dataclasses.dataclass(frozen=True)
-class Conventions:
-    """What the log may count otherwise than the simulator.
-
-    Attributes:
-        changes: Lines of the column map, any of which makes the nominal simulator forecast far
-            better: a sign, a zero or a unit.
-        times: How much smaller its error is then.
-    """
-
-    changes: tuple[str, ...]
-    times: float
 
 
 @dataclasses.dataclass(frozen=True)

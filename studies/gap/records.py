@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from residual.gap import GapResult
-from residual.gap.result import Unlike
+from residual.gap.beside import Unlike
 from studies.gap.words import capitalized, effect_name, minus, names_of, percent, unit_text
 
 #: What the terminal and the report call it.

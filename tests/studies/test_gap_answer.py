@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from residual.gap.beside import Conventions
 from residual.gap.result import (
     ChannelGap,
-    Conventions,
     Gap,
     GapResult,
     Meant,

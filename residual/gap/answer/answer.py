@@ -22,6 +22,7 @@ from residual.gap.answer.verdicts import (
     parted_verdict,
     remainder_verdict,
 )
+from residual.gap.beside import Blind
 from residual.gap.confirmation.aliases import hidden
 from residual.gap.confirmation.certainty import TOO_FEW, claims, in_plain_form, share
 from residual.gap.confirmation.claim import Claim
@@ -33,7 +34,7 @@ from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.model import Model
 from residual.gap.preparation.numerics import enough_for, own_substeps
 from residual.gap.preparation.prepare import Prepared, prepare
-from residual.gap.result import Blind, Gap, GapResult, Verdict
+from residual.gap.result import Gap, GapResult, Verdict
 from residual.gap.search.choice import helps, material
 from residual.gap.search.exchange import add_exchanged
 from residual.gap.search.explain import FOOTNOTE, Explanation

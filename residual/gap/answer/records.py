@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.answer.answer import Answer
+from residual.gap.beside import Unlike
 from residual.gap.fitting.bounded import bounded_step
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.screening import beside_starts, constrained, flatten, trials
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.fitting.validation import by_block, validate
-from residual.gap.result import Unlike
 from residual.gap.search.sets import Key, Search, all_but
 
 Array = NDArray[np.float64]

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from residual.gap.answer.doubts import DOUBTS, doubts
+from residual.gap.beside import Blind
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.size import may_be_none, may_vanish
 from residual.gap.fitting.contract import Left
-from residual.gap.result import Blind, Gap, Kind, Number, Span, Verdict
+from residual.gap.result import Gap, Kind, Number, Span, Verdict
 from residual.gap.search.sets import Key, Search
 
 #: Families of which an effect may be one and still be worth a name, if forecasts do not clearly

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from residual.gap.beside import Blind
 from residual.gap.fitting.screening import Signatures
 from residual.gap.model.candidates import Candidate
-from residual.gap.result import Blind
 from residual.trajectories import Trajectory
 from sims.effects.actuator import ActuatorGain
 from sims.effects.aliases import exact_aliases, probes

@@ -14,11 +14,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.beside import Conventions
 from residual.gap.fitting.contract import Fitter
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model import paths
 from residual.gap.model.model import Model
-from residual.gap.result import Conventions
 from residual.logs.units import Unit, find_unit, units_of
 from sims.host import HostSimulator
 from sims.simulator import Channel

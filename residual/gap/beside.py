@@ -1,0 +1,60 @@
+"""What is told beside the verdicts: what the log could hide, counts otherwise, or disagrees on."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+
+@dataclasses.dataclass(frozen=True)
+class Blind:
+    """An effect that this log could hide.
+
+    Attributes:
+        effect: ``name@where``.
+        visible_from: Smallest strength that would have been noticed, in ``unit``.
+        needs: What data would show it.
+    """
+
+    effect: str
+    visible_from: float
+    unit: str
+    needs: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Conventions:
+    """What the log may count otherwise than the simulator.
+
+    Attributes:
+        changes: Lines of the column map, any of which makes the nominal simulator forecast far
+            better: a sign, a zero or a unit.
+        times: How much smaller its error is then.
+    """
+
+    changes: tuple[str, ...]
+    times: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Unlike:
+    """An effect that every record wants in a size of its own.
+
+    Attributes:
+        effect, where: Its name and place.
+        field, unit: The number, and its unit.
+        sizes: By record, of those with data enough.
+        share: Part of the nominal simulator's cross-validated squared error that has a name then.
+    """
+
+    effect: str
+    where: str
+    field: str
+    unit: str
+    sizes: Mapping[str, float]
+    share: float
+
+    @property
+    def label(self) -> str:
+        """``name@where``, or the name alone of a parameter."""
+        return self.effect if self.where == self.effect else f"{self.effect}@{self.where}"
