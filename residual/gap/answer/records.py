@@ -19,7 +19,7 @@ from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.screening import beside_starts, constrained, flatten, trials
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.fitting.validation import by_block, validate
-from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.sets import Key, Search
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -117,7 +117,6 @@ def _asked(
         noise: Mean squared errors of blocks by noise alone, (B, m).
     """
     fitter, candidate = search.fitter, search.candidates[number]
-    rest = all_but(key, number)
     fit = search.tried[key] if number in key else _with(search, key, number)
     (own,) = np.flatnonzero([c is candidate for c in fit.model.chosen])
     places = np.flatnonzero(fit.model.owner == own)
@@ -129,9 +128,9 @@ def _asked(
     thetas = np.concatenate([_sizes(fit, place, group, rows) for rows in without])
     which = blocks.fold_of_window * (group.max() + 1) + group
     apart = by_block(fitter.foretell(fit.model, thetas, which, fit).squares, blocks)
-    others = [validate(fitter, fit).squares]
-    if rest == key:
-        others.append(search.validated[key].squares)
+    others = [search.validated[key].squares]
+    if number not in key:
+        others.append(validate(fitter, fit).squares)
     currency = search.currency
     error, least = currency.error(apart), currency.error(noise) ** 2
     for squares in others:
@@ -176,11 +175,12 @@ def _sizes(fit: Fit, place: int, group: Integers, rows: NDArray[np.bool_]) -> Ar
     def spread(values: Array) -> Array:
         return np.append(np.delete(values, place), np.repeat(values[place], count))
 
+    low, high = model.room(theta)
     step = bounded_step(
         np.einsum("wri,wrj,w->ij", columns, columns, weights),
         np.einsum("wri,wr,w->i", columns, fit.projected[rows], weights),
-        spread(np.maximum(model.low - theta, -model.leap(theta))),
-        spread(np.minimum(model.high - theta, model.leap(theta))),
+        spread(low),
+        spread(high),
     )
     found = theta + np.insert(step[:-count], place, 0.0)[None].repeat(count, axis=0)
     found[:, place] += step[-count:]

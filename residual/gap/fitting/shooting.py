@@ -283,12 +283,10 @@ def _step(
         return np.zeros(0)
     rows = by_knob * np.sqrt(weight)[:, None, None]
     aims = projected * np.sqrt(weight)[:, None]
-    limit = model.leap(theta)
     weight_of_known = model.known**-2
     return bounded_step(
         np.einsum("wri,wrj->ij", rows, rows) + np.diag(weight_of_known),
         np.einsum("wri,wr->i", rows, aims) - weight_of_known * theta,
-        np.maximum(model.low - theta, -limit),
-        np.minimum(model.high - theta, limit),
+        *model.room(theta),
         damping,
     )

@@ -55,8 +55,7 @@ def without_folds(fit: Fit, blocks: Blocks) -> Array:
     found = np.repeat(theta[None], blocks.folds, axis=0)
     if not len(theta) or blocks.folds < 2:
         return found
-    low = np.maximum(model.low - theta, -model.leap(theta))
-    high = np.minimum(model.high - theta, model.leap(theta))
+    low, high = model.room(theta)
     for fold in range(blocks.folds):
         rest = blocks.fold_of_window != fold
         matrix, right = matrices[rest].sum(axis=0), rights[rest].sum(axis=0)

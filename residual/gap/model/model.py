@@ -65,17 +65,19 @@ class Model:
 
         A saturation cuts what comes out of a gain: beside one, its level is not among commands.
         """
-        gains = [c.effect for c in self.chosen if c.effect.drives]
         effect = candidate.effect
         if not (candidate.fixed_level and isinstance(effect, ActuatorEffect)):
             return candidate.knobs
+        gains = [c.effect for c in self.chosen if c.effect.drives]
         if not any(isinstance(g, ActuatorEffect) and effect.meets(g) for g in gains):
             return candidate.knobs
         return tuple(dataclasses.replace(knob, high=np.inf) for knob in candidate.knobs)
 
-    def leap(self, theta: Array) -> Array:
-        """How far each unknown may go at once, (p,): further, no slope is believed."""
-        return 10 * self.step + np.abs(theta)
+    def room(self, theta: Array) -> tuple[Array, Array]:
+        """How far each unknown may go down and up at once, each (p,): within its bounds, and no
+        further than a slope is believed."""
+        leap = 10 * self.step + np.abs(theta)
+        return np.maximum(self.low - theta, -leap), np.minimum(self.high - theta, leap)
 
     def bind(self, theta: Array, each: int = 1) -> HostSimulator:
         """The simulator with its own effects and these.
