@@ -8,10 +8,11 @@ from typing import Any
 
 from residual.gap.answer.answer import judged_apart, matters, summed_up, told
 from residual.gap.answer.records import unlike
+from residual.gap.clock import Clock
 from residual.gap.confirmation.rest import from_rest
 from residual.gap.data.examine import examine
 from residual.gap.data.excerpt import excerpt
-from residual.gap.inquiry import Clock, Inquiry
+from residual.gap.inquiry import Inquiry
 from residual.gap.log import look, settle
 from residual.gap.model.workers import workers
 from residual.gap.offered import Offered
@@ -88,7 +89,7 @@ def find_gap(
         simulator = held_as(log.simulator, hold)
         clock.lap("read")
 
-        log, prepared = settle(simulator, log, horizon is not None, tell)
+        log, prepared = settle(simulator, log, tell)
         conventions = otherwise(simulator, prepared.fitter)
         if conventions is not None:
             tell(f"does the log count otherwise, by {' or '.join(conventions.changes)}?")
@@ -116,7 +117,7 @@ def find_gap(
         table, apart = summed_up(answer), None
         if held:
             others, _ = excerpt(
-                examine(simulator, held).trajectories, stride_for(held, log.horizon)
+                examine(simulator, held).trajectories, stride_for(held, known.prepared.horizon)
             )
             if on_rest:
                 others = tuple(from_rest(simulator, others))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 from residual.gap.answer.answer import Answer, confirm
 from residual.gap.answer.curves import over_the_log, takes_its_place, worth_a_curve
 from residual.gap.answer.free_parameters import better, worth_freeing
 from residual.gap.answer.lone import explains_the_rest, lone_stretch
+from residual.gap.clock import Clock
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
 from residual.gap.confirmation.rest import fits_better_from_rest
@@ -19,6 +19,7 @@ from residual.gap.fitting.smooth import LEAD, SmoothFitter
 from residual.gap.log import Log
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.offered import Offered
+from residual.gap.preparation.horizon import FEWER, usual_horizon
 from residual.gap.preparation.numerics import held_otherwise, how_held
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.search.explain import Explanation, explain
@@ -26,38 +27,8 @@ from residual.gap.search.sets import Search
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 
-#: Part of the time budget after which nothing new is tried.
-SEARCHING = 0.7
-
-
-class Clock:
-    """Processor time that is left, and seconds by step."""
-
-    def __init__(self, minutes: float) -> None:
-        begin = time.process_time()
-        self.search_until = begin + 60 * minutes * SEARCHING
-        self.over = begin + 60 * minutes
-        self.confirm_until = begin + 120 * minutes
-        self.laps: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    @contextlib.contextmanager
-    def besides(self) -> Iterator[None]:
-        """What is done within this context takes no time from confirming."""
-        begin = time.process_time()
-        yield
-        self.confirm_until += time.process_time() - begin
-
-    @property
-    def late(self) -> bool:
-        """Whether the time for confirming is over, too."""
-        return time.process_time() > self.confirm_until
-
-    def lap(self, step: str) -> None:
-        """End of a step."""
-        now = time.perf_counter()
-        self.laps[step] = now - self._last
-        self._last = now
+#: By how much longer forecasts have to be to show something else.
+LONGER = 1.25
 
 
 @dataclasses.dataclass(frozen=True)
@@ -199,6 +170,7 @@ class Inquiry:
             known = self.without_lone_stretch(log, known, tolerance)
             known = self.with_parameters_free(known, tolerance)
             known = self.with_curves(known, tolerance)
+            known = self.over_longer_forecasts(log, known, tolerance)
         answer = known.answer
         claims = with_twins(answer.found.search, answer.key, answer.claims)
         return dataclasses.replace(known, answer=dataclasses.replace(answer, claims=claims))
@@ -234,6 +206,30 @@ class Inquiry:
         if not takes_its_place(second, answer):
             return known
         return dataclasses.replace(known, answer=second)
+
+    def over_longer_forecasts(self, log: Log, known: Confirmed, tolerance: float) -> Confirmed:
+        """The same, or what is found over longer forecasts, of which the records hold fewer.
+
+        They are tried where the usual ones had to be shortened and nothing could be named.
+        """
+        search = known.answer.found.search
+        if log.by_user or known.answer.key or search.beside:
+            return known
+        simulator = search.simulator
+        longer = log.at(usual_horizon(simulator, log.recorded, FEWER))
+        if longer.horizon < LONGER * log.horizon or time.process_time() > self.clock.search_until:
+            return known
+        self.tell("once more over longer forecasts, of which the records hold fewer")
+        ready = prepare(simulator, longer.runs, longer.horizon)
+        again = self.explained(simulator, ready)
+        answer = confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
+        if not explains_the_rest(answer):
+            return known
+        says = (
+            f"forecasts go over {longer.horizon:.3g} s: over {log.horizon:.3g} s, of which these "
+            "records hold more, nothing can be named"
+        )
+        return Confirmed(ready, answer, (says,))
 
     def _asked_again(
         self,

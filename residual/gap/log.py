@@ -25,6 +25,7 @@ class Log:
         recorded: All runs, without what is faulty in them.
         runs: Of those the stretches that are searched.
         horizon: Length of forecasts in s.
+        by_user: Whether the user chose the horizon, so that it stays.
         findings: What was found about the data, in words.
         left_out: What of the data is not searched, in words.
     """
@@ -33,6 +34,7 @@ class Log:
     recorded: Sequence[Trajectory]
     runs: Sequence[Trajectory]
     horizon: float
+    by_user: bool
     findings: list[str]
     left_out: list[str]
 
@@ -58,28 +60,25 @@ def look(
         "what is said of records set aside is no test"
         for copy, first in copies(held, trajectories)[:1]
     ]
-    horizon = horizon or usual_horizon(simulator, examined.trajectories)
     every = examined.trajectories
-    log = Log(simulator, every, every, horizon, findings, []).at(horizon)
+    length = horizon or usual_horizon(simulator, every)
+    log = Log(simulator, every, every, length, horizon is not None, findings, []).at(length)
     for says in [*findings, *log.left_out]:
         tell(says)
     return log
 
 
-def settle(
-    simulator: HostSimulator, log: Log, by_user: bool, tell: Callable[[str], None]
-) -> tuple[Log, Prepared]:
+def settle(simulator: HostSimulator, log: Log, tell: Callable[[str], None]) -> tuple[Log, Prepared]:
     """Windows, weights and numerics, from the nominal simulator alone.
 
     Args:
         simulator: The nominal one, with its inputs held as they shall be.
         log: What was recorded.
-        by_user: Whether the user chose the horizon, so that it stays.
         tell: Progress.
     """
     tell("fitting the nominal simulator")
     prepared = prepare(simulator, log.runs, log.horizon)
-    if not by_user and not simulator.has_contacts:
+    if not log.by_user and not simulator.has_contacts:
         if needs_closer_rows(log.runs, prepared):
             log = log.at(horizon_of_windows(prepared))
             tell(f"windows end early, where motion is unstable: rows for {log.horizon:.3g} s")

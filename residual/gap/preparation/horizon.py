@@ -19,24 +19,27 @@ TURNING = np.pi / np.sqrt(3)
 PART = 1 / 3
 #: Part of a length asked for by which another is none.
 NEARLY = 0.2
-#: Windows that the records should at least be good for.
-WINDOWS = 8
+#: Windows that the records should at least be good for, and where so many show nothing.
+WINDOWS, FEWER = 8, 5
 #: Least samples of a window, and of a forecast of a system that strikes the ground.
 SAMPLES, STRIDE = 8, 10
 
 
-def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> float:
+def usual_horizon(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory], windows: int = WINDOWS
+) -> float:
     """A third of the usual period of the motion, or less if the records are short, in s.
 
     Two thirds of a system that strikes the ground: its forecasts begin where a shorter window
     ends, and over less a small force moves nothing.
 
     The period is that of a sine with the same spread and the same spread of its rate, the middle
-    one over channels. At least the records have to hold ``WINDOWS`` windows of ``SAMPLES`` samples.
+    one over channels. At least the records have to hold some windows of ``SAMPLES`` samples.
 
     Args:
         simulator: Gives the channels and the control period.
         trajectories: Measured runs.
+        windows: How many the records have to hold.
     """
     step = float(np.median(np.concatenate([t.durations for t in trajectories])))
     periods = []
@@ -53,7 +56,7 @@ def usual_horizon(simulator: HostSimulator, trajectories: Sequence[Trajectory]) 
             periods.append(period)
     part = 2 * PART if simulator.has_contacts else PART
     wanted = part * float(np.median(periods)) if periods else 20 * simulator.dt
-    most = longest_horizon(trajectories)
+    most = longest_horizon(trajectories, windows)
     least = STRIDE if simulator.has_contacts else (1 - LEAD) * SAMPLES
     return float(max(min(wanted, most), least * step))
 
@@ -80,10 +83,10 @@ def other_length(simulator: HostSimulator, asked: float, seconds: float) -> list
     ]
 
 
-def longest_horizon(trajectories: Sequence[Trajectory]) -> float:
-    """The longest of which the records still hold enough windows, in s."""
+def longest_horizon(trajectories: Sequence[Trajectory], windows: int = WINDOWS) -> float:
+    """The longest of which the records still hold so many windows, in s."""
     lengths = [float(t.times[-1] - t.times[0]) for t in trajectories]
-    return (1 - LEAD) * min(sum(lengths) / WINDOWS, max(lengths))
+    return (1 - LEAD) * min(sum(lengths) / windows, max(lengths))
 
 
 def _period(trajectories: Sequence[Trajectory], column: int, angle: bool) -> float:
