@@ -161,6 +161,8 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     joint = next((j for j in simulator.joints if j.name == effect.where), None)
     if not isinstance(effect, JointEffect) or joint is None or joint.position in measured:
         return False
+    if joint.position == joint.rate:  # a speed, which shows in what it moves
+        return False
     if isinstance(effect, Curve):
         return effect.along == "position"
     there = typical(effect, simulator)

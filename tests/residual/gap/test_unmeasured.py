@@ -94,3 +94,39 @@ def test_a_wrong_outlet_is_named_below_a_tank_without_a_sensor():
     first = found.verdicts[0]
     assert "outlet" in {first.effect, *first.same_motion}
     assert first.parameters["change"].value == pytest.approx(0.01, rel=0.2)
+
+
+class Motor(FirstOrderSystem):
+    """A motor whose current is logged, and whose speed is not."""
+
+    dt = 0.01
+    state_channels = (
+        Channel("speed", "rad/s", "rate", scale=50.0),
+        Channel("current", "A", "other", scale=2.0),
+    )
+    action_channels = (Channel("voltage", "V", "input", scale=6.0),)
+    parameters = {"constant": Parameter(0.05, "N m/A", "of the motor", low=1e-3)}
+
+    def derivative(self, x, u, p):
+        speed, current = x.T
+        driven = (u[:, 0] - current - p.constant * speed) / 0.01
+        return np.stack([p.constant * current / 1e-4, driven], axis=1)
+
+
+def rubbing(_, x, volts):
+    """Slope of the true motor."""
+    return [500.0 * x[1] - 40.0 * np.tanh(x[0]), 100.0 * (volts - x[1] - 0.05 * x[0])]
+
+
+def test_friction_of_a_speed_without_a_sensor_is_found_in_the_current():
+    rng = np.random.default_rng(0)
+    volts, state, seen = np.repeat(rng.uniform(-6, 6, 16), 50), np.zeros(2), []
+    for u in volts:
+        seen.append([np.nan, state[1] + rng.normal(0, 0.005)])
+        state = solve_ivp(rubbing, (0, 0.01), state, args=(u,), rtol=1e-7, atol=1e-7).y[:, -1]
+    log = Trajectory("log", 0.01 * np.arange(len(seen)), np.array(seen), volts[:-1, None])
+    offered = ["coulomb_friction", "viscous_friction", "actuator_gain", "constant", "constant_load"]
+    first = find_gap(Motor(), [log], effects=offered).verdicts[0]
+    assert (first.effect, first.where) == ("coulomb_friction", "speed")
+    level = first.parameters["level"]
+    assert level.low < 40.0 < level.high and level.value == pytest.approx(40.0, rel=0.1)
