@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from residual.gap.data.copies import copies
 from residual.gap.data.examine import examine
 from residual.gap.data.excerpt import excerpt
-from residual.gap.preparation.horizon import usual_horizon
+from residual.gap.preparation.horizon import held_by_records, usual_horizon
 from residual.gap.preparation.numerics import stride_for
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.preparation.suited import beyond_noise, horizon_of_windows, needs_closer_rows
@@ -61,7 +61,9 @@ def look(
         for copy, first in copies(held, trajectories)[:1]
     ]
     every = examined.trajectories
-    length = horizon or usual_horizon(simulator, every)
+    length = (
+        held_by_records(simulator, every, horizon) if horizon else usual_horizon(simulator, every)
+    )
     log = Log(simulator, every, every, length, horizon is not None, findings, []).at(length)
     for says in [*findings, *log.left_out]:
         tell(says)

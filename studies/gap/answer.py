@@ -32,6 +32,8 @@ from studies.gap.words import (
 
 #: Share of the gap without a name that is a footnote.
 FOOTNOTE = 0.02
+#: Forecast error over that by noise, from which on there is a gap.
+OFF = 1.5
 #: Verdicts that name no effect.
 NAMELESS = ("unexplained", "calibrated", "needs_data", "no_gap")
 #: Letters of a parameter's name up to which it is a symbol: l and L are two.
@@ -51,6 +53,8 @@ def headline(verdict: Verdict, result: GapResult) -> str:
     gap = result.gap
     if verdict.kind == "no_gap":
         return f"The {ahead(gap)} is {quantity_text(gap.before.value, gap.unit)}."
+    if verdict.kind == "unexplained" and cannot_tell(result):
+        return "These data cannot tell whether there is a gap."
     if verdict.kind == "unexplained":
         return f"{capitalized(percent(verdict.share.value))} of the gap has no name."
     if verdict.kind == "needs_data":
@@ -220,6 +224,12 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
             "others"
         )
     return found
+
+
+def cannot_tell(result: GapResult) -> bool:
+    """Whether too few data err by no more than noise, so that there may be a gap or none."""
+    gap = result.gap
+    return gap.blocks < TOO_FEW and not gap.exceeds_noise(OFF) and not result.effects
 
 
 def provisional(result: GapResult) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from residual.gap import GapResult
 from residual.gap.fitting.forecasts import own_channels
 from residual.gap.result import ChannelGap, Verdict
-from studies.gap.answer import rivals
+from studies.gap.answer import OFF, cannot_tell, rivals
 from studies.gap.records import beside_lead
 from studies.gap.words import (
     ahead,
@@ -25,8 +25,6 @@ FEW_RIVALS = 2
 TRIFLE = 0.05
 #: Error on records set aside, over that of the nominal simulator, from which on it is worse.
 WORSE = 1.05
-#: The same over that by noise, from which on there is a gap.
-OFF = 1.5
 #: Difference between channels' shares from which on they are told one by one, so many at most.
 UNLIKE, FEW_CHANNELS = 0.2, 3
 
@@ -65,9 +63,14 @@ def _named_share(result: GapResult, tolerance: float | None) -> str:
     if kinds & {"confirmed", "ambiguous", "calibrated"}:
         share = f"{capitalized(percent(gap.share.value))} of the gap is {_what(result)}"
         return f"{share}{_by_channel(result)}.{_but_worse_apart(result)}"
+    floor = quantity_text(gap.noise_floor.value, gap.unit)
+    if "unexplained" in kinds and cannot_tell(result):
+        return (
+            f"Too few data to tell whether there is a gap: the {ahead(gap)} is {before}, noise "
+            f"alone makes {floor}."
+        )
     if "unexplained" in kinds:
         return f"The gap has no name: the {ahead(gap)} is {before}."
-    floor = quantity_text(gap.noise_floor.value, gap.unit)
     none = f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
     return none + _but_off_apart(result)
 

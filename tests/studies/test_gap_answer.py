@@ -203,6 +203,18 @@ def test_no_gap_and_nothing_that_matters_are_different_answers():
     assert lead(result(MASS), tolerance=0.5) == lead(result(MASS))
 
 
+def test_too_few_data_that_err_as_by_noise_may_hold_a_gap_or_none():
+    found = result(rest(1.0), effects=[], blocks=2)
+    table = dataclasses.replace(found.gap, noise_floor=Span(0.9, 0.8, 1.2))
+    few = dataclasses.replace(found, gap=table)
+    assert lead(few).startswith("Too few data to tell whether there is a gap: ")
+    assert headline(few.verdicts[0], few) == "These data cannot tell whether there is a gap."
+    assert "4 are needed" in summary(few)
+    assert lead(found).startswith("The gap has no name: ")
+    enough = dataclasses.replace(few, gap=dataclasses.replace(table, blocks=20))
+    assert lead(enough).startswith("The gap has no name: ")
+
+
 def test_a_number_at_its_bound_pretends_no_interval_and_says_why_it_is_not_certain():
     found = result(MASS, DELAY)
     assert headline(DELAY, found) == "Delay at voltage: time 0.75 s (at its bound)."

@@ -61,6 +61,17 @@ def usual_horizon(
     return float(max(min(wanted, most), least * step))
 
 
+def held_by_records(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory], asked: float
+) -> float:
+    """A length asked for, or what the longest record can hold if that is less, in s.
+
+    Rows are chosen for it: for more than there is they would be too far apart to see the motion.
+    """
+    longest = longest_horizon(trajectories, 1)
+    return min(asked, longest / (1 - LEAD) if simulator.has_contacts else longest)
+
+
 def other_length(simulator: HostSimulator, asked: float, seconds: float) -> list[str]:
     """What is to be said if forecasts are not as long as a user asked for.
 
@@ -73,7 +84,7 @@ def other_length(simulator: HostSimulator, asked: float, seconds: float) -> list
     if abs(seconds - lead - asked) <= NEARLY * asked:
         return []
     why = (
-        "the samples are too far apart for less"
+        "the samples are too far apart for less, or records hold no whole number of it"
         if seconds > asked + lead
         else "records are too short for more, or motion is too unstable"
     )

@@ -10,7 +10,13 @@ from scipy.integrate import solve_ivp
 
 from residual.gap import find_gap
 from residual.gap.fitting.smooth import LEAD
-from residual.gap.preparation.horizon import SAMPLES, WINDOWS, longest_horizon, usual_horizon
+from residual.gap.preparation.horizon import (
+    SAMPLES,
+    WINDOWS,
+    held_by_records,
+    longest_horizon,
+    usual_horizon,
+)
 from residual.gap.preparation.prepare import prepare
 from residual.gap.preparation.suited import beyond_noise
 from residual.trajectories import Trajectory
@@ -39,6 +45,17 @@ def test_another_length_than_was_asked_for_is_told(step, asked, why):
     told = [says for says in found.quality if "a horizon of" in says]
     assert len(told) == (why is not None)
     assert why is None or (why in told[0] and f"{found.gap.horizon_s:.3g} s" in told[0])
+
+
+def test_a_length_beyond_the_record_is_what_it_holds_and_one_block_is_never_no_gap():
+    """Rows were chosen for the length asked for, too far apart to see anything."""
+    runs = [swing(2.0, 10.0, noise=1e-3)]
+    found, far = (
+        find_gap(PendulumEquation(), runs, horizon=asked, effects=["mass"])
+        for asked in (held_by_records(PendulumEquation(), runs, 500.0), 500.0)
+    )
+    assert far.gap.before == found.gap.before and far.gap.blocks == 1
+    assert "no_gap" not in {verdict.kind for verdict in far.verdicts}
 
 
 @given(st.floats(0.8, 10))
