@@ -8,7 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sims.contract import acceleration_keeps, contract, declared, parameters_by_row
+from sims.contract import (
+    acceleration_keeps,
+    contract,
+    declared,
+    forces_act,
+    parameters_by_row,
+    positions_and_rates,
+)
 from sims.effects.base import Effect
 from sims.effects.library import library, typical
 from sims.equations import EquationOfMotion, FirstOrderSystem
@@ -75,7 +82,10 @@ def _checks(
     yield from _to_the_bounds(simulator, rng)
     if isinstance(simulator, EquationOfMotion):
         yield acceleration_keeps(simulator, states, actions)
-        yield _linear(simulator, states, actions)
+        acts = forces_act(simulator, states, actions)
+        yield acts
+        if acts.ok:
+            yield _linear(simulator, states, actions)
     yield from _parameters(simulator, states, actions)
     if isinstance(simulator, EquationOfMotion | FirstOrderSystem):
         yield parameters_by_row(simulator, states, actions)
@@ -109,9 +119,7 @@ def _to_the_bounds(simulator: Simulator, rng: np.random.Generator) -> Iterator[F
 
 def _linear(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:
     """Effects add forces, so twice the force must give twice the change of acceleration."""
-    names = [channel.name for channel in simulator.state_channels]
-    q = states[:, [names.index(joint.position) for joint in simulator.joints]]
-    v = states[:, [names.index(str(joint.rate)) for joint in simulator.joints]]
+    q, v = positions_and_rates(simulator, states)
     values = SimpleNamespace(**simulator.parameter_values())
     for j, joint in enumerate(simulator.joints):
         force = np.zeros((3, *q.shape))

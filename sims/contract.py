@@ -15,9 +15,11 @@ from sims.unsound import Unsound
 #: What makes every number of a simulator worthless.
 _GRAVE = (
     "period", "channels", "parameters", "shape", "arguments", "repeatable", "pure", "rows",
-    "arguments of acceleration", "parameters by row",
+    "arguments of acceleration", "forces", "parameters by row",
 )  # fmt: skip
 _ROUNDING = 1e-6
+#: Forces that are tried, in the joints' units: one is large enough for whatever is moved.
+_FORCES = (1.0, 1e6, 1e12)
 
 
 def refuse_unsound(simulator: Simulator) -> None:
@@ -25,7 +27,8 @@ def refuse_unsound(simulator: Simulator) -> None:
 
     Raises:
         ValueError: It has no period or no channels, raises, returns rows of another shape,
-            overwrites its arguments, or gives other numbers for the same rows.
+            overwrites its arguments, gives other numbers for the same rows, or is an equation of
+            motion that no force on a joint moves.
     """
     name = f"simulator {getattr(simulator, 'name', type(simulator).__name__)}"
     try:
@@ -56,6 +59,7 @@ def _sound(simulator: Simulator) -> Iterator[Finding]:
     yield Finding("rows", same, "a row's result depends on the rows beside it")
     if isinstance(simulator, EquationOfMotion):
         yield acceleration_keeps(simulator, states, actions)
+        yield forces_act(simulator, states, actions)
     if isinstance(simulator, EquationOfMotion | FirstOrderSystem):
         yield parameters_by_row(simulator, states, actions)
 
@@ -91,9 +95,7 @@ def parameters_by_row(
 
 def acceleration_keeps(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:
     """Does the user's ``acceleration`` leave its arguments as they were?"""
-    names = [channel.name for channel in simulator.state_channels]
-    q = states[:, [names.index(joint.position) for joint in simulator.joints]]
-    v = states[:, [names.index(str(joint.rate)) for joint in simulator.joints]]
+    q, v = positions_and_rates(simulator, states)
     given = (q, v, actions.copy(), np.zeros_like(q))
     before = [array.copy() for array in given]
     with np.errstate(all="ignore"):
@@ -102,6 +104,39 @@ def acceleration_keeps(simulator: EquationOfMotion, states: Array, actions: Arra
     kept = all(map(np.array_equal, given, before))
     says = "are left as they were" if kept else "are overwritten"
     return Finding("arguments of acceleration", kept, says)
+
+
+def forces_act(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:
+    """Does a force on each joint accelerate it? Friction, loads and springs are such forces."""
+    q, v = positions_and_rates(simulator, states)
+    values = SimpleNamespace(**simulator.parameter_values())
+
+    def accelerations(force: Array, joint: int) -> Array:
+        found = simulator.acceleration(q.copy(), v.copy(), actions.copy(), force, values)
+        return np.asarray(found)[:, joint]
+
+    for j, joint in enumerate(simulator.joints):
+        with np.errstate(all="ignore"):
+            free = accelerations(np.zeros_like(q), j)
+            for size in _FORCES:
+                force = np.zeros_like(q)
+                force[:, j] = size
+                if not np.array_equal(accelerations(force, j), free, equal_nan=True):
+                    break
+            else:
+                says = (
+                    f"acceleration does not change with the force on joint {joint.name!r}, so no "
+                    f"effect could act there: add force[:, {j}] to the sum of forces"
+                )
+                return Finding("forces", False, says)
+    return Finding("forces", True, "a force on each joint accelerates it")
+
+
+def positions_and_rates(simulator: EquationOfMotion, states: Array) -> tuple[Array, Array]:
+    """What ``acceleration`` is given of some states, each (n, n_joints)."""
+    names = [channel.name for channel in simulator.state_channels]
+    q = states[:, [names.index(joint.position) for joint in simulator.joints]]
+    return q, states[:, [names.index(str(joint.rate)) for joint in simulator.joints]]
 
 
 def declared(simulator: Simulator) -> Iterator[Finding]:

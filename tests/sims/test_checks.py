@@ -1,13 +1,17 @@
 """The simulator checker finds each way of breaking the contract, and nothing else."""
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
 from sims.checks import check_simulator
+from sims.contract import refuse_unsound
 from sims.equations import EquationOfMotion
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel, Parameter, Simulator
+from sims.unsound import Unsound
 
 
 class Good(Simulator):
@@ -150,6 +154,35 @@ def test_an_effect_that_does_not_reach_the_output_is_named():
     assert (
         "effect viscous_friction@pivot" in failed and "effect actuator_gain@voltage" not in failed
     )
+
+
+class Stage(EquationOfMotion):
+    """A slide on a slide; ``forgotten`` is the joint whose force is left out."""
+
+    dt = 0.01
+    state_channels = (
+        Channel("low", "m", "position"), Channel("low rate", "m/s", "rate", rate_of="low"),
+        Channel("high", "m", "position"), Channel("high rate", "m/s", "rate", rate_of="high"),
+    )  # fmt: skip
+    action_channels = ()
+    parameters: ClassVar = {"mass": Parameter(3e7, "kg", "of each", low=1.0)}
+    forgotten = None
+
+    def acceleration(self, q, v, u, force, p):
+        sums = [-1e7 * q[:, j] + (0 if j == self.forgotten else force[:, j]) for j in range(2)]
+        return np.stack([each / p.mass for each in sums], axis=1)
+
+
+def test_a_force_left_out_of_the_equation_is_named_with_its_joint():
+    refuse_unsound(Stage())
+    assert all(finding.ok for finding in check_simulator(Stage()) if finding.check == "forces")
+    simulator = Stage()
+    simulator.forgotten = 1
+    says = r"simulator Stage: forces: .*joint 'high', .*: add force\[:, 1\] to the sum of forces"
+    with pytest.raises(Unsound, match=says):
+        refuse_unsound(simulator)
+    failed = [finding.check for finding in check_simulator(simulator) if not finding.ok]
+    assert failed[0] == "forces" and "linear in forces" not in failed
 
 
 class Bounded(Good):
