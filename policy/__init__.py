@@ -6,11 +6,13 @@ from policy.evaluate import Policy, Rollout, action_of, collect, evaluate, rollo
 from policy.learner import Algorithm, Learner, load_policy
 from policy.mlp import MlpPolicy
 from policy.noise import OrnsteinUhlenbeck
+from policy.observations import Column, StateColumns
 from policy.selection import Point, Selection, learn_and_select, score
 
 __all__ = [
     "DDPG",
     "Algorithm",
+    "Column",
     "DDPGConfig",
     "Learner",
     "MlpPolicy",
@@ -20,6 +22,7 @@ __all__ = [
     "Progress",
     "Rollout",
     "Selection",
+    "StateColumns",
     "action_of",
     "collect",
     "evaluate",

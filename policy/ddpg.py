@@ -17,8 +17,10 @@ from policy.config import DDPGConfig, whole
 from policy.files import content_of, read_arrays, write_arrays
 from policy.mlp import MlpPolicy
 from policy.noise import OrnsteinUhlenbeck
+from policy.observations import StateColumns
 from policy.replay import Replay, Seen
 from policy.scaling import Scaling
+from policy.spaces import check_spaces, one_box
 
 FORMAT = "simgap.ddpg.1"
 
@@ -54,6 +56,7 @@ class DDPG:
         config: Settings.
         seed: Seed of the initial weights, the noise, the batches and the environment's resets.
         scaling: Of what the networks see; by default none.
+        columns: Of the states that observations are made of, for the policy's ``act_on``.
 
     Attributes:
         policy: The current deterministic policy, a live view: it changes as the agent learns.
@@ -70,9 +73,10 @@ class DDPG:
         config: DDPGConfig | None = None,
         seed: int = 0,
         scaling: Scaling | None = None,
+        columns: StateColumns | None = None,
     ) -> None:
-        n_o = _box("observation_space", observation_space).shape[0]
-        box = _box("action_space", action_space)
+        n_o = one_box("observation_space", observation_space).shape[0]
+        box = one_box("action_space", action_space)
         if not box.is_bounded():
             raise ValueError(f"action_space is {box}, expected finite bounds: the noise needs them")
         n_a = box.shape[0]
@@ -87,6 +91,7 @@ class DDPG:
             np.asarray(box.low, np.float32),
             np.asarray(box.high, np.float32),
             scaling,
+            columns,
         )
 
     @classmethod
@@ -96,9 +101,10 @@ class DDPG:
         config: DDPGConfig | None = None,
         seed: int = 0,
         scaling: Scaling | None = None,
+        columns: StateColumns | None = None,
     ) -> DDPG:
         """An agent for the spaces of ``env``; errors as for the class."""
-        return cls(env.observation_space, env.action_space, config, seed, scaling)
+        return cls(env.observation_space, env.action_space, config, seed, scaling, columns)
 
     def __repr__(self) -> str:
         return f"DDPG({self.policy!r}, {self.updates} updates, {len(self.replay)} transitions)"
@@ -149,7 +155,7 @@ class DDPG:
             FloatingPointError: The environment gave an observation or a reward that is not
                 finite.
         """
-        self._check_env(env)
+        check_spaces(env, self.policy.observation_size, len(self.policy.low))
         c, seen = self.config, self.scaling.seen
         factor = c.reward_scale * self.scaling.reward
         returns: list[float] = []
@@ -238,6 +244,8 @@ class DDPG:
             "updates": self.updates,
             "random": self._rng.bit_generator.state,
         }
+        if self.policy.columns:
+            metadata |= self.policy.columns.plain()
         write_arrays(path, FORMAT, arrays, metadata)
 
     @classmethod
@@ -265,7 +273,8 @@ class DDPG:
         if low.dtype != np.float32 or high.dtype != np.float32 or not np.all(low <= high):
             raise ValueError("the bounds of the action are no float32, or the wrong way round")
         observed = gymnasium.spaces.Box(-np.inf, np.inf, (n_o,))
-        agent = cls(observed, gymnasium.spaces.Box(low, high), config, scaling=scaling)
+        columns, bounded = StateColumns.taken_from(metadata), gymnasium.spaces.Box(low, high)
+        agent = cls(observed, bounded, config, scaling=scaling, columns=columns)
         agent.restore(arrays)
         if rows is not None:
             agent.replay.restore(rows, whole("position", metadata["position"], 0, config.replay))
@@ -280,20 +289,3 @@ class DDPG:
                 "noise is for one observation at a time: it has a memory of one episode"
             )
         return np.minimum(np.maximum(normalised + self._noise(), -1.0), 1.0)
-
-    def _check_env(self, env: gymnasium.Env[Any, Any]) -> None:
-        for name, space, size in (
-            ("observation", env.observation_space, self.policy.observation_size),
-            ("action", env.action_space, len(self.policy.low)),
-        ):
-            if space.shape != (size,):
-                raise ValueError(
-                    f"the environment's {name} space is {space}, but the agent was made for "
-                    f"{size} {name}(s): make a new agent, or wrap the environment"
-                )
-
-
-def _box(name: str, space: gymnasium.Space[Any]) -> gymnasium.spaces.Box:
-    if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
-        raise ValueError(f"{name} is {space}, expected a one-dimensional Box")
-    return space

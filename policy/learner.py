@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from policy.config import DDPGConfig
 from policy.ddpg import DDPG, Progress
 from policy.evaluate import Policy
-from policy.files import OtherForm, read_arrays
+from policy.files import OtherForm, content_of, read_arrays
+from policy.observations import StateColumns
 from policy.replay import Seen
 from policy.scaling import Scaling
 
@@ -107,6 +108,7 @@ class Algorithm:
         seed: int,
         noise_sigma: float | None = None,
         scaling: Scaling | None = None,
+        columns: StateColumns | None = None,
     ) -> Learner:
         """A learner before any training.
 
@@ -116,15 +118,16 @@ class Algorithm:
             noise_sigma: Exploration noise of DDPG, if not that of its settings; other algorithms
                 explore in their own way.
             scaling: Of what its networks see; by default none.
+            columns: Of the states that the observations of ``env`` are made of, if it is known.
         """
         if self.path != OURS:
             from policy.stable_baselines import StableBaselines
 
-            return StableBaselines(self.kind(), self.options, env, seed, scaling)
+            return StableBaselines(self.kind(), self.options, env, seed, scaling, columns)
         config = self.ddpg
         if noise_sigma is not None:
             config = dataclasses.replace(config, noise_sigma=noise_sigma)
-        return DDPG.for_env(env, config, seed, scaling)
+        return DDPG.for_env(env, config, seed, scaling, columns)
 
     def load(self, path: Path, env: gymnasium.Env[Any, Any]) -> Learner:
         """A learner with what another one of this algorithm has saved.
@@ -137,8 +140,10 @@ class Algorithm:
             return DDPG.load(path)
         from policy.stable_baselines import FORMAT
 
-        learner = self.make(env, 0)
-        arrays, _ = read_arrays(path, FORMAT)
+        arrays, metadata = read_arrays(path, FORMAT)
+        with content_of(path, "policy"):
+            columns = StateColumns.taken_from(metadata)
+        learner = self.make(env, 0, columns=columns)
         try:
             learner.restore(arrays)
         except ValueError as error:
@@ -175,7 +180,11 @@ def imported(path: str, what: str) -> Any:
 def load_policy(path: str | Path) -> Policy:
     """A policy from a file of ``DDPG.save`` or ``MlpPolicy.save``, or by its import path.
 
-    Files name no code, so one of another algorithm is read by ``Algorithm.load``.
+    One that the loop learnt acts on states in the units of the system's channels,
+    ``load_policy(path).act_on(state)``. Its ``act`` takes what the loop's environments observe:
+    channels divided by their scale, angles as cosine and sine. Any other file knows no channels,
+    and only has ``act``. Files name no code, so one of another algorithm is read by
+    ``Algorithm.load``.
 
     Raises:
         FileNotFoundError: There is no such file.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from policy.files import content_of, read_arrays, write_arrays
+from policy.observations import StateColumns, finite, observation_of
 from policy.scaling import Scaling
 
 FORMAT = "simgap.policy.1"
@@ -24,12 +25,17 @@ class MlpPolicy:
         low: Lowest action, shape (n_a,).
         high: Highest action, shape (n_a,).
         scaling: Of observations, before the first layer; by default none.
+        columns: Of the states that observations are made of; without them ``act_on`` refuses.
+
+    Raises:
+        ValueError: The columns give another number of observations.
     """
 
     weights: dict[str, NDArray[np.float32]]
     low: NDArray[np.float32]
     high: NDArray[np.float32]
     scaling: Scaling | None = None
+    columns: StateColumns | None = None
 
     def __post_init__(self) -> None:
         # One layout, whether learnt, copied or loaded: another one would round differently.
@@ -37,32 +43,57 @@ class MlpPolicy:
             self.weights[name] = (np.asfortranarray if name == "weight1" else np.ascontiguousarray)(
                 value
             )
+        if self.columns and self.columns.observation_size != self.observation_size:
+            raise ValueError(
+                f"the columns {self.columns!r} make {self.columns.observation_size} observations, "
+                f"but the policy takes {self.observation_size}"
+            )
 
     def __repr__(self) -> str:
         sizes = [self.observation_size, *(len(self.weights[f"bias{k}"]) for k in (1, 2, 3))]
-        return f"MlpPolicy({' -> '.join(map(str, sizes))})"
+        on = f"; acts on {self.columns!r}" if self.columns else ""
+        return f"MlpPolicy({' -> '.join(map(str, sizes))}{on})"
 
     @property
     def observation_size(self) -> int:
         """Number of observations n_o."""
         return int(self.weights["weight1"].shape[1])
 
+    def act_on(self, state: ArrayLike) -> NDArray[np.float32]:
+        """Action(s) for what the system's state is, in the units of its channels.
+
+        Args:
+            state: One state, shape (n_s,), or a batch, shape (n, n_s).
+
+        Returns:
+            Within the bounds, in the units of the action channels: shape (n_a,) or (n, n_a),
+            float32.
+
+        Raises:
+            ValueError: The state has another number of columns or is not finite, or the policy
+                was not learnt by the loop, so that its columns are not known.
+        """
+        return self.act(observation_of(state, self.columns))
+
     def act(self, observation: ArrayLike) -> NDArray[np.float32]:
-        """Action(s) within the bounds.
+        """Action(s) for what the environment learnt in observes; for a state take ``act_on``.
+
+        An environment of ``sims`` observes every channel divided by its scale, and an angle as
+        cosine and sine.
 
         Args:
             observation: One observation, shape (n_o,), or a batch, shape (n, n_o).
 
         Returns:
-            Shape (n_a,) or (n, n_a), float32.
+            Within the bounds, shape (n_a,) or (n, n_a), float32.
 
         Raises:
-            ValueError: The observation has another number of columns.
+            ValueError: The observation has another number of columns, or is not finite.
         """
-        return self.to_action(self.normalised(observation))
+        return self.to_action(self.normalised(finite(observation)))
 
     def normalised(self, observation: ArrayLike) -> NDArray[np.float32]:
-        """Action(s) in [-1, 1]; arguments and errors as in ``act``."""
+        """Action(s) in [-1, 1]; arguments as in ``act``, but not finite ones pass."""
         x = np.asarray(observation)
         w = self.weights
         if x.ndim not in (1, 2) or x.shape[-1] != self.observation_size:
@@ -90,12 +121,13 @@ class MlpPolicy:
     def copy(self) -> MlpPolicy:
         """The same policy with weights of its own."""
         weights = {name: value.copy(order="K") for name, value in self.weights.items()}
-        return MlpPolicy(weights, self.low.copy(), self.high.copy(), self.scaling)
+        return MlpPolicy(weights, self.low.copy(), self.high.copy(), self.scaling, self.columns)
 
     def save(self, path: str | Path) -> None:
         """Write a safetensors file; it appears whole or not at all."""
         tensors = {**self.weights, "low": self.low, "high": self.high}
-        write_arrays(path, FORMAT, tensors | (self.scaling.arrays() if self.scaling else {}), {})
+        tensors |= self.scaling.arrays() if self.scaling else {}
+        write_arrays(path, FORMAT, tensors, self.columns.plain() if self.columns else {})
 
     @classmethod
     def load(cls, path: str | Path) -> MlpPolicy:
@@ -105,12 +137,12 @@ class MlpPolicy:
             FileNotFoundError: There is no such file.
             ValueError: The file is damaged or holds something else.
         """
-        arrays, _ = read_arrays(path, FORMAT)
+        arrays, metadata = read_arrays(path, FORMAT)
         with content_of(path, "policy"):
             low, high = arrays.pop("low"), arrays.pop("high")
             scaling = Scaling.taken_from(arrays, arrays["weight1"].shape[-1])
             _check_shapes(arrays, low, high)
-        return cls(arrays, low, high, scaling)
+            return cls(arrays, low, high, scaling, StateColumns.taken_from(metadata))
 
 
 def _check_shapes(

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from policy.ddpg import Progress
 from policy.files import write_arrays
+from policy.observations import StateColumns, finite, observation_of
 from policy.replay import Seen
 from policy.scaling import ScaledEnv, Scaling
 
@@ -66,6 +67,7 @@ class StableBaselines:
         env: For the spaces.
         seed: Seed of everything random; the library also sets the global generators by it.
         scaling: Of what the networks see; by default none.
+        columns: Of the states that observations are made of; without them ``act_on`` refuses.
 
     Attributes:
         model: The algorithm itself.
@@ -78,6 +80,7 @@ class StableBaselines:
         env: gymnasium.Env[Any, Any],
         seed: int = 0,
         scaling: Scaling | None = None,
+        columns: StateColumns | None = None,
     ) -> None:
         from stable_baselines3 import TD3
         from stable_baselines3.common.logger import Logger
@@ -92,6 +95,7 @@ class StableBaselines:
             zeros = np.zeros(env.action_space.shape or ())
             chosen["action_noise"] = NormalActionNoise(zeros, zeros + sigma)
         self._seed = seed % 2**32
+        self.columns = columns
         self.scaling = scaling or Scaling.none(int(np.prod(env.observation_space.shape or ())))
         self.model: Any = kind(env=env, seed=self._seed, **chosen)
         if not {"verbose", "tensorboard_log"} & chosen.keys():
@@ -105,8 +109,13 @@ class StableBaselines:
         return self
 
     def act(self, observation: ArrayLike) -> NDArray[Any]:
-        """Action(s) without noise: shape (n_o,) or (n, n_o) in, (n_a,) or (n, n_a) out."""
-        return self.model.predict(self.scaling.seen(observation), deterministic=True)[0]
+        """Action(s) without noise; arguments and errors as in ``MlpPolicy.act``."""
+        seen = self.scaling.seen(finite(observation))
+        return self.model.predict(seen, deterministic=True)[0]
+
+    def act_on(self, state: ArrayLike) -> NDArray[Any]:
+        """Action(s) for a state; arguments and errors as in ``MlpPolicy.act_on``."""
+        return self.act(observation_of(state, self.columns))
 
     @property
     def updates(self) -> int:
@@ -192,4 +201,5 @@ class StableBaselines:
         """Write the networks to a safetensors file; a replay cannot be kept."""
         kind = type(self.model)
         name = f"{kind.__module__}.{kind.__qualname__}"
-        write_arrays(path, FORMAT, self.networks(), {"algorithm": name})
+        columns = self.columns.plain() if self.columns else {}
+        write_arrays(path, FORMAT, self.networks(), {"algorithm": name, **columns})

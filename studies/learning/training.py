@@ -14,12 +14,14 @@ import numpy as np
 from policy.evaluate import Policy, Rollout, evaluate, rollout
 from policy.learner import Algorithm, Learner
 from policy.noise import OrnsteinUhlenbeck
+from policy.observations import Column, StateColumns
 from policy.selection import Point, learn_and_select
 from residual.corrected import CorrectedSimulator
 from residual.trajectories import Transitions
 from residual.uncertainty_penalty import PenalisedTask
 from simgap_files.npz import read_npz, write_npz
-from sims.simulator import Array, Simulator
+from sims.environment import observed_channels
+from sims.simulator import Array, Channel, Simulator
 from sims.system import USUAL_STARTS, System
 from studies.learning.streams import stream
 from studies.learning.warm_start import Recorder, Simulated, WarmStart
@@ -131,7 +133,8 @@ def train(
     )
     sigma = system.cold_noise_sigma if start is None else None
     seed = stream(steps.seed, "train", kind, update)
-    learner = steps.algorithm.make(env, seed, sigma, steps.scaling)
+    columns = state_columns(system.nominal)
+    learner = steps.algorithm.make(env, seed, sigma, steps.scaling, columns)
     if isinstance(start, WarmStart) and start.rows:
         with steps.progress.task("take up what was simulated", start.rows) as tell:
             again = isinstance(on, Simulator)
@@ -185,6 +188,17 @@ def train(
     summary["held"] = simulator.held if isinstance(simulator, CorrectedSimulator) else 0
     taken = recorder.taken(difference if all_again else None) if recorder else None
     return Training(learner, selection.curve, summary | tests, episode, taken)
+
+
+def state_columns(simulator: Simulator) -> StateColumns:
+    """What policies that learn on a simulator see of its states, for ``act_on``."""
+    seen = observed_channels(simulator)
+
+    def column(c: Channel) -> Column:
+        scale, memory = float(c.scale), c.kind == "memory"
+        return Column(str(c.name), str(c.unit), scale, bool(c.angle), c in seen, memory)
+
+    return StateColumns(tuple(map(column, simulator.state_channels)))
 
 
 def test_on_truth(

@@ -7,7 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from policy import load_policy
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial-learn.md"
@@ -45,16 +48,28 @@ def learnt(folder, command, more):
     output = f"out{len(list(folder.glob('out*')))}"
     run([sys.executable, *words[1:], *LESS, *more, "--output", output], folder)
     assert "Policies" in (folder / output / "report.html").read_text()
-    return json.loads((folder / output / "results.json").read_text())
+    return output, json.loads((folder / output / "results.json").read_text())
 
 
 def test_the_file_is_short_and_the_command_learns(folder):
     assert len((folder / "cart_pole.py").read_text().splitlines()) <= 60
-    found = learnt(folder, blocks("bash")[0], [*SMALL_DDPG, "--budget.true_samples", "300"])
+    command, more = blocks("bash")[0], [*SMALL_DDPG, "--budget.true_samples", "300"]
+    output, found = learnt(folder, command, more)
     assert [policy["name"] for policy in found["policies"]] == ["idealised", "difference"]
     errors = found["accuracy"][0]["visited"]["one_step"]
     assert max(errors.values()) < 0.2
     assert set(found["accuracy"][0]) >= {"visited", "uniform"}
+    file = folder / output / "policies" / "difference-1.safetensors"
+    printed = run([sys.executable, "use.py", str(file)], folder)
+    assert "acts on cart (m), cart rate (m/s), pole (rad)" in printed
+    # What the page says of this state, and what was done on the true system.
+    policy = load_policy(file)
+    acted = policy.act([0.3, -0.6, np.cos(3), np.sin(3), 0.1])
+    np.testing.assert_array_equal(policy.act_on([0.3, -1.2, 3.0, 0.5]), acted)
+    assert str(acted) in printed
+    with np.load(folder / output / "rollouts" / "difference-1.npz") as episode:
+        acted = [policy.act_on(state) for state in episode["states"][:-1]]
+        np.testing.assert_array_equal(acted, episode["actions"])
 
 
 def test_the_python_call_runs(folder):
@@ -77,7 +92,7 @@ def test_a_mujoco_environment_is_the_true_system(folder, learner):
     small = "{policy_kwargs: {net_arch: [16, 16]}, learning_starts: 100}"
     few = ["--budget.idealised_steps", "500", "--budget.difference_steps", "300"]
     more = SMALL_DDPG if learner == "ddpg" else ["--learner_options", small, *few]
-    found = learnt(folder, command, more)
+    _, found = learnt(folder, command, more)
     _first, second = found["policies"]
     assert second["true_samples"] == 150 and second["updates"] > 0
     # The truth cannot be set to a state, so accuracy is where the policy goes and nowhere else.
