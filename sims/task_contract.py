@@ -24,8 +24,9 @@ def refuse_unsound_task(task: Task, simulator: Simulator) -> None:
         simulator: Its channels name the columns; memory channels are not shown to tasks.
 
     Raises:
-        Unsound: Its horizon is no count of steps, a start state does not fit the channels, rewards
-            or terminations are not one for each row, depend on other rows or are not finite.
+        Unsound: Its horizon is no count of steps, a start state does not fit the channels or lies
+            where it ends episodes, rewards or terminations are not one for each row, depend on
+            other rows or are not finite, or terminations are not true or false.
     """
     name = type(task).__name__
     names = [channel.name for channel in physical(simulator.state_channels)]
@@ -44,17 +45,60 @@ def refuse_unsound_task(task: Task, simulator: Simulator) -> None:
         rewards = _by_row(task.reward, f"{name}.reward", drawn, fits)
         ends = _by_row(lambda s, a, n: task.terminal(n), f"{name}.terminal", drawn, fits)
         first = _asked(task.reward, f"{name}.reward", begun, fits)
+        _refuse_no_truths(ends, drawn[2], name, names)
+        _refuse_ended_starts(task, np.array(starts), drawn[2], names, fits)
     if rewards.dtype.kind not in "biuf":
         raise Unsound(f"{name}.reward returned {rewards.dtype}, expected real numbers")
-    if ends.dtype.kind not in "biuf":
-        raise Unsound(f"{name}.terminal returned {ends.dtype}, expected true or false by row")
     bad = np.flatnonzero(~np.isfinite(first) & np.isfinite(begun[2]).all(axis=1))
     if bad.size:
-        reached = ", ".join(f"{c} {v:.4g}" for c, v in zip(names, begun[2][bad[0]], strict=True))
         raise Unsound(
             f"{name}.reward is {first[bad[0]]:g} one step after a start state, expected a finite "
-            f"number; reached was {reached}"
+            f"number; reached was {_told(names, begun[2][bad[0]])}"
         )
+
+
+def _refuse_no_truths(ends: np.ndarray, reached: Array, name: str, names: list[str]) -> None:
+    """Refuse terminations that are neither true nor false: any number but 0 would end episodes."""
+    if ends.dtype.kind not in "biuf":
+        raise Unsound(f"{name}.terminal returned {ends.dtype}, expected true or false by row")
+    bad = np.flatnonzero(~np.isin(ends, (0, 1)) & np.isfinite(reached).all(axis=1))
+    if bad.size:
+        raise Unsound(
+            f"{name}.terminal returned {ends[bad[0]]:.4g} at {_told(names, reached[bad[0]])}, "
+            "expected true or false by row: compare, such as next_states[:, 0] > 1"
+        )
+
+
+def _refuse_ended_starts(
+    task: Task, starts: Array, reached: Array, names: list[str], fits: str
+) -> None:
+    """Refuse a task that mostly starts where it ends episodes: nothing could be learnt."""
+
+    def over(states: Array) -> np.ndarray:
+        return _asked(task.terminal, f"{name}.terminal", (states,), fits).astype(bool)
+
+    name = type(task).__name__
+    bad = starts[over(starts)]
+    if len(bad) <= len(starts) / 2:
+        return
+    # Which channel it is: one that alone brings a start back if it is as elsewhere.
+    elsewhere = np.vstack([np.zeros(len(names)), reached[np.isfinite(reached).all(axis=1)]])
+    guilty = []
+    for column, channel in enumerate(names):
+        moved = np.tile(bad[0], (len(elsewhere), 1))
+        moved[:, column] = elsewhere[:, column]
+        if not over(moved).all():
+            guilty.append(channel)
+    why = f" (it is {' and '.join(guilty)})" if guilty else ""
+    raise Unsound(
+        f"{name}.terminal is true of {len(bad)} of {len(starts)} states that {name}.start gives, "
+        f"such as {_told(names, bad[0])}{why}: every episode would end at once; change where "
+        "episodes start, or when terminal() is true"
+    )
+
+
+def _told(names: list[str], state: Array) -> str:
+    return ", ".join(f"{name} {value:.4g}" for name, value in zip(names, state, strict=True))
 
 
 def _start(task: Task, seed: int, names: list[str], simulator: Simulator, fits: str) -> Array:

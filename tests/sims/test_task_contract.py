@@ -42,6 +42,16 @@ def greedy(states, actions, next_states):
         ({"reward": wild}, "reward is nan one step after a start state.*reached was angle"),
         ({"reward": greedy}, "overwrites its arguments"),
         ({"reward": lambda s, a, n: n[:, 7]}, r"does not fit pendulum \(angle, rate\).*IndexError"),
+        (
+            {"terminal": lambda n: np.sin(n[:, 0])},
+            r"terminal returned -?0\.\d+ at angle.*expected",
+        ),
+        ({"terminal": lambda n: n[:, 0] * np.nan}, r"terminal returned nan at angle"),
+        (
+            {"terminal": lambda n: n[:, 0] > 2},
+            r"Up.terminal is true of 20 of 20 states that Up.start gives, such as angle 3.14\d*, "
+            r"rate 0 \(it is angle\): every episode would end",
+        ),
         ({"terminal": lambda n: n[0, 0] > 8}, r"terminal returned shape \(\) for 8 rows"),
     ],
 )
@@ -50,3 +60,16 @@ def test_a_task_that_breaks_its_contract_is_refused_before_anything_runs(parts, 
     with pytest.raises(ValueError, match=f"(?s)system mine: .*{says}"):
         system.check()
     System("mine", Pendulum(), Pendulum.true(), Up()).check()
+
+
+@pytest.mark.parametrize(
+    "terminal",
+    [
+        lambda n: (n[:, 0] > 9).astype(float),
+        lambda n: (n[:, 0] > 9).astype(int),
+        lambda n: n[:, 0] > 3.9,  # A third of the starts below.
+    ],
+)
+def test_a_task_that_ends_few_episodes_at_once_is_let_pass(terminal):
+    parts = {"terminal": terminal, "start": lambda rng: np.array([rng.uniform(3.0, 4.3), 0.0])}
+    System("mine", Pendulum(), Pendulum.true(), Up(**parts)).check()
