@@ -27,7 +27,7 @@ def evidence(found: Explanation, left: Key, leads: Sequence[str]) -> tuple[Rival
         gone = {key for key in search.tried if set(search.labels(key)) & set(leads)}
         gone |= {key for key in larger if material(search, left, key)}
         unnamed = dict.fromkeys(gone, "holds effects that these data do not establish")
-        why = reasons(search, left) | unnamed
+        why = reasons(search, left) | unnamed | search.refused
     rows = [
         Rival(
             search.labels(key), search.error(key), key == left,

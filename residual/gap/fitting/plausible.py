@@ -16,6 +16,7 @@ from residual.gap.data.samples import Samples
 from residual.gap.fitting.contract import Fit, Fitter
 from residual.gap.fitting.intervals import at_bound, deviations
 from residual.gap.fitting.screening import flatten
+from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.model import Model
 from sims.drive import shaped
 from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
@@ -33,6 +34,9 @@ FACTOR = 10.0
 MINOR = 0.1
 #: Least part of the input's variation that its way to the actuator leaves.
 THROUGH = 0.1
+#: Residual over noise of the nominal simulator that has to be explained, and of what explains it;
+#: or the residual of that as a part of the motion itself.
+FAR, CLOSE, UNMOVED = 3.0, 1.5, 0.2
 #: Part of two effects that is left of both together, below which they undo each other.
 UNDONE = 0.25
 
@@ -88,6 +92,38 @@ def nearly(fit: Fit, number: int, fitter: Fitter) -> bool:
     reach = np.where(fit.model.owner == number, half, 0.0)
     nearer = fit.theta - np.clip(fit.theta, -reach, reach)
     return not absurd(fit.model, nearer, fitter.samples)[1]
+
+
+def told_by_data(fit: Fit, nominal: Fit, fitter: Fitter, noise: Array | None) -> bool:
+    """Whether numbers out of all proportion explain what moved, of a gap far above the noise.
+
+    What only switches the motion off does not: the motion is left.
+
+    Args:
+        fit: With such numbers.
+        nominal: The fit of the nominal simulator.
+        fitter: Of both.
+        noise: Of every measured channel, (m,); None if it is not known.
+    """
+    if noise is None or not isinstance(fitter, SmoothFitter):
+        return False
+    far, left = (fitter.over_noise(one, noise) for one in (nominal, fit))
+    little = np.maximum(CLOSE, UNMOVED * _motion(fitter) / noise)
+    return bool((far > FAR).any() and (left < little).all())
+
+
+def _motion(fitter: SmoothFitter) -> Array:
+    """How far every measured channel departs from straight lines through each window, (m,)."""
+    samples, windows, valid = fitter.samples, fitter.blocks.windows, fitter.valid
+    seen = np.where(valid, samples.seen[windows.index][..., samples.measured], 0.0)
+    weights = valid.astype(float)
+    times = (samples.times[windows.index] - samples.times[windows.index[:, :1]])[..., None]
+    count = np.maximum(weights.sum(axis=1, keepdims=True), 1.0)
+    t = weights * (times - (weights * times).sum(axis=1, keepdims=True) / count)
+    x = weights * (seen - seen.sum(axis=1, keepdims=True) / count)
+    square = np.maximum((t**2).sum(axis=1, keepdims=True), 1e-300)
+    bends = x - t * (t * x).sum(axis=1, keepdims=True) / square
+    return np.sqrt((bends**2).sum(axis=(0, 1)) / np.maximum(valid.sum(axis=(0, 1)), 1))
 
 
 def gross(effect: Effect, simulator: HostSimulator, samples: Samples) -> bool:

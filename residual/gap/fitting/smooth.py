@@ -192,6 +192,12 @@ class SmoothFitter:
             tuple(float(r) for r in found.ratio),
         )  # fmt: skip
 
+    def over_noise(self, fit: Fit, sigma: Array) -> Array:
+        """Residual of every measured channel over its noise ``sigma``, (m,)."""
+        square = fit.projected.reshape(*self.blocks.windows.index.shape, -1) ** 2
+        count = np.maximum(self.valid.sum(axis=(0, 1)), 1)
+        return np.sqrt(square.sum(axis=(0, 1)) / count) * self.sigma / sigma
+
     def _quiet_in_every_fold(self, fit: Fit, floor: Floor) -> bool:
         """Whether no fold of the data has a residual beyond noise."""
         windows = self.blocks.windows

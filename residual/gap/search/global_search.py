@@ -112,7 +112,8 @@ def begins_elsewhere(
         for candidate in model.chosen
     )
     own_step = model.batched and not model.simulator.own_files()
-    if not (sticks and own_step and 0 < free <= MOST and _far(fitter, fit, noise)):
+    far = (fitter.over_noise(fit, noise) > FAR).any()
+    if not (sticks and own_step and 0 < free <= MOST and far):
         return np.zeros((0, len(fit.theta)))
     forecasts = ShortForecasts(fitter, model, parts)
     space = _Space(model, fit.theta, free)
@@ -139,15 +140,6 @@ def _apart(points: Array, near: Array) -> Array:
         if len(found) < STARTS and (np.abs(found - point) > near).any(axis=1).all():
             found = np.vstack([found, point])
     return found
-
-
-def _far(fitter: SmoothFitter, fit: Fit, noise: Array) -> bool:
-    """Whether a fit leaves much more than noise."""
-    windows = fitter.blocks.windows
-    square = fit.projected.reshape(*windows.index.shape, -1) ** 2
-    count = np.maximum(fitter.valid.sum(axis=(0, 1)), 1)
-    left = np.sqrt(square.sum(axis=(0, 1)) / count) * fitter.sigma
-    return bool((left > FAR * noise).any())
 
 
 class _Space:

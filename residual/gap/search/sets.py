@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.fitting.contract import UNCONVERGED, Fit, Fitter
-from residual.gap.fitting.plausible import absurd, nearly, surprises, undone
+from residual.gap.fitting.plausible import absurd, nearly, surprises, told_by_data, undone
 from residual.gap.fitting.screening import Signatures, signatures, trials
 from residual.gap.fitting.validation import Validated, validate
 from residual.gap.model.candidates import Candidate
@@ -85,7 +85,7 @@ class Search:
         self.refused: dict[Key, str] = {}
         self.nearly: set[Key] = set()
         self.halved: dict[Key, Fit] = {}
-        self._globally = GlobalSearch(noise, until)
+        self._noise, self._globally = noise, GlobalSearch(noise, until)
         self._from_longer_leads: dict[Key, Array] = {}
         self._signatures: dict[Key, Signatures] = {}
         channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
@@ -228,7 +228,7 @@ class Search:
         self.tried[key] = found
         self.validated[key] = validate(self.fitter, found)
         number, reason = absurd(found.model, found.theta, self.fitter.samples)
-        if reason:
+        if reason and not told_by_data(found, self.nominal, self.fitter, self._noise):
             self.refused[key] = reason
             if nearly(found, number, self.fitter):
                 self.nearly.add(key)
