@@ -84,12 +84,14 @@ def check_rate(position: Signal, rate: Signal, where: str) -> list[Finding]:
         return []
     as_is = min(_misfit(moved, integral, turning) for moved, integral in spans)
     if as_is > 0.3:
-        for signal, fix, (on_position, on_rate) in _repairs(position, rate):
+        repairs = _repairs(position, rate)
+        for signal, fix, (on_position, on_rate) in repairs:
             mended = min(_misfit(on_position * m, on_rate * i, turning) for m, i in spans)
             if mended < min(0.3, as_is / 3):
+                factor = on_rate / on_position
                 raise ValueError(
                     f"column {signal.column!r}: {signal.channel.name!r} {_looks(fix)}: set {fix}"
-                    f"{_or_time(on_rate / on_position)} (the change of "
+                    f"{_or_other(repairs, signal, factor)}{_or_time(factor)} (the change of "
                     f"{position.channel.name!r} is not the integral of {rate.channel.name!r}, and "
                     "would be then)"
                 )
@@ -144,8 +146,9 @@ def check_plausible(signal: Signal, rate_scale: float | None) -> None:
     limit = _TIMES_SCALE * rate_scale if rate_scale else _FASTEST
     fast = float(np.quantile(speed, 0.95)) if speed.size else 0.0
     if fast > limit:
+        moves = "reaches" if unit == "rad/s" else "turns by up to"
         raise ValueError(
-            f"{name} reaches {fast:.3g} rad/s, expected at most about {limit:.3g}; {advice}"
+            f"{name} {moves} {fast:.3g} rad/s, expected at most about {limit:.3g}; {advice}"
         )
 
 
@@ -162,15 +165,27 @@ def _looks(fix: str) -> str:
     return "has the wrong sign" if unit == fix else f"looks like {_WORDS.get(unit, unit)}"
 
 
+def _or_other(repairs: Sequence[Repair], blamed: Signal, factor: float) -> str:
+    """The fix of the other column that would do the same, if there is one."""
+    for signal, fix, (on_position, on_rate) in repairs:
+        if signal is not blamed and math.isclose(on_rate / on_position, factor):
+            return f", or if that is right set {fix} for column {signal.column!r}"
+    return ""
+
+
 def _or_time(factor: float) -> str:
     """Times in another unit than seconds change the integral of a rate as its own unit does."""
     found = [n for n in units_of("s") if math.isclose(find_unit(n, "s").factor, factor)]
     return f", or unit: {found[0]} for the time" if found and found[0] != "s" else ""
 
 
-def _repairs(position: Signal, rate: Signal) -> list[tuple[Signal, str, tuple[float, float]]]:
-    """What may be wrong: the signal, the fix, and its factors on position and rate."""
-    repairs = []
+#: What may be wrong: the signal, the fix, and its factors on position and rate.
+Repair = tuple[Signal, str, tuple[float, float]]
+
+
+def _repairs(position: Signal, rate: Signal) -> list[Repair]:
+    """What may be wrong, the likeliest first."""
+    repairs: list[Repair] = []
     for signal in (position, rate):
         target = signal.channel.unit
         stated = find_unit(signal.unit, target).factor
@@ -179,8 +194,14 @@ def _repairs(position: Signal, rate: Signal) -> list[tuple[Signal, str, tuple[fl
             if not math.isclose(factor, 1):
                 factors = (factor, 1.0) if signal is position else (1.0, factor)
                 repairs.append((signal, f"unit: {name}", factors))
-    # The commonest mistake first, since a flipped sign or another unit may come close.
-    repairs.sort(key=lambda repair: not repair[1].startswith(("unit: deg", "unit: rad")))
+
+    def unlikely(repair: Repair) -> tuple[bool, bool]:
+        # The commonest mistake first, since a flipped sign or another unit may come close; and
+        # whoever states the unit of one column has forgotten that of the other.
+        common = repair[1].startswith(("unit: deg", "unit: rad"))
+        return not common, bool(repair[0].unit)
+
+    repairs.sort(key=unlikely)
     return [*repairs, (rate, "scale: -1", (1.0, -1.0))]
 
 

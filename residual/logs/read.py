@@ -74,7 +74,9 @@ def read_logs(
             if table.headers:
                 says = f"The header stands there {table.headers} times more, and was left out."
                 findings.append(Finding("headers", str(path), says))
-            runs += runs_of(table, layout, channels, action_channels, findings)
+            alone = len(paths) == 1
+            runs += runs_of(table, layout, channels, action_channels, findings, alone)
+        _refuse_nowhere(runs, channels, columns)
         runs = tidy(
             runs, columns.gap, columns.minimum_samples, findings, [c.name for c in channels]
         )
@@ -86,6 +88,20 @@ def read_logs(
         trajectories = tuple(_trajectory(run, state_channels, channels, findings) for run in runs)
     findings += _unmeasured(channels, runs)
     return LogData(trajectories, tuple(findings))
+
+
+def _refuse_nowhere(runs: Sequence[Run], channels: Sequence[Channel], columns: LogFormat) -> None:
+    """Refuse a state that the layout gives a column, and that has no value in any file."""
+    for index, channel in enumerate(channels):
+        if channel.name not in columns.states or not runs:
+            continue
+        if not any(np.isfinite(run.states[:, index]).any() for run in runs):
+            column = named_column(columns.states[channel.name], channel.name)
+            raise LogError(
+                f"no value at all for {channel.name!r} in any file, expected numbers; leave the "
+                "channel out if it was not measured",
+                column=column.column,
+            )
 
 
 def _check_actions(runs: Sequence[Run], channels: Sequence[Channel], columns: LogFormat) -> None:

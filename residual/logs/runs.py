@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ def runs_of(
     states: Sequence[Channel],
     actions: Sequence[Channel],
     findings: list[Finding],
+    alone: bool = True,
 ) -> Iterator[Run]:
     """The trajectories of one file as they were recorded, in SI.
 
@@ -37,6 +38,7 @@ def runs_of(
         actions: Action channels.
         findings: Converted columns, and trajectories that ``start`` and ``stop`` leave out, are
             added here.
+        alone: Whether there is no other file, where a state that has no value here has some.
 
     Raises:
         LogError: A column is missing or holds no numbers, or the time goes backwards.
@@ -58,6 +60,8 @@ def runs_of(
             "give it a constant value, with --columns FILE",
             table.path,
         )
+    if not alone:
+        _refuse_absent(table, found)
     time = time_column(table, columns.time, findings)
     times = _si(table, time, TIME, columns.decimal)
     seen = [
@@ -67,7 +71,10 @@ def runs_of(
         for channel in states
     ]
     acted = [_si(table, inputs[channel.name], channel, columns.decimal) for channel in actions]
-    for channel, values in (*zip(states, seen, strict=True), *zip(actions, acted, strict=True)):
+    needed = list(zip(actions, acted, strict=True))
+    if alone or not any(np.isfinite(values).any() for values in seen):
+        needed = [*zip(states, seen, strict=True), *needed]
+    for channel, values in needed:
         column = (found | inputs).get(channel.name)
         if column is not None and not np.isfinite(values).any():
             raise LogError(
@@ -96,6 +103,20 @@ def runs_of(
                 matrix[part],
                 inputs_matrix[part],
             )
+
+
+def _refuse_absent(table: Table, states: Mapping[str, Column]) -> None:
+    """Refuse one of several files that lacks the column of a state."""
+    for name, column in states.items():
+        if column.column in (*table.names, *range(1, len(table.names) + 1)):
+            continue
+        try:
+            table.values(column.column)
+        except LogError as error:
+            raise LogError(
+                f"{error}; if {name!r} was not measured in this file, give it an empty column of "
+                "that name, or leave the channel out of the map"
+            ) from None
 
 
 def _si(table: Table, column: Column, channel: Channel, decimal: str) -> Array:

@@ -6,7 +6,7 @@ import pyarrow.parquet
 import pytest
 from swings import ACTIONS, STATES, error, read, swing, write
 
-from residual.logs import Column, LogError, read_logs
+from residual.logs import Column, LogError, LogFormat, read_logs
 
 
 def test_no_file_and_no_table(tmp_path):
@@ -63,6 +63,22 @@ def test_infinite_value(csv, word):
 def test_column_without_any_value(tmp_path):
     path = write(tmp_path / "log.npz", swing() | {"rate": np.full(200, np.nan)})
     assert "column 'rate': no value at all for 'rate'" in error(path)
+
+
+def test_a_state_that_one_of_several_files_lacks(tmp_path):
+    """An empty column says that it was not measured there."""
+    whole = write(tmp_path / "whole.csv", swing())
+    empty = write(tmp_path / "empty.npz", swing() | {"rate": np.full(200, np.nan)})
+    states = {"angle": "angle", "rate": "rate"}
+    data = read_logs([whole, empty], STATES, ACTIONS, LogFormat(states=states))
+    assert np.isnan(data.trajectories[1].states[:, 1]).all()
+    columns = swing()
+    del columns["rate"]
+    lacking = write(tmp_path / "lacking.csv", columns)
+    with pytest.raises(LogError, match=r"no column 'rate', .* give it an empty column of that"):
+        read_logs([whole, lacking], STATES, ACTIONS, LogFormat(states=states))
+    with pytest.raises(LogError, match="column 'rate': no value at all for 'rate' in any file"):
+        read_logs([empty, empty], STATES, ACTIONS, LogFormat(states=states))
 
 
 def test_time_going_backwards(csv):

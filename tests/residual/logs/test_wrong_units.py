@@ -25,7 +25,17 @@ def test_wrong_units_are_found_by_kinematics(csv, noise, wrap, speed):
     assert "set scale: -1" in error(csv(angle=angle, rate=-rate))
     # Stated as degrees, but it was radians.
     declared = {"angle": Column("angle", "deg"), "rate": "rate"}
-    assert "set unit: rad" in error(csv(angle=angle, rate=rate), states=declared)
+    stated = error(csv(angle=angle, rate=rate), states=declared)
+    assert "or if that is right set unit: rad for column 'angle'" in stated
+
+
+def test_a_column_without_a_unit_is_suspected_before_one_with(csv):
+    """Both would do: the angle is in degrees as stated, and the rate is, too."""
+    log = csv(angle=DEG * swing()["angle"], rate=DEG * swing()["rate"])
+    message = error(log, states={"angle": Column("angle", "deg"), "rate": "rate"})
+    assert "column 'rate': 'rate' looks like degrees per second: set unit: deg/s" in message
+    message = error(log, states={"angle": "angle", "rate": Column("rate", "deg/s")})
+    assert "column 'angle': 'angle' looks like degrees: set unit: deg" in message
 
 
 def test_scale_of_a_sensor_that_no_unit_explains_is_a_finding(csv):
@@ -59,6 +69,7 @@ def test_degrees_without_a_measured_rate_are_found_by_plausibility(csv):
     clean = swing(speed=6.0)
     message = error(csv(angle=DEG * clean["angle"]), states={"angle": "angle"})
     assert "looks like degrees: set unit: deg (or unit: rad if that is right)" in message
+    assert "the channel 'angle' turns by up to" in message
     both = error(csv(angle=DEG * clean["angle"], rate=DEG * clean["rate"]))
     assert "looks like degrees" in both
     compass = (DEG * 1.5 * clean["time"]) % 360
