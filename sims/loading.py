@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import difflib
 import importlib
 import importlib.util
 import inspect
@@ -155,10 +156,12 @@ def chosen_effects(
             if not own and "." in name:
                 own = _placed(simulator, name, where)
         if not own:
-            there = ", ".join([*known, *map(str, curves)])
+            there = [*known, *map(str, curves)]
+            near = difflib.get_close_matches(str(entry), there, 1)
+            hint = f"did you mean {near[0]!r}? Else " if near else ""
             raise ValueError(
-                f"no effect {entry!r} for {simulator.name}: give one of {there}, or the import "
-                "path of a class of your own"
+                f"no effect {entry!r} for {simulator.name}: {hint}give one of {', '.join(there)}, "
+                "or the import path of a class of your own"
             )
         found.update({str(effect): effect for effect in own})
     return tuple(found.values())

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import json
 import re
 import sys
 import typing
 from argparse import RawDescriptionHelpFormatter
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -27,6 +28,10 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 # How jsonargparse begins a list of all classes that it knows.
 _LISTED = ", known subclasses: "
 _IMPORT_PATH = re.compile(r"\w+(\.\w+)+")
+
+
+# Files of settings that were given, by path with their option, to say where something is wrong.
+_READ: dict[str, tuple[str, Any]] = {}
 
 
 class HelpFormatter(jsonargparse.DefaultHelpFormatter, RawDescriptionHelpFormatter):
@@ -52,11 +57,13 @@ class Parser(jsonargparse.ArgumentParser):
         options.setdefault("formatter_class", HelpFormatter)
         options.setdefault("epilog", says)
         super().__init__(*given, **options)
+        self._given: Any = None
 
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, *rest: Any, **options: Any
     ) -> Any:
         """As usual; a model file may stand for a simulator, and words in a row for a list."""
+        _READ.clear()
         kinds = {o: getattr(a, "_typehint", None) for a in self._actions for o in a.option_strings}
         lists = {name for name, kind in kinds.items() if typing.get_origin(kind) in (list, tuple)}
         given = _with_lists(list(sys.argv[1:] if args is None else args), lists)
@@ -75,6 +82,7 @@ class Parser(jsonargparse.ArgumentParser):
     def parse_object(self, cfg_obj: Any, *rest: Any, **options: Any) -> Any:
         """As usual; a robot's model file may stand where a simulator is expected."""
         given = _with_models(cfg_obj) if isinstance(cfg_obj, Mapping) else cfg_obj
+        self._given = given
         return super().parse_object(given, *rest, **options)
 
     def parse_string(self, content: str, path: Any = "", *rest: Any, **options: Any) -> Any:
@@ -106,9 +114,56 @@ class Parser(jsonargparse.ArgumentParser):
 
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
         """Say what is wrong and how to learn more, in one line."""
-        reason = re.sub(r"\s*\n\s*-?\s*", " ", str(message).strip())
+        unknown = self._unknown() if isinstance(ex, KeyError) else ""
+        reason = unknown or re.sub(r"\s*\n\s*-?\s*", " ", str(message).strip())
         sys.stderr.write(f"error: {reason} (see --help)\n")
         raise SystemExit(2)
+
+    def _unknown(self) -> str:
+        """The first setting given that there is not, with its place; empty if there is none."""
+        given = self._given
+        if isinstance(given, jsonargparse.Namespace):  # of a part of the settings
+            found = _not_among(given.as_dict(), self._settings_below(""))
+            return found and _place(given.as_dict()) + found
+        for path, (option, content) in _READ.items():
+            for keys, inside in _mappings(content, () if option == "config" else (option,)):
+                if found := _not_among(
+                    inside, self._settings_below("".join(f"{k}." for k in keys))
+                ):
+                    below = keys if option == "config" else keys[1:]
+                    return f"{': '.join([path, *below])}: {found}"
+        return ""
+
+    def _settings_below(self, group: str) -> list[str]:
+        names = [action.dest for action in self._actions if action.dest.startswith(group)]
+        tops = dict.fromkeys(n.removeprefix(group).partition(".")[0] for n in names)
+        return [name for name in tops if name != "help"]
+
+
+def _not_among(given: Any, known: Sequence[str]) -> str:
+    """What is to be said of the first setting that is not known, if there is one."""
+    for name in given if isinstance(given, Mapping) and known else ():
+        if name not in known:
+            near = difflib.get_close_matches(str(name), known, 1)
+            hint = f"did you mean {near[0]!r}?" if near else f"there is {', '.join(known)}"
+            return f"no setting {name!r}, {hint}"
+    return ""
+
+
+def _place(settings: Mapping[str, Any]) -> str:
+    """Where settings stand in the files that were given, as a beginning of a sentence."""
+    for path, (_, content) in _READ.items():
+        for keys, inside in _mappings(content):
+            if inside == settings:
+                return f"{': '.join([path, *keys])}: "
+    return ""
+
+
+def _mappings(content: Any, keys: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    if isinstance(content, Mapping):
+        yield keys, content
+        for key, value in content.items():
+            yield from _mappings(value, (*keys, str(key)))
 
 
 def _with_lists(arguments: Sequence[str], lists: Container[str]) -> list[str]:
@@ -153,7 +208,7 @@ def _check_given(name: str, value: str) -> None:
     lacking = ""
     if value.endswith((".yaml", ".yml")):
         try:
-            safe_yaml.read(value)
+            _READ[value] = (name.removeprefix("--"), safe_yaml.read(value))
         except ValueError as error:
             raise ValueError(f"{name} {error}") from None
     elif name in _CLASSES:

@@ -105,6 +105,36 @@ def test_a_simulator_that_hosts_nothing_is_told_what_to_derive_from(
     assert not (tmp_path / "o").exists()
 
 
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ("time: {column: time, units: ms}", "time: no setting 'units', did you mean 'unit'?"),
+        ("states: {angle: {unti: deg}}", "states: angle: no setting 'unti', did you mean 'unit'?"),
+        ("stats: {angle: {unit: deg}}", "no setting 'stats', did you mean 'states'?"),
+    ],
+)
+def test_a_misspelt_setting_of_a_column_map_is_named_with_file_and_place(
+    settings, says, logs, tmp_path, capsys
+):
+    path = tmp_path / "columns.yaml"
+    path.write_text(settings)
+    (tmp_path / "all.yaml").write_text(f"columns: {{{settings}}}")
+    for option, file, place in (("columns", path, ""), ("config", tmp_path / "all.yaml", None)):
+        with pytest.raises(SystemExit) as stopped:
+            main(["--simulator", EQUATION, "--logs", *logs, f"--{option}", str(file), "--output",
+                  str(tmp_path / "out")])  # fmt: skip
+        said = capsys.readouterr().err
+        assert stopped.value.code == 2 and says.split(": no")[-1] in said
+        assert place is None or f"error: {file}: {says}" in said
+
+
+def test_an_effect_at_a_misspelt_place_is_told_the_right_one(logs, tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main(["--simulator", EQUATION, "--logs", *logs, "--effects", "delay@volts", "--output",
+              str(tmp_path / "out")])  # fmt: skip
+    assert "did you mean 'delay@voltage'?" in capsys.readouterr().err
+
+
 def test_a_file_is_used_or_set_aside_but_not_both(logs, tmp_path, capsys):
     with pytest.raises(SystemExit) as stopped:
         main(["--simulator", EQUATION, "--output", str(tmp_path / "o"), "--logs", *logs,
