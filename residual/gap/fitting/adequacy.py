@@ -58,7 +58,8 @@ def generic_forces(
 ) -> tuple[Array, list[str]]:
     """Functions of state and input that a missing force could be made of, (n, g), and names.
 
-    Where an angle does not run through half a wave, it shows no wave: that has no name.
+    Where an angle does not run through half a wave, it shows no wave: that has no name. Nor has
+    the sign of an input that never changes it.
     """
     columns: list[Array] = []
     names: list[str] = []
@@ -94,7 +95,8 @@ def generic_forces(
         size = max(float(np.std(u)), 1e-12)
         add(channel.name, u / size)
         add(f"{channel.name} |{channel.name}|", u * np.abs(u) / size**2)
-        add(f"sign of {channel.name}", np.tanh(2 * u / size))
+        turns = float(u.min()) < 0 < float(u.max())
+        add(f"sign of {channel.name}" if turns else "", np.tanh(2 * u / size))
         add(f"change of {channel.name}", (u - past) / size)
         for i, other in enumerate(channels):
             if other.kind == "rate":
