@@ -134,12 +134,14 @@ def apart(result: GapResult) -> list[Section]:
 
 
 def blind(result: GapResult) -> list[Section]:
-    """Effects that this log could hide."""
+    """Effects that this log could hide; one of several orders is seen, whichever it is, from the
+    largest strength on."""
     if not result.blind:
         return []
+    least = {b.effect: b for b in sorted(result.blind, key=lambda b: b.visible_from)}
     rows: list[list[Cell]] = [
         [effect_name(b.effect), f"{b.visible_from:.3g}{unit_text(b.unit)}", b.needs]
-        for b in result.blind
+        for b in (least[name] for name in dict.fromkeys(b.effect for b in result.blind))
     ]
     return [
         Table(

@@ -70,9 +70,9 @@ def names_of(labels: Sequence[str], last: str = "or") -> str:
 
 
 def by_place(names: Sequence[str]) -> list[str]:
-    """``friction at a`` and ``friction at b`` as ``friction at a and b``."""
+    """``friction at a`` and ``friction at b`` as ``friction at a and b``, each once."""
     places: dict[str, list[str]] = {}
-    for name in names:
+    for name in dict.fromkeys(names):
         what, _, place = name.partition(" at ")
         places.setdefault(what, []).append(place)
     return [f"{what} at {listed(found)}" if all(found) else what for what, found in places.items()]

@@ -308,6 +308,7 @@ def test_too_few_blocks_are_no_verdict_on_the_library(effects):
 @pytest.mark.parametrize(("hidden", "says"), [
     (("delay@voltage",), "Delay at voltage."),
     (("delay@voltage", "mass"), "Delay at voltage and mass."),
+    (("cogging@angle", "cogging@angle", "mass", "cogging@angle"), "Cogging at angle and mass."),
     (("delay@u", "mass", "coulomb_friction@left_hip", "coulomb_friction@left_knee",
       "coulomb_friction@x"),
      "Delay at u; mass; Coulomb friction at left hip, left knee and x."),

@@ -179,10 +179,11 @@ def no_gap_verdict(says: str) -> Verdict:
 
 
 def blind_verdict(blind: Sequence[Blind]) -> Verdict:
-    """What this log could not show."""
-    names = ", ".join(f"{b.effect} (needs {b.needs})" for b in blind)
+    """What this log could not show; an effect of several orders, such as cogging, once."""
+    needs = {b.effect: b.needs for b in blind}
+    names = ", ".join(f"{effect} (needs {needed})" for effect, needed in needs.items())
     return Verdict(
-        "needs_data", "", "", {}, tuple(b.effect for b in blind), "",
+        "needs_data", "", "", {}, tuple(needs), "",
         f"this log could not show: {names}", Span(0.0, 0.0, 0.0),
     )  # fmt: skip
 
