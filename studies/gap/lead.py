@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from residual.gap import GapResult
 from residual.gap.fitting.forecasts import own_channels
-from residual.gap.result import ChannelGap, Verdict
+from residual.gap.result import ChannelGap, Gap, Verdict
 from studies.gap.answer import OFF, cannot_tell, rivals
 from studies.gap.records import beside_lead
 from studies.gap.words import (
@@ -25,6 +25,8 @@ FEW_RIVALS = 2
 TRIFLE = 0.05
 #: Error on records set aside, over that of the nominal simulator, from which on it is worse.
 WORSE = 1.05
+#: The same over that of the nominal one, for a channel that is not the main one.
+MUCH_WORSE = 1.1
 #: Difference between channels' shares from which on they are told one by one, so many at most.
 UNLIKE, FEW_CHANNELS = 0.2, 3
 
@@ -75,9 +77,10 @@ def _named_share(result: GapResult, tolerance: float | None) -> str:
     return none + _but_off_apart(result)
 
 
-def own_errors(result: GapResult) -> dict[str, ChannelGap]:
-    """Errors of all measured channels, but of those that are the rate of another one."""
-    table = result.gap.by_channel
+def own_errors(result: GapResult, apart: Gap | None = None) -> dict[str, ChannelGap]:
+    """Errors of all measured channels, but of those that are the rate of another one; of the
+    records that were set aside, if their table is given."""
+    table = (apart or result.gap).by_channel
     channels = [c for c in result.corrected.physical_channels if c.name in table]
     return {channels[i].name: table[channels[i].name] for i in own_channels(channels)}
 
@@ -117,8 +120,10 @@ def _but_worse_apart(result: GapResult) -> str:
     """What speaks against the corrected simulator on the records that were set aside, if it is
     no better there."""
     apart = result.held_out
-    if apart is None or WORSE * apart.after.value < apart.before.value:
+    if apart is None:
         return ""
+    if WORSE * apart.after.value < apart.before.value:
+        return _but_worse_elsewhere(result, apart)
     before, after = (quantity_text(s.value, apart.unit) for s in (apart.before, apart.after))
     by_chance = apart.after.low < apart.before.value and apart.after.value < apart.before.high
     if by_chance or apart.after.value <= WORSE * apart.before.value:
@@ -129,6 +134,25 @@ def _but_worse_apart(result: GapResult) -> str:
     return (
         f" But it does not hold on the records set aside, where the corrected simulator is worse: "
         f"the {ahead(apart)} is {after}, the nominal one's {before}."
+    )
+
+
+def _but_worse_elsewhere(result: GapResult, apart: Gap) -> str:
+    """The channel that the corrected simulator makes clearly worse on the records set aside, while
+    the main one is better there."""
+    errors = own_errors(result, apart)
+    worse = {
+        name: error.after.value / error.before.value
+        for name, error in errors.items()
+        if error.after.value > max(MUCH_WORSE * error.before.value, OFF * error.noise_floor.value)
+    }
+    if not worse:
+        return ""
+    name = max(worse, key=lambda name: worse[name])
+    error = errors[name]
+    before, after = (quantity_text(s.value, error.unit) for s in (error.before, error.after))
+    return (
+        f" But on the records set aside it makes {name} worse: {after} with it, {before} without."
     )
 
 
