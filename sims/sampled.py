@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import gymnasium
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from sims.environment import observe
 from sims.simulator import Array, Simulator, wrap
 from sims.tasks import Task
-from sims.unsound import Unsound, cannot_call, refuse_not_finite
+from sims.unsound import Unsound, answered, cannot_call, refuse_not_finite
 
 #: Reads the state, shape (n_s,), from the environment and its last observation.
 StateOf = Callable[[Any, Any], ArrayLike]
@@ -43,7 +43,7 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     Raises:
         Unsound: The actions or the control period are not those of ``nominal``; later, the state
-            does not fit its channels, or is not finite.
+            does not fit its channels, or is not finite, or a function of the environment raised.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin an episode where the environment begins it."""
         super().reset(seed=seed)
-        begun = self.env.reset(seed=seed, options=options)
+        begun = answered(f"{self._name} in reset", self.env.reset, seed=seed, options=options)
         if not isinstance(begun, tuple) or len(begun) != 2:
             raise Unsound(
                 f"{self._name}: reset returned {type(begun).__name__}, expected Gymnasium's two: "
@@ -118,10 +118,12 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         assert isinstance(box, gymnasium.spaces.Box)
         held = np.clip(np.asarray(action, float), box.low, box.high)
         dtype = self.env.action_space.dtype
-        stepped = self.env.step(held.astype(dtype))
-        if len(stepped) != 5:
+        stepped = answered(f"{self._name} in step", self.env.step, held.astype(dtype))
+        if not isinstance(stepped, tuple | list) or len(stepped) != 5:
+            several = isinstance(stepped, tuple | list)
+            what = f"{len(stepped)} values" if several else type(stepped).__name__
             raise Unsound(
-                f"{self._name}: step returned {len(stepped)} values, expected Gymnasium's five: "
+                f"{self._name}: step returned {what}, expected Gymnasium's five: "
                 "observation, reward, terminated, truncated, info"
             )
         observation, _, ended, cut, info = stepped
@@ -174,14 +176,23 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _read(self, observation: Any, info: dict[str, Any]) -> Array:
         if self._state_of is not None:
-            state = np.asarray(self._state_of(self.env, observation), float)
-        elif "state" in info:
-            state = np.asarray(info["state"], float)
+            whose = f"the function state_of for {self._name}"
+            given, what = (
+                answered(whose, self._state_of, self.env, observation),
+                "state_of returned",
+            )
+        elif isinstance(info, Mapping) and "state" in info:
+            given, what = info["state"], "info['state'] is"
         else:
             raise Unsound(
                 "the true environment does not report its state: put it into info['state'], or "
                 "give the System a function state_of(env, observation)"
             )
+        state = _numbers(given)
+        if state is None:
+            names = ", ".join(channel.name for channel in self.nominal.state_channels)
+            raise Unsound(f"{self._name}: {what} {given!r:.80}, expected one real number for "
+                          f"each of {names}")  # fmt: skip
         channels = self.nominal.state_channels
         if state.shape != (len(channels),):
             names = ", ".join(channel.name for channel in channels)
@@ -191,6 +202,16 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             )
         refuse_not_finite(self._name, channels, state, self._steps)
         return state
+
+
+def _numbers(given: Any) -> Array | None:
+    """What somebody gave as an array of real numbers; None if it is no such thing."""
+    try:
+        found = np.asarray(given)
+        # Numbers of other libraries are objects here.
+        return None if found.dtype.kind not in "biufO" else found.astype(float)
+    except Exception:
+        return None
 
 
 def _refuse_early_end(env: gymnasium.Env[Any, Any], task: Task) -> None:

@@ -17,7 +17,7 @@ from sims.sampled import SampledEnv, StateOf
 from sims.simulator import Array, Simulator, physical
 from sims.task_contract import refuse_unsound_task
 from sims.tasks import Task
-from sims.unsound import Unsound, cannot_call
+from sims.unsound import Unsound, answered, cannot_call
 
 # Up to so many state channels are reported one by one, more by their kind.
 _FEW = 6
@@ -175,7 +175,7 @@ class System:
         """
         true = self.true
         if not isinstance(true, Simulator | gymnasium.Env):
-            true = true()
+            true = answered(f"system {self.name}: the function true", true)
             if not isinstance(true, Simulator | gymnasium.Env):
                 raise ValueError(
                     f"system {self.name}: the function true returned {_kind(true)}, expected a "
@@ -225,15 +225,19 @@ class System:
             refuse_unsound_task(self.task, self.nominal)
         except Unsound as error:
             raise Unsound(f"system {self.name}: {error}") from error.__cause__ or error
-        try:
-            for env in (self.environment(self.nominal), self.true_environment()):
+        names = ", ".join(channel.name for channel in self.nominal.state_channels)
+        fits = f"{type(self.task).__name__} does not fit {self.nominal.name} ({names})"
+        for env, wrong in (
+            (self.environment(self.nominal), fits),
+            (self.true_environment(), "the true system cannot be stepped"),
+        ):
+            try:
                 env.reset(seed=0)
                 env.step(env.action_space.sample() * 0)
-        except (IndexError, TypeError, KeyError) as error:
-            raise ValueError(
-                f"system {self.name}: {type(self.task).__name__} does not fit {self.nominal.name} "
-                f"({', '.join(c.name for c in self.nominal.state_channels)}): {error}"
-            ) from error
+            except (IndexError, TypeError, KeyError) as error:
+                raise ValueError(
+                    f"system {self.name}: {wrong}: {type(error).__name__}: {error}"
+                ) from error
 
     def code(self) -> list[Any]:
         """The objects and functions whose code says what the system is."""

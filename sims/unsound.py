@@ -25,6 +25,24 @@ def cannot_call(function: Callable[..., Any], *given: Any, **named: Any) -> str:
     return ""
 
 
+def answered(whose: str, function: Callable[..., Any], *given: Any, **named: Any) -> Any:
+    """What somebody else's function returns.
+
+    Args:
+        whose: Function it is, in words.
+        function: Called with the other arguments.
+
+    Raises:
+        Unsound: It raised; the message says whose it is, and the kind and words of its error.
+    """
+    try:
+        return function(*given, **named)
+    except Unsound:
+        raise
+    except Exception as error:
+        raise Unsound(f"{whose} raised {type(error).__name__}: {error}") from error
+
+
 def refuse_not_finite(
     what: str, channels: tuple[Channel, ...], state: Array, step: int, reward: float = 0.0
 ) -> None:
