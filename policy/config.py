@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import numpy as np
+
 
 @dataclasses.dataclass(frozen=True)
 class DDPGConfig:
@@ -59,7 +61,9 @@ class DDPGConfig:
     def __post_init__(self) -> None:
         object.__setattr__(self, "hidden", tuple(self.hidden))
         if len(self.hidden) != 2:
-            raise ValueError(f"hidden is {self.hidden}, expected the widths of two layers")
+            raise ValueError(f"ddpg.hidden is {self.hidden}, expected the widths of two layers")
+        if not all(isinstance(width, int | np.integer) and width > 0 for width in self.hidden):
+            raise ValueError(f"ddpg.hidden is {self.hidden}, expected whole numbers from 1")
         for name, low, high in (
             ("action_layer", 1, 2),
             ("tau", 0, 1),
@@ -76,7 +80,7 @@ class DDPGConfig:
         ):
             value = getattr(self, name)
             if not low <= value <= high:
-                raise ValueError(f"{name} is {value}, expected a value from {low} to {high}")
+                raise ValueError(f"ddpg.{name} is {value}, expected a value from {low} to {high}")
 
 
 def whole(name: str, value: object, low: int, high: int) -> int:

@@ -40,7 +40,9 @@ class Budget:
             least = 2 if field.name == "true_samples" else 0
             value = getattr(self, field.name)
             if not isinstance(value, int) or value < least:
-                raise ValueError(f"{field.name} is {value}, expected a number of at least {least}")
+                raise ValueError(
+                    f"budget.{field.name} is {value}, expected a number of at least {least}"
+                )
 
     def check(self, algorithm: Algorithm, replay_is_filled: bool, corrected: bool = False) -> None:
         """Raise ``ValueError`` if a training would end before anything is learnt in it.

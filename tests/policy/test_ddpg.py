@@ -243,6 +243,9 @@ def test_impossible_settings_are_named(field, value):
         DDPGConfig(**{field: value})
     with pytest.raises(ValueError, match="two layers"):
         DDPGConfig(hidden=(3,))  # type: ignore[arg-type]
+    for hidden in ((-3, 8), (0, 8), (2.5, 8)):
+        with pytest.raises(ValueError, match=r"ddpg.hidden is \(.*expected whole numbers from 1"):
+            DDPGConfig(hidden=hidden)  # type: ignore[arg-type]
 
 
 def test_config_is_a_command_line_group():
