@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from residual.gap.answer.answer import judged_apart, matters, summed_up, told
+from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.records import unlike
 from residual.gap.clock import Clock
 from residual.gap.confirmation.rest import from_rest
@@ -127,4 +128,5 @@ def find_gap(
     quality = [*log.findings, *log.left_out, *other, *on_hold, *on_rest, *on_more, *known.says]
     quality += inquiry.untried(answer)
     result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)
-    return dataclasses.replace(result, conventions=conventions, unlike=differ)
+    late = nearly_in_sensors(result.effects, answer.found.search)
+    return dataclasses.replace(result, conventions=conventions, unlike=differ, nearly_late=late)

@@ -232,6 +232,8 @@ class GapResult:
         conventions: What to look at first, None where nothing is counted otherwise.
         unlike: Effects that would take much of what is left off with a size of their own in each
             record, best first.
+        nearly_late: Labels of delays and lags of some inputs that late, or filtering, sensors would
+            nearly imitate, since the other inputs hardly change in that time.
     """
 
     verdicts: tuple[Verdict, ...]
@@ -251,6 +253,7 @@ class GapResult:
     substeps: int | None = None
     conventions: Conventions | None = None
     unlike: tuple[Unlike, ...] = ()
+    nearly_late: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         kinds = "; ".join(f"{v.effect} {v.kind}".strip() for v in self.verdicts[:4])

@@ -129,7 +129,8 @@ class Effect(abc.ABC):
             output, so that such a record holds its consequence already.
         holds_still: True if up to a size of its own nothing moves: forces of friction, or inputs.
         drives: True if it makes an input stronger or weaker in proportion.
-        looks_like: What outside the library moves a system of one input in the same way, in words.
+        looks_like: What outside the library moves a system in the same way if the effect is in all
+            its inputs, in words.
         creeps: True if it is a constant that is seldom one for long, as zeros of sensors are.
     """
 

@@ -9,6 +9,7 @@ from residual.gap.answer.doubts import DOUBTS
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
 from residual.gap.result import Gap, Meant, Number, Verdict
 from sims.effects import Curve
+from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 from studies.gap.words import (
@@ -166,8 +167,12 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         known = {o.effect: f" ({_values(o)})" for o in verdict.meant}
         names = [f"{effect_name(name)}{known.get(name, '')}" for name in verdict.same_motion]
         found.append(f"no motion can tell it from {listed(names, 'or')}")
-    if effect.looks_like and len(result.corrected.action_channels) == 1:
-        found.append(f"{effect.looks_like} would look the same")
+    if effect.looks_like and isinstance(effect, ActuatorEffect):
+        # Sensors that are all late look exactly like inputs that are all late.
+        if len(effect.actuators) == len(result.corrected.action_channels):
+            found.append(f"{effect.looks_like} would look the same")
+        elif verdict.label in result.nearly_late:
+            found.append(f"{effect.looks_like} would look nearly the same")
     for other in verdict.beside:
         twin = next(v for v in result.verdicts if other.effect in v.same_motion)
         meant, named = effect_name(other.effect), effect_name(twin.label)

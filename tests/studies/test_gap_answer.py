@@ -345,3 +345,16 @@ def test_what_the_log_cannot_show_is_told_by_effect(hidden, says):
 def test_what_the_library_does_not_hold_is_named_beside_what_moves_alike():
     found = result(dataclasses.replace(DELAY, kind="confirmed"))
     assert "sensors that are late by as much would look the same" in notes(found.verdicts[0], found)
+
+
+@pytest.mark.parametrize(("inputs", "nearly", "said"), [
+    ("voltage", (), "would look the same"), ("other", (), ""),
+    ("other", ("delay@voltage",), "nearly"),
+])  # fmt: skip
+def test_late_sensors_look_like_inputs_that_are_all_late(inputs, nearly, said):
+    found = dataclasses.replace(result(DELAY), nearly_late=nearly)
+    if inputs == "other":
+        two = Channel("other", "V", "input")
+        found.corrected.action_channels = (*found.corrected.action_channels, two)
+    told = [note for note in notes(DELAY, found) if "sensors that are late" in note]
+    assert len(told) == bool(said) and all(said in note for note in told)
