@@ -138,6 +138,8 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.kind == "unexplained":
         return _remainder_notes(verdict, result)
     if verdict.kind == "calibrated":
+        if verdict.share.value <= 0:
+            return ["alone they take nothing off, they serve the rest; which is off is not known"]
         return [
             f"alone they take {percent(verdict.share.value)} of the gap off; which of them is off "
             "is not known, and what else is missing may hide behind them"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import textwrap
 from collections.abc import Sequence
 
 from residual.gap import GapResult
+from residual.gap.answer.table import BESIDE
 from residual.gap.result import ChannelGap, Gap
 from residual.logs import Finding
 from studies.gap import records
@@ -81,8 +83,9 @@ def wrapped(text: str, indent: str, first: str = "") -> list[str]:
 
 
 def bars(gap: Gap) -> list[str]:
-    """The shrinking gap."""
-    rows = gap_rows(gap)
+    """The shrinking gap; parameters that only serve the rest have no row if they take nothing."""
+    taking = [s for s in gap.steps if s.added != BESIDE or s.gap.value < gap.before.value]
+    rows = gap_rows(dataclasses.replace(gap, steps=tuple(taking)))
     width = max(len(name) for name, _ in rows)
     wide = max(len(span_text(span)) for _, span in rows)
     top = max(span.value for _, span in rows) or 1.0

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from residual.gap.answer.table import BESIDE
 from residual.gap.beside import Conventions
 from residual.gap.result import (
     ChannelGap,
@@ -358,3 +359,15 @@ def test_late_sensors_look_like_inputs_that_are_all_late(inputs, nearly, said):
         found.corrected.action_channels = (*found.corrected.action_channels, two)
     told = [note for note in notes(DELAY, found) if "sensors that are late" in note]
     assert len(told) == bool(said) and all(said in note for note in told)
+
+
+@pytest.mark.parametrize(("share", "error", "told"), [(0.4, 0.8, True), (-0.1, 1.05, False)])
+def test_parameters_that_take_nothing_off_have_no_row_and_fewer_words(share, error, told):
+    moved = Verdict("calibrated", "", "", {}, (), "", "never parsed", Span(share, share, share))
+    found = result(MASS, moved)
+    first, *rest = found.gap.steps
+    steps = (first, Step(BESIDE, Span(error, error, error)), *rest)
+    says = summary(dataclasses.replace(found, gap=dataclasses.replace(found.gap, steps=steps)))
+    assert ("+ parameters within their tolerance" in says) is told
+    assert ("alone they take nothing off" in says) is not told
+    assert "+ mass" in says

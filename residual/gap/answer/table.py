@@ -17,6 +17,8 @@ from residual.gap.search.sets import Key, Search
 
 Array = NDArray[np.float64]
 
+#: The step of parameters that are free within their tolerance.
+BESIDE = "parameters within their tolerance"
 #: Forecasts drawn for pictures.
 PICTURES = 6
 #: Squared error of a block over that of noise alone, up to which it is as good as can be.
@@ -49,7 +51,7 @@ def gap(
     steps = [Step("", by_channel[name].before)]
     if search.beside:
         squares = search.validated[()].squares[:, main]
-        steps.append(Step("parameters within their tolerance", span(squares)))
+        steps.append(Step(BESIDE, span(squares)))
     part: Key = ()
     rest = list(order)
     while rest:
