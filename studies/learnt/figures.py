@@ -103,12 +103,13 @@ def episodes_figure(
     figure, axes = new_figure(len(wanted), 1, height=1.2 + 1.7 * len(wanted), share_x=True)
     data = []
     for axis, (what, column, channel) in zip(axes[:, 0], wanted, strict=True):
-        series = {}
+        series: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         for name, episode in episodes.items():
             values = episode[what][:steps, column]
             if channel.get("angle"):
-                # Where the run ends counts as the first turn: no jumps, whatever the turns.
-                values = values - 2 * np.pi * np.round(values[-1] / (2 * np.pi))
+                # Whole turns off, so that all begin within half a turn of the first one's begin.
+                near = next(iter(series.values()))[1][0] if series else 0.0
+                values = values - 2 * np.pi * np.round((values[0] - near) / (2 * np.pi))
             time = np.arange(len(values)) * about["dt"]
             series[name] = (time, values)
             columns = {"time_s": time, "policy": name, "channel": channel["name"], "value": values}

@@ -28,6 +28,7 @@ from studies.learnt.sections import (
     says_section,
     summarise,
 )
+from studies.learnt.statistics import to_digits
 from studies.learnt.tables import apart, tables_of
 from studies.learnt.verdict import headline
 from studies.learnt.words import Results, measures_of, record_key, shown
@@ -104,7 +105,7 @@ def write_report(
     Report(title, subtitle, sections).write(folder / name)
     # What others published makes lines too long for a terminal.
     told = summary.drop(columns="published", errors="ignore")
-    table = told.to_string(index=False, na_rep="", float_format=lambda value: f"{value:.3g}")
+    table = told.to_string(index=False, na_rep="", float_format=lambda value: to_digits(value, 3))
     single = says_section(results) if len(results) == 1 else []
     says = [f"{row[0]}: {row[-1]}" for part in single for row in part.rows]
     return "\n".join([table, "", *legend(summary, once), *(["", *says] if says else [])])
@@ -125,11 +126,13 @@ def _of_episodes(results: Results, episodes: Episodes) -> list[Drawing]:
     """Pictures of one episode of each policy on the true system."""
     about = results["about"]
     drawn = {title: episodes[key] for key, title in shown(results).items() if key in episodes}
+    steps = drawn_steps(about["dt"])
+    cut = any(len(episode["states"]) > steps for episode in drawn.values())
+    what = f"The first {steps * about['dt']:.4g} s" if cut else "One whole episode of each policy"
     drawings = [(
         "trajectories", episodes_figure(about, drawn), "Episodes on the true system",
         "State and action over time for each policy on the true system.",
-        f"The first {drawn_steps(about['dt']) * about['dt']:.4g} s on the true system; a line "
-        "ends where its episode ends.",
+        f"{what} on the true system; a line ends where its episode ends.",
     )]  # fmt: skip
     if about.get("path"):
         drawings.append((

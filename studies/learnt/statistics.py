@@ -40,7 +40,7 @@ class Mean:
 
     def __str__(self) -> str:
         if self.count == 1:
-            return return_text(self.value)
+            return to_digits(self.value, 5)
         larger = max(abs(self.value), float(np.nan_to_num(self.half_width)))
         # Of what is small, two digits.
         size = np.floor(np.log10(larger)) if larger else 0
@@ -77,6 +77,13 @@ def mean(values: Sequence[float]) -> Mean:
 def return_text(value: float) -> str:
     """A return as people write it: five digits, and of what is large the units."""
     return f"{value:.0f}" if 1e5 <= abs(value) < 1e9 else f"{value:.5g}"
+
+
+def to_digits(value: float, digits: int) -> str:
+    """A number of a column to so many digits, trailing zeros too: -41.000 stands by -93.618."""
+    if 10**digits <= abs(value) < 1e9:
+        return f"{value:.0f}"
+    return f"{value:#.{digits}g}".removesuffix(".") if value else "0"
 
 
 def above(one: pd.DataFrame, other: pd.DataFrame) -> list[float]:

@@ -7,7 +7,7 @@ import pytest
 from studies.learnt.figures import drawn_steps, episodes_figure
 from studies.learnt.report import write_report
 from studies.learnt.sections import policies_once
-from studies.learnt.statistics import above
+from studies.learnt.statistics import above, to_digits
 from studies.learnt.tables import tables_of
 from studies.learnt.verdict import headline
 from studies.learnt.words import returns_by_start
@@ -182,6 +182,37 @@ def test_slow_systems_are_drawn_over_enough_of_their_periods():
     _, numbers = episodes_figure(about, {"idealised": episode})
     assert numbers["time_s"].max() == 60.0 * 99
     assert drawn_steps(0.05) == 200  # ten seconds
+
+
+def test_episodes_are_drawn_from_begins_within_half_a_turn():
+    about = ABOUT | {"states": [{"name": "upper", "unit": "rad", "angle": True}]}
+    begins = {"a": 13.0, "b": -3.0, "c": 3.1}
+    swing = np.linspace(0.0, 9.0, 40)  # Each ends more than a turn from where it begins.
+    episodes = {name: {"states": (begin + swing)[:, None]} for name, begin in begins.items()}
+    episodes["b"]["states"] = (-3.0 - swing)[:, None]
+    _, numbers = episodes_figure(about, episodes)
+    first = numbers.groupby("policy")["value"].first()
+    assert abs(first - first["a"]).max() <= np.pi and abs(first["a"]) <= np.pi
+    for name, begin in begins.items():
+        assert np.isclose((first[name] - begin) / (2 * np.pi) % 1, [0, 1], atol=1e-9).any()
+
+
+@pytest.mark.parametrize(
+    ("steps", "says"),
+    [(20, "One whole episode of each policy on the true system"), (101, "The first 200\u00a0s on")],
+)
+def test_a_caption_says_how_much_of_episodes_is_drawn(tmp_path, steps, says):
+    episode = {"states": np.zeros((steps, 2)), "actions": np.zeros((steps - 1, 0))}
+    write_report([trial([more(8)])], tmp_path, {"idealised": episode})
+    assert says in (tmp_path / "report.html").read_text()
+
+
+def test_numbers_of_a_column_have_the_same_digits(tmp_path):
+    assert [to_digits(v, 5) for v in (-41, -93.618, 0.0, 0.0123456, 12345.6, 123456.7)] == [
+        "-41.000", "-93.618", "0", "0.012346", "12346", "123457",
+    ]  # fmt: skip
+    told = write_report([trial([more(8)])], tmp_path)
+    assert "-41.000" in told and "0.00750" in told
 
 
 def test_the_terminal_says_what_its_columns_mean(tmp_path):
