@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.confirmation.certainty import HOPELESS, ratio, where_it_matters
+from residual.gap.confirmation.certainty import CLEARLY, HOPELESS, ratio, where_it_matters
 from residual.gap.confirmation.claim import Claim
 from residual.gap.fitting.bounded import bounded_step
 from residual.gap.fitting.contract import Fit
@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 #: Errors of a forecast count up to so many times the usual one of the nominal simulator.
 BEYOND = 3.0
+#: Part of the loss of the chosen set from which on a larger one fits much better.
+HALF = 0.5
 
 
 def widened(
@@ -63,27 +65,49 @@ def widened(
 
 
 def _beside_rivals(search: Search, key: Key, claim: Claim, claims: Sequence[Claim]) -> Claim:
-    """A claim with intervals that hold, too, with rivals in place of its companions."""
-    numbers, own = dict(claim.numbers), search.tried[key]
-    half = 1.96 * deviations(own, search.fitter.blocks)[own.model.owner == key.index(claim.number)]
+    """A claim with intervals that hold, too, with rivals in place of its companions, and in larger
+    sets that fit much better."""
+    others = list(_larger(search, key))
     for companion in claims:
         if companion.number == claim.number:
             continue
         instead = {*companion.form, *companion.alike, *companion.rivals}
-        for other, rival in exchanged(search, key, companion.number):
-            if search.candidates[other].label not in instead:
-                continue
-            fit = search.tried[rival]
-            there = np.flatnonzero(fit.model.owner == rival.index(claim.number))
-            for j, reach in zip(there, half, strict=True):
-                knob, value = fit.model.knobs[j], float(fit.theta[j])
-                n = numbers[knob.field]
-                numbers[knob.field] = dataclasses.replace(
-                    n,
-                    low=max(min(n.low, value - reach), knob.low),
-                    high=min(max(n.high, value + reach), knob.high),
-                )
+        others += [
+            rival
+            for other, rival in exchanged(search, key, companion.number)
+            if search.candidates[other].label in instead
+        ]
+    numbers, own = dict(claim.numbers), search.tried[key]
+    half = 1.96 * deviations(own, search.fitter.blocks)[own.model.owner == key.index(claim.number)]
+    for other in others:
+        fit = search.tried[other]
+        there = np.flatnonzero(fit.model.owner == other.index(claim.number))
+        for j, reach in zip(there, half, strict=True):
+            knob, value = fit.model.knobs[j], float(fit.theta[j])
+            n = numbers[knob.field]
+            numbers[knob.field] = dataclasses.replace(
+                n,
+                low=max(min(n.low, value - reach), knob.low),
+                high=min(max(n.high, value + reach), knob.high),
+            )
     return dataclasses.replace(claim, numbers=numbers)
+
+
+def _larger(search: Search, key: Key) -> list[Key]:
+    """Sets that contain the chosen one, leave half of its loss, and forecast no worse than an
+    imperfect model may.
+
+    They have more numbers than forecasts bear out, but some of them may well be right, and then the
+    numbers of the chosen set are not.
+    """
+    fit, error = search.tried[key].merit, search.error(key)
+    return [
+        larger
+        for larger in search.usable()
+        if set(key) < set(larger)
+        and search.tried[larger].merit <= HALF * fit
+        and search.error(larger) <= CLEARLY * error
+    ]
 
 
 def vital(search: Search, key: Key, claim: Claim) -> bool:

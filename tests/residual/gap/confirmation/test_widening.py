@@ -1,0 +1,36 @@
+"""Intervals allow for larger sets that fit much better."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from toy import Toy
+
+from residual.gap.confirmation import widening
+from residual.gap.confirmation.claim import Claim
+from residual.gap.result import Number
+
+
+def told(monkeypatch, merit, error):
+    """The interval of one effect, 2 (1.9 to 2.1), that would be 1 beside a second one."""
+    search = Toy({(): 1.0, (0,): 0.1, (0, 1): error}, merits={(0,): 100.0, (0, 1): merit})
+    knob = SimpleNamespace(field="change", low=-10.0, high=10.0)
+    for key, values in (((0,), [2.0]), ((0, 1), [1.0, 5.0])):
+        fit = search.tried[key]
+        fit.theta = np.array(values)
+        fit.model.knobs, fit.model.owner = (knob,) * len(key), np.arange(len(key))
+    monkeypatch.setattr(widening, "deviations", lambda fit, blocks: np.full(len(fit.theta), 0.05))
+    number = Number(2.0, 1.9, 2.1, "kg")
+    claim = Claim(0, {"change": number}, (), (), (), (), True, True, True, False, (0.9, 0.8, 0.95))
+    found = widening._beside_rivals(search, (0,), claim, [claim]).numbers["change"]
+    return found.low, found.high
+
+
+def test_an_interval_holds_in_a_larger_set_that_leaves_half_of_the_loss(monkeypatch):
+    low, high = told(monkeypatch, merit=40.0, error=0.12)
+    assert low == pytest.approx(1.0 - 1.96 * 0.05) and high == pytest.approx(2.1)
+
+
+@pytest.mark.parametrize(("merit", "error"), [(80.0, 0.12), (40.0, 0.2)])
+def test_not_in_one_that_fits_hardly_better_or_forecasts_clearly_worse(monkeypatch, merit, error):
+    assert told(monkeypatch, merit, error) == (1.9, 2.1)
