@@ -93,7 +93,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except ImportError as error:
         sys.stderr.write(f"error: {error}\n")
         raise SystemExit(2) from None
-    importlib.import_module(COMMANDS[given[0]][0]).main(given[1:])
+    try:
+        study = importlib.import_module(COMMANDS[given[0]][0])
+    except KeyboardInterrupt:
+        sys.stderr.write("\nstopped; nothing had begun\n")
+        raise SystemExit(130) from None
+    study.main(given[1:])
 
 
 if __name__ == "__main__":

@@ -54,6 +54,15 @@ def test_every_command_tells_its_options(command, tmp_path, monkeypatch, capsys)
     assert f"usage: simgap {command} " in said
 
 
+def test_an_interrupt_while_a_command_loads_is_one_line(tmp_path, monkeypatch, capsys):
+    (tmp_path / "slow_study.py").write_text("raise KeyboardInterrupt\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(simgap.COMMANDS, "slow", ("slow_study", "loads slowly"))
+    with pytest.raises(SystemExit, match="130"):
+        simgap.main(["slow"])
+    assert capsys.readouterr().err == "\nstopped; nothing had begun\n"
+
+
 def test_what_a_notebook_shows_is_short():
     rng = np.random.default_rng(0)
     states, actions = rng.uniform(-3, 3, (300, 2)), rng.uniform(-3, 3, (300, 1))
