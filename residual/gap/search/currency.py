@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 NOISY = 1.3
 #: Blocks, counted by what is at stake in them, below which one of them decides alone.
 ALONE = 2.0
+#: Part of the error that all blocks but one have to hold to be asked alone, and of that part what
+#: one of them holds in which an effect acts.
+REST, TOUCHED = 0.1, 0.01
 
 
 def groups(channels: Sequence[Channel]) -> tuple[tuple[int, ...], ...]:
@@ -86,7 +89,8 @@ class Currency:
         Args:
             one, other: Mean squared errors of blocks, (B, m).
             group: The joint that is looked at.
-            by_stake: Count blocks by what is at stake in them, so that no single one decides.
+            by_stake: Count blocks by what is at stake in them, so that no single one decides; where
+                one outweighs all others, these are asked without it.
         """
         a, b = (self.by_block(squares)[:, group] for squares in (one, other))
         there = (a > 0) & (b > 0)
@@ -96,9 +100,21 @@ class Currency:
         mean = float(weights @ ratios)
         n = 1 / float((weights**2).sum()) if by_stake else float(there.sum())
         if n < ALONE:
-            return 0.0
+            return self._elsewhere(one, other, group)
         error = float(np.sqrt((weights**2) @ (ratios - mean) ** 2 * n / (n - 1)))
         return mean / max(error, 1e-12)
+
+    def _elsewhere(self, one: Array, other: Array, group: int) -> float:
+        """The same without the block in which most is at stake, all others in which something is
+        counting alike; 0 if there are fewer than three, or if nearly nothing is at stake there."""
+        a, b = (self.by_block(squares)[:, group] for squares in (one, other))
+        rest = np.delete(a, np.argmax(a))
+        there = (a > TOUCHED * rest.sum()) & (a < a.max()) & (b > 0)
+        if there.sum() < 3 or rest.sum() < REST * a.sum():
+            return 0.0
+        ratios = np.log(a[there] / b[there])
+        error = float(ratios.std(ddof=1) / np.sqrt(len(ratios)))
+        return float(ratios.mean()) / max(error, 1e-12)
 
     def share(
         self, less: Array, more: Array, rng: np.random.Generator

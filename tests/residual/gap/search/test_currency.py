@@ -109,3 +109,12 @@ def test_one_block_that_decides_alone_is_no_evidence():
     worse = alike * np.linspace(1.5, 2.5, 8)[:, None]
     plain, by_stake = even.clearly(worse, alike, 0), even.clearly(worse, alike, 0, by_stake=True)
     assert plain == pytest.approx(by_stake, rel=0.1)
+
+
+@pytest.mark.parametrize(("others", "sure"), [(9.0, True), (1.0, False)])
+def test_where_one_block_outweighs_all_others_these_are_asked(others, sure):
+    """A step at the start of a long rest: what explains it has to help in the rest, too."""
+    wobble = np.random.default_rng(0).uniform(0.7, 1.4, 8)[:, None]
+    nominal = np.array([40.0, 3.0, 1.0, 1.0, 2.0, 1.0, 1e-4, 1e-4])[:, None]
+    better = np.append([[1.0]], nominal[1:] / others, axis=0) * wobble
+    assert (Currency(nominal, ((0,),)).clearly(nominal, better, 0, True) > 2.0) is sure
