@@ -65,8 +65,8 @@ def summarise(
             seen = model_errors(errors, estimator, samples, update)
             row |= {
                 "error": float(by_group(seen, "one_step", about).mean(axis=1).mean()),
-                "in 90 %": round(seen["coverage90"].astype(float).mean(), 3),
-                "fit s": round(float(seen["fit_seconds"].mean()), 2),
+                "in 90 %": float(seen["coverage90"].astype(float).mean()),
+                "fit s": float(seen["fit_seconds"].mean()),
             }
         if published:
             row["published"] = published.get(name, "")
