@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from residual.gap.answer.answer import judged_apart, matters, summed_up, told
@@ -50,7 +50,8 @@ def find_gap(
     Args:
         simulator: The nominal simulator.
         trajectories: Measured runs; blocks of them are left out in turn to judge what is found.
-        held: Runs that are used for the final table only.
+        held: Runs that are used for the final table only; where the corrected simulator is worse on
+            them, nothing is certain.
         tolerance: Forecast error that does not matter, in the unit of the first measured
             position; below it the verdict is "nothing that matters".
         effects: Effects that may be missing, as objects or by name (``sims.loading.
@@ -113,8 +114,8 @@ def find_gap(
         clock.lap("confirm")
 
         if conventions is not None:  # it is asked first, so that nothing is certain before
-            doubted = [dataclasses.replace(claim, counted=True) for claim in answer.claims]
-            answer = dataclasses.replace(answer, claims=tuple(doubted))
+            doubted = tuple(replace(claim, counted=True) for claim in answer.claims)
+            answer = replace(answer, claims=doubted)
         table, apart = summed_up(answer), None
         if held:
             others, _ = excerpt(
@@ -123,10 +124,13 @@ def find_gap(
             if on_rest:
                 others = tuple(from_rest(simulator, others))
             apart = judged_apart(answer, known.prepared, others, table)
+            if apart.refutes:
+                doubted = tuple(replace(claim, refuted=True) for claim in answer.claims)
+                answer = replace(answer, claims=doubted)
         clock.lap("forecast")
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
     quality = [*log.findings, *log.left_out, *other, *on_hold, *on_rest, *on_more, *known.says]
     quality += inquiry.untried(answer)
     result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)
-    return dataclasses.replace(result, conventions=conventions, unlike=differ, nearly_late=late)
+    return replace(result, conventions=conventions, unlike=differ, nearly_late=late)

@@ -20,14 +20,17 @@ Kind = Literal[
 ]
 #: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
 #: between folds or with the numerics, lies at its bound, parameters within their tolerance do as
-#: well, or there was no time to ask that, it is a time shorter than half a sample, its interval
-#: holds zero, few blocks of data leave much without a name, or an effect of another kind does as
-#: well.
+#: well, or there was no time to ask that, it is a time shorter than half a sample, records that
+#: were set aside are foretold worse, its interval holds zero, few blocks of data leave much without
+#: a name, or an effect of another kind does as well.
 Doubt = Literal[
     "not_needed", "unsteady", "creeps", "numerics", "at_bound", "calibration", "slight",
-    "no_time", "clock", "gross", "conventions", "may_be_zero", "share_may_be_zero", "few_blocks",
-    "rivals",
+    "no_time", "clock", "gross", "conventions", "set_aside", "may_be_zero", "share_may_be_zero",
+    "few_blocks", "rivals",
 ]  # fmt: skip
+
+#: Forecast error over that of the nominal simulator from which on the corrected one is worse.
+WORSE = 1.05
 
 
 @dataclasses.dataclass(frozen=True)
@@ -178,6 +181,17 @@ class Gap:
         noise makes, and by more whichever blocks of data are drawn."""
         error, noise = self.after if corrected else self.before, self.noise_floor
         return error.value > times * noise.value and error.low > noise.high
+
+    @property
+    def helps(self) -> bool:
+        """Whether the corrected simulator errs less than the nominal one."""
+        return WORSE * self.after.value < self.before.value
+
+    @property
+    def refutes(self) -> bool:
+        """Whether it errs more, and not by chance."""
+        by_chance = self.after.low < self.before.value and self.after.value < self.before.high
+        return self.after.value > WORSE * self.before.value and not by_chance
 
 
 @dataclasses.dataclass(frozen=True)

@@ -23,9 +23,8 @@ FEW_RIVALS = 2
 #: Part of the gap that calibrated parameters take off alone, below which, or below that of what is
 #: not certain, they only serve the rest.
 TRIFLE = 0.05
-#: Error on records set aside, over that of the nominal simulator, from which on it is worse.
-WORSE = 1.05
-#: The same over that of the nominal one, for a channel that is not the main one.
+#: Error on records set aside, over that of the nominal simulator, from which on a channel is worse
+#: that is not the main one.
 MUCH_WORSE = 1.1
 #: Difference between channels' shares from which on they are told one by one, so many at most.
 UNLIKE, FEW_CHANNELS = 0.2, 3
@@ -122,11 +121,10 @@ def _but_worse_apart(result: GapResult) -> str:
     apart = result.held_out
     if apart is None:
         return ""
-    if WORSE * apart.after.value < apart.before.value:
+    if apart.helps:
         return _but_worse_elsewhere(result, apart)
     before, after = (quantity_text(s.value, apart.unit) for s in (apart.before, apart.after))
-    by_chance = apart.after.low < apart.before.value and apart.after.value < apart.before.high
-    if by_chance or apart.after.value <= WORSE * apart.before.value:
+    if not apart.refutes:
         return (
             f" But it does not help on the records set aside, where the {ahead(apart)} is {after} "
             f"with it and {before} without."

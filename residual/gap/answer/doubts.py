@@ -13,6 +13,7 @@ DOUBTS: dict[Doubt, str] = {
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
     "conventions": "it has to be seen first whether the log counts as the simulator does",
+    "set_aside": "the corrected simulator is worse on the records that were set aside",
     "gross": "a sensor is seldom wrong by a fifth of all that it showed, and something that the "
     "library lacks may look so",
     "no_time": "there was no time to ask whether parameters that are a few percent off would do as "
@@ -48,6 +49,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "clock": claim.brief,
         "gross": claim.gross,
         "conventions": claim.counted,
+        "set_aside": claim.refuted,
         "may_be_zero": vanishes,
         "share_may_be_zero": not claim.gains,
         "few_blocks": thin,

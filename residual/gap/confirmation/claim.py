@@ -42,6 +42,7 @@ class Claim:
         unasked: Whether there was no time to ask that.
         brief: Whether it is a time too short for the log's own clock.
         counted: Whether the log may count otherwise than the simulator does.
+        refuted: Whether the corrected simulator forecasts records that were set aside worse.
         gross: Whether it is a sensor further off than sensors are, beside a remainder.
         by_fit: Whether a fit to all data leaves three times as much without it: forecasts of single
             blocks may go astray all the same, where motion hangs on a hair.
@@ -67,6 +68,7 @@ class Claim:
     brief: bool = False
     gross: bool = False
     counted: bool = False
+    refuted: bool = False
     by_fit: bool = False
     there: bool = False
     creeps: bool = False
@@ -92,6 +94,7 @@ class Claim:
             self.brief,
             self.gross,
             self.counted,
+            self.refuted,
             self.rivals,
             self.alike,
             self.unasked,

@@ -134,6 +134,16 @@ def test_records_set_aside_only_judge():
     assert judged.held_out.after.value < 0.6 * judged.held_out.before.value
 
 
+def test_nothing_is_certain_that_records_set_aside_speak_against():
+    """They are of a lighter rotor, not of a heavier one."""
+    logs = make_logs(Truth(inertia=0.3), 11, "strong", "A", 4)
+    others = make_logs(Truth(inertia=-0.3), 12, "strong", "A", 2)
+    found = find_gap(PendulumEquation(), logs, held=others, effects=few(), hold="zero")
+    first = found.verdicts[0]
+    assert (first.kind, first.effect) == ("ambiguous", "inertia")
+    assert first.doubts == ("set_aside",)
+
+
 def test_a_single_record_with_uneven_sampling():
     simulator = PendulumEquation(mass=0.07)
     rng = np.random.default_rng(5)
