@@ -45,6 +45,7 @@ class Unlike:
         field, unit: The number, and its unit.
         sizes: By record, of those with data enough.
         share: Part of the nominal simulator's cross-validated squared error that has a name then.
+        instead: Whether that is so in place of what was named, not beside it.
     """
 
     effect: str
@@ -53,6 +54,7 @@ class Unlike:
     unit: str
     sizes: Mapping[str, float]
     share: float
+    instead: bool = False
 
     @property
     def label(self) -> str:

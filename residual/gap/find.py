@@ -111,6 +111,9 @@ def find_gap(
         answer = known.answer
         tell("do the records differ?")
         differ = unlike(answer) if asked and not clock.late else ()
+        if any(one.instead for one in differ):
+            doubted = tuple(replace(claim, unlike=True) for claim in answer.claims)
+            answer = replace(answer, claims=doubted)
         clock.lap("confirm")
 
         if conventions is not None:  # it is asked first, so that nothing is certain before

@@ -20,9 +20,10 @@ def beside_lead(result: GapResult) -> str:
         return ""
     first = result.unlike[0]
     name, share = effect_name(first.label), percent(first.share)
+    instead = ", and nothing else is added" if first.instead else ""
     return (
-        f" The records differ: if {name} may have its own size in each of them, {share} of the gap "
-        "has a name."
+        f" The records differ: if {name} may have its own size in each of them{instead}, {share} "
+        "of the gap has a name."
     )
 
 

@@ -54,10 +54,18 @@ def unlike(answer: Answer) -> tuple[Unlike, ...]:
     if len(names) < 2 or fitter.left(search.tried[key], answer.found.floor).adequate:
         return ()
     noise = noise_floor(fitter, search.tried[key], answer.found.floor.sigma)
-    asked = _worth(search, key, group)
-    found = [_asked(search, key, number, names, group, noise) for number in asked]
+    found = [
+        _asked(search, key, base, number, names, group, noise)
+        # One size for all may have led to effects that only make the best of it.
+        for base in dict.fromkeys([key, ()])
+        for number in _worth(search, base, group)
+    ]
     helping = sorted((pair for pair in found if pair), key=lambda pair: pair[0])
-    return tuple(one for error, one in helping if error <= NEARLY * helping[0][0])[:TOLD]
+    told: dict[str, Unlike] = {}
+    for error, one in helping:
+        if error <= NEARLY * helping[0][0]:
+            told.setdefault(one.label, one)
+    return tuple(told.values())[:TOLD]
 
 
 def _records(fitter: SmoothFitter) -> tuple[tuple[str, ...], Integers]:
@@ -100,6 +108,7 @@ def _by_group(columns: Array, group: Integers) -> Array:
 def _asked(
     search: Search,
     key: Key,
+    base: Key,
     number: int,
     names: tuple[str, ...],
     group: Integers,
@@ -107,17 +116,18 @@ def _asked(
 ) -> tuple[float, Unlike] | None:
     """The error of forecasts with a size of its own in each record, and these sizes.
 
-    None if that is not clearly better than one size for all, and than nothing.
+    None if that is not clearly better than one size for all, and than what was found.
 
     Args:
-        search: With the fitted set ``key``.
+        search: With the fitted sets ``key`` and ``base``.
         key: What was found.
+        base: What the effect is asked beside.
         number: The effect that is asked about.
         names: Records with data enough, and ``group``, the record of every window, (W,).
         noise: Mean squared errors of blocks by noise alone, (B, m).
     """
     fitter, candidate = search.fitter, search.candidates[number]
-    fit = search.tried[key] if number in key else _with(search, key, number)
+    fit = search.tried[base] if number in base else _with(search, base, number)
     (own,) = np.flatnonzero([c is candidate for c in fit.model.chosen])
     places = np.flatnonzero(fit.model.owner == own)
     if len(places) != 1:  # of several numbers a record tells too little
@@ -129,7 +139,7 @@ def _asked(
     which = blocks.fold_of_window * (group.max() + 1) + group
     apart = by_block(fitter.foretell(fit.model, thetas, which, fit).squares, blocks)
     others = [search.validated[key].squares]
-    if number not in key:
+    if number not in base:
         others.append(validate(fitter, fit).squares)
     currency = search.currency
     error, least = currency.error(apart), currency.error(noise) ** 2
@@ -142,7 +152,9 @@ def _asked(
     by_record = dict(zip(names, map(float, sizes), strict=True))
     taken, *_ = currency.share(search.before.squares, apart, np.random.default_rng(0))
     knob, effect = candidate.knobs[0], candidate.effect
-    return error, Unlike(effect.name, effect.where, knob.field, knob.unit, by_record, taken)
+    return error, Unlike(
+        effect.name, effect.where, knob.field, knob.unit, by_record, taken, instead=base != key
+    )
 
 
 def _with(search: Search, key: Key, number: int) -> Fit:

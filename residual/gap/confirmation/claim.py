@@ -42,6 +42,7 @@ class Claim:
         unasked: Whether there was no time to ask that.
         brief: Whether it is a time too short for the log's own clock.
         counted: Whether the log may count otherwise than the simulator does.
+        unlike: Whether one effect, in a size of its own in each record, does better than all named.
         refuted: Whether the corrected simulator forecasts records that were set aside worse.
         gross: Whether it is a sensor further off than sensors are, beside a remainder.
         by_fit: Whether a fit to all data leaves three times as much without it: forecasts of single
@@ -68,6 +69,7 @@ class Claim:
     brief: bool = False
     gross: bool = False
     counted: bool = False
+    unlike: bool = False
     refuted: bool = False
     by_fit: bool = False
     there: bool = False
@@ -94,6 +96,7 @@ class Claim:
             self.brief,
             self.gross,
             self.counted,
+            self.unlike,
             self.refuted,
             self.rivals,
             self.alike,

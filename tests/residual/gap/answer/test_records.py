@@ -4,6 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from lift import LOADS, TRIPS, Lift
+from lift import OFFERED as OFFERED_LIFT
 
 from residual.gap import find_gap
 from sims.pendulum_equation import PendulumEquation
@@ -65,6 +67,18 @@ def test_what_is_the_same_in_all_records_is_named_beside_what_differs():
 def test_records_that_agree_are_not_said_to_differ(truth):
     """Also where something has no name: a wind that no library holds."""
     assert ask(logs(*[truth] * 4)).unlike == ()
+
+
+def test_loads_of_a_lift_are_told_in_place_of_what_makes_the_best_of_them():
+    """One size for all leads to a dead zone and another counterweight."""
+    found = find_gap(Lift(), TRIPS, effects=OFFERED_LIFT, horizon=1.5)
+    first = found.unlike[0]
+    assert first.label == "cabin" and first.instead
+    sizes = [first.sizes[run.name] for run in TRIPS]
+    assert np.allclose(sizes, LOADS, atol=50.0)
+    assert not [v.effect for v in found.verdicts if v.kind == "confirmed"]
+    assert "records" in found.verdicts[0].doubts
+    assert "and nothing else is added, 99.1 % of the gap has a name" in lead(found)
 
 
 def test_nothing_is_said_of_a_single_record():
