@@ -53,16 +53,11 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
         Its position among the model's effects, their number if it is none of them, and why.
     """
     host, given = model.bind(theta), model.simulator.with_effects(())
-    for number, effect in enumerate(host.effects[len(model.simulator.effects) :]):
-        if not isinstance(effect, ParameterChange):
-            continue
-        nominal = float(np.mean(host.parameters[effect.parameter].value))
-        if nominal == 0:
-            continue
-        ratio = (nominal + float(effect.change)) / nominal
-        small = ratio > FACTOR and _minor(given, effect.parameter, ratio)
+    for number, ratio in _ratios(host, model).items():
+        name = host.effects[len(model.simulator.effects) + number].where
+        small = ratio > FACTOR and _minor(given, name, ratio)
         if not 1 / FACTOR <= ratio <= FACTOR and not small:
-            return number, f"{effect.parameter} would be {ratio:.3g} times its nominal value"
+            return number, f"{name} would be {ratio:.3g} times its nominal value"
     once = _shows_once(host, samples, len(model.simulator.effects))
     if once is not None:
         return once, "the input reaches where it acts only once, so that nothing confirms it"
@@ -76,6 +71,17 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
             number = acting.index(True) if any(acting) else len(acting)
             return number, f"{channel.name} would have {left / usual:.2g} of its strength"
     return len(model.chosen), ""
+
+
+def _ratios(host: HostSimulator, model: Model) -> dict[int, float]:
+    """Parameters over their nominal values, by position of their change among a model's effects."""
+    found = {}
+    for number, effect in enumerate(host.effects[len(model.simulator.effects) :]):
+        if isinstance(effect, ParameterChange):
+            nominal = float(np.mean(host.parameters[effect.parameter].value))
+            if nominal:
+                found[number] = (nominal + float(effect.change)) / nominal
+    return found
 
 
 def nearly(fit: Fit, number: int, fitter: Fitter) -> bool:
@@ -97,7 +103,8 @@ def nearly(fit: Fit, number: int, fitter: Fitter) -> bool:
 def told_by_data(fit: Fit, nominal: Fit, fitter: Fitter, noise: Array | None) -> bool:
     """Whether numbers out of all proportion explain what moved, of a gap far above the noise.
 
-    What only switches the motion off does not: the motion is left.
+    What only switches the motion off does not: the motion is left. A parameter of the other sign is
+    another law.
 
     Args:
         fit: With such numbers.
@@ -106,6 +113,8 @@ def told_by_data(fit: Fit, nominal: Fit, fitter: Fitter, noise: Array | None) ->
         noise: Of every measured channel, (m,); None if it is not known.
     """
     if noise is None or not isinstance(fitter, SmoothFitter):
+        return False
+    if min(_ratios(fit.model.bind(fit.theta), fit.model).values(), default=1.0) < 0:
         return False
     far, left = (fitter.over_noise(one, noise) for one in (nominal, fit))
     little = np.maximum(CLOSE, UNMOVED * _motion(fitter) / noise)
