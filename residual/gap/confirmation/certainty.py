@@ -220,7 +220,11 @@ def needed(search: Search, key: Key, number: int, adequate: bool) -> bool:
     if adequate:
         return score(search, rest) - score(search, key) > tie(search, key, rest) and lost > 0
     gone = 1 - 1 / max(_ratio(search, without, own, group), 1e-12)
-    return gone > 0.5 * AT_ONE and search.currency.clearly(without, own, group, True) > WORSE
+    if gone <= 0.5 * AT_ONE:
+        return False
+    clearly = search.currency.clearly(without, own, group, True)
+    # Where one block outweighs all others, these have to say so without it.
+    return (clearly or search.currency.clearly_elsewhere(without, own, group)) > WORSE
 
 
 def by_fit(search: Search, key: Key, number: int) -> bool:

@@ -89,8 +89,7 @@ class Currency:
         Args:
             one, other: Mean squared errors of blocks, (B, m).
             group: The joint that is looked at.
-            by_stake: Count blocks by what is at stake in them, so that no single one decides; where
-                one outweighs all others, these are asked without it.
+            by_stake: Count blocks by what is at stake in them, so that no single one decides.
         """
         a, b = (self.by_block(squares)[:, group] for squares in (one, other))
         there = (a > 0) & (b > 0)
@@ -100,13 +99,17 @@ class Currency:
         mean = float(weights @ ratios)
         n = 1 / float((weights**2).sum()) if by_stake else float(there.sum())
         if n < ALONE:
-            return self._elsewhere(one, other, group)
+            return 0.0
         error = float(np.sqrt((weights**2) @ (ratios - mean) ** 2 * n / (n - 1)))
         return mean / max(error, 1e-12)
 
-    def _elsewhere(self, one: Array, other: Array, group: int) -> float:
+    def clearly_elsewhere(self, one: Array, other: Array, group: int) -> float:
         """The same without the block in which most is at stake, all others in which something is
-        counting alike; 0 if there are fewer than three, or if nearly nothing is at stake there."""
+        counting alike.
+
+        Returns:
+            Standard errors; 0 if there are fewer than three, or nearly nothing is at stake there.
+        """
         a, b = (self.by_block(squares)[:, group] for squares in (one, other))
         rest = np.delete(a, np.argmax(a))
         there = (a > TOUCHED * rest.sum()) & (a < a.max()) & (b > 0)

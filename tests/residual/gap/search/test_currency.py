@@ -117,4 +117,6 @@ def test_where_one_block_outweighs_all_others_these_are_asked(others, sure):
     wobble = np.random.default_rng(0).uniform(0.7, 1.4, 8)[:, None]
     nominal = np.array([40.0, 3.0, 1.0, 1.0, 2.0, 1.0, 1e-4, 1e-4])[:, None]
     better = np.append([[1.0]], nominal[1:] / others, axis=0) * wobble
-    assert (Currency(nominal, ((0,),)).clearly(nominal, better, 0, True) > 2.0) is sure
+    one = Currency(nominal, ((0,),))
+    assert one.clearly(nominal, better, 0, True) == 0.0
+    assert (one.clearly_elsewhere(nominal, better, 0) > 2.0) is sure
