@@ -23,6 +23,8 @@ FEW_RIVALS = 2
 #: Part of the gap that calibrated parameters take off alone, below which, or below that of what is
 #: not certain, they only serve the rest.
 TRIFLE = 0.05
+#: Share of what is certain, over the largest of what is not, below which it is told last.
+LITTLE = 0.1
 #: Error on records set aside, over that of the nominal simulator, from which on a channel is worse
 #: that is not the main one.
 MUCH_WORSE = 1.1
@@ -155,7 +157,7 @@ def _but_worse_elsewhere(result: GapResult, apart: Gap) -> str:
 
 
 def _what(result: GapResult) -> str:
-    """What the gap is made of, certain names first."""
+    """What the gap is made of, certain names first unless they are next to nothing of it."""
     certain = [v for v in result.verdicts if v.kind == "confirmed"]
     others = [v for v in result.verdicts if v.kind == "ambiguous"]
     moved = [verdict for verdict in result.verdicts if verdict.kind == "calibrated"]
@@ -173,6 +175,10 @@ def _what(result: GapResult) -> str:
         doubtful = _with_rivals(others[0], result)
     else:
         doubtful = "perhaps " + listed(by_place([_briefly(v, result) for v in others]))
+    if certain and sum(v.share.value for v in certain) < LITTLE * max(
+        v.share.value for v in others
+    ):
+        return f"{doubtful}{beside}, and {sure}, which {'are' if len(words) > 1 else 'is'} certain"
     return (f"{sure} and {doubtful}" if sure else doubtful) + beside
 
 

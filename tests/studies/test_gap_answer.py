@@ -221,6 +221,13 @@ def test_the_first_sentence_is_the_share_that_has_a_name(verdicts, first):
     assert summary(result(*verdicts)).startswith(first)
 
 
+def test_what_is_certain_and_next_to_nothing_is_told_last():
+    mass = dataclasses.replace(MASS, kind="ambiguous", alternatives=(), same_motion=())
+    late = dataclasses.replace(DELAY, kind="confirmed", alternatives=(), doubts=())
+    found = result(late, mass)
+    assert lead(found) == "98 % of the gap is perhaps mass, and delay at voltage, which is certain."
+
+
 def test_no_gap_and_nothing_that_matters_are_different_answers():
     nothing = result(NO_GAP, effects=[])
     assert lead(nothing).startswith("No gap above the noise: ")
