@@ -107,8 +107,6 @@ class HostSimulator(Simulator):
         """What those files cannot hold, or hold a little differently, one line each."""
         return ()
 
-    # -- what it is made of ---------------------------------------------------------------
-
     @property
     def physical_channels(self) -> tuple[Channel, ...]:
         """State channels without the memory of effects."""
@@ -197,13 +195,8 @@ class HostSimulator(Simulator):
 
     def actuator_effects(self, actuator: str) -> list[ActuatorEffect]:
         """The effects on one input, alone or with others, that are not at zero strength."""
-        return [
-            e
-            for e in self.effects
-            if isinstance(e, ActuatorEffect) and actuator in e.actuators and not e.absent
-        ]
-
-    # -- one control period ---------------------------------------------------------------
+        there = (e for e in self.effects if isinstance(e, ActuatorEffect) and not e.absent)
+        return [effect for effect in there if actuator in effect.actuators]
 
     def step(self, states: ArrayLike, actions: ArrayLike) -> Array:
         """Advance every row by one control period; see ``Simulator.step``."""

@@ -11,7 +11,6 @@ from residual import Linear, NamedEffects
 from sims import Channel, FirstOrderSystem, Parameter
 from sims.effects import ActuatorLag
 from sims.environment import SimulatorEnv
-from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.system import EvaluationProtocol, System
 from sims.tasks import SwingUp, Task
@@ -290,26 +289,3 @@ def test_a_budget_that_teaches_nothing_is_refused():
             SYSTEM.nominal, SYSTEM.true, SYSTEM.task,
             budget=Budget(40, 1, 120, 40), ddpg=DDPG, progress=Silent(),
         )  # fmt: skip
-
-
-def true_return(seed, budget, **options):
-    found = learn_by_difference(
-        Pendulum(), Pendulum.true(), SwingUp(), estimator=Linear(), budget=budget, seed=seed,
-        progress=Silent(), **options,
-    )  # fmt: skip
-    before, after = found.policies
-    assert (before["name"], after["name"]) == ("idealised", "difference")
-    return before["return_true"], after["return_true"]
-
-
-def test_one_update_beats_the_idealised_policy():
-    quick = EvaluationProtocol(every=1000, noisy=1)
-    small = DDPGConfig(hidden=(64, 48), actor_lr=3e-4)
-    before, after = true_return(0, Budget(400, 1, 10_000, 4000), ddpg=small, evaluation=quick)
-    assert after > before
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_one_update_with_400_samples_swings_the_true_pendulum_up(seed):
-    assert true_return(seed, Budget(400, 1))[1] > -700

@@ -1,74 +1,27 @@
 """The sentences of find_gap: by kind, share and fields, never by other sentences."""
 
 import dataclasses
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
+from told import DELAY, FRICTION, MASS, MINOR, rest, result
 
 from residual.gap.answer.table import BESIDE
-from residual.gap.beside import Conventions
 from residual.gap.result import (
     ChannelGap,
-    Gap,
-    GapResult,
     Meant,
     Number,
     Span,
     Step,
     Verdict,
-    Where,
 )  # fmt: skip
 from sims import Channel
-from sims.effects import CoulombFriction, ParameterChange
-from sims.pendulum_equation import PendulumEquation
+from sims.effects import ParameterChange
 from studies.gap.answer import headline, notes
 from studies.gap.lead import lead
 from studies.gap.summary import summary
 from studies.gap.verdicts import banners
 from studies.reporting.sections import Prose
 from studies.reporting.sections import Verdict as Banner
-
-MASS = Verdict(
-    "confirmed", "mass", "mass", {"change": Number(0.035, 0.034, 0.036, "kg")},
-    ("length", "gravity"), "", "never parsed", Span(0.95, 0.9, 0.97),
-    same_motion=("length", "gravity"),
-)  # fmt: skip
-FRICTION = Verdict(
-    "confirmed", "coulomb_friction", "pivot", {"level": Number(2e-3, 1e-3, 3e-3, "N m")},
-    ("viscous_friction@pivot",), "dissipation", "never parsed", Span(0.03, 0.02, 0.04),
-    form=("viscous_friction@pivot",),
-)  # fmt: skip
-DELAY = Verdict(
-    "ambiguous", "delay", "voltage", {"time": Number(0.75, 0.75, 0.75, "s", True)},
-    ("actuator_lag@voltage",), "", "never parsed", Span(0.01, 0.0, 0.02), True,
-    doubts=("at_bound", "rivals"),
-)  # fmt: skip
-
-
-def rest(share):
-    return Verdict("unexplained", "", "", {}, (), "", "never parsed", Span(share, share, share))
-
-
-NO_GAP = Verdict("no_gap", "", "", {}, (), "", "never parsed", Span(0.0, 0.0, 0.0))
-MINOR = Verdict("minor", "cogging", "pivot", {}, (), "", "never parsed", Span(0.004, 0.001, 0.007))
-
-
-def result(*verdicts, share=0.98, effects=None, blocks=20):
-    """What find_gap would have returned with these verdicts."""
-    errors = [Span(x, 0.9 * x, 1.1 * x) for x in (1.0, 0.1, 0.09)]
-    table = Gap(
-        "angle", "rad", 1.0, *errors, (Step("", errors[0]), Step("mass", errors[1])),
-        {"angle": ChannelGap("rad", *errors)}, 80.0, 1.05, Span(share, share, share), blocks, 5,
-    )  # fmt: skip
-    there = [ParameterChange("mass", 0.035), CoulombFriction("pivot", 2e-3)]
-    effects = there if effects is None else effects
-    where = Where({"angle": 80.0}, (), np.zeros(0), {}, {})
-    return GapResult(
-        verdicts, table, None, where, (), (), tuple(effects),
-        PendulumEquation().with_effects(effects), (("angle", "rad"),), {"angle": (0.01, 0.001)},
-        (), (), True, {},
-    )  # fmt: skip
 
 
 def test_a_gain_is_told_as_a_share_more_and_as_times():
@@ -79,111 +32,6 @@ def test_a_gain_is_told_as_a_share_more_and_as_times():
     assert headline(gain, result(gain)).endswith(
         "gain 0.62 (0.50 to 0.70), so 1.62 times the command."
     )
-
-
-def test_what_the_log_may_count_otherwise_comes_first():
-    found = dataclasses.replace(
-        result(MASS),
-        conventions=Conventions(("`scale: -1` for voltage", "`unit: mV` for voltage"), 19.0),
-    )
-    first, rest = lead(found).split(" If that is not it: ")
-    assert "with `scale: -1` for voltage or `unit: mV` for voltage in the column map" in first
-    assert first.endswith("errs 19 times less.")
-    assert rest == lead(result(MASS))
-
-
-@pytest.mark.parametrize(
-    ("after", "spread", "worse", "helps"),
-    # The last is worse by no more than which records were set aside.
-    [(0.9, 1.1, False, True), (0.99, 1.1, False, False), (1.2, 1.1, True, False),
-     (1.2, 2.0, False, False)],
-)  # fmt: skip
-def test_the_first_sentence_says_where_the_corrected_simulator_is_no_better(
-    after, spread, worse, helps
-):
-    found = result(MASS)
-    before = Span(1.0, 1 / spread, spread)
-    apart = dataclasses.replace(
-        found.gap, before=before, after=Span(after, after / spread, after * spread)
-    )
-    says = lead(dataclasses.replace(found, held_out=apart))
-    assert says.startswith("98 % of the gap is mass.")
-    assert (
-        "does not hold on the records set aside, where the corrected simulator is worse: the 1 s "
-        "error of angle is 1.2 rad, the nominal one's 1 rad." in says
-    ) is worse
-    assert (
-        f"does not help on the records set aside, where the 1 s error of angle is {after} rad with "
-        "it and 1 rad without." in says
-    ) is not (helps or worse)
-    assert ("records set aside" in says) is not helps
-
-
-def boats(*errors):
-    """A result about several quantities, each with these errors before and after."""
-
-    names = "abcdefg"[: len(errors)]
-    corrected = SimpleNamespace(
-        physical_channels=[Channel(name, "m/s", "rate") for name in names], joints=(), parameters={}
-    )
-    table = {
-        name: ChannelGap("m/s", Span(before, 0, 9), Span(after, 0, 9), Span(0.1, 0, 9))
-        for name, (before, after) in zip(names, errors, strict=True)
-    }
-    found = result(MASS, share=0.46)
-    gap = dataclasses.replace(found.gap, channel="a", by_channel=table)
-    return dataclasses.replace(found, gap=gap, corrected=corrected)
-
-
-@pytest.mark.parametrize(
-    ("errors", "told"),
-    [
-        ([(1.0, 0.3), (1.0, 1.1)], " (a 91 %, b 0 %)."),
-        # Alike; one without a gap to take anything off; many.
-        ([(1.0, 0.3), (1.0, 0.4)], "."),
-        ([(1.0, 0.3), (0.12, 0.12)], "."),
-        ([(1.0, 0.5), (1.0, 0.1), (1.0, 0.9), (1.0, 0.5)], " (between c 19 % and b 99 %)."),
-    ],
-)
-def test_the_first_sentence_tells_channels_apart_where_they_differ(errors, told):
-    assert lead(boats(*errors)) == f"46 % of the gap is mass{told}"
-
-
-@pytest.mark.parametrize(
-    ("errors", "says"),
-    [
-        ([(1.0, 0.3), (1.0, 1.3)], " But on the records set aside it makes b worse: 1.3 m/s with"
-         " it, 1 m/s without."),
-        # Within the spread between records; of noise alone; the main one, which is told otherwise.
-        ([(1.0, 0.3), (1.0, 1.05)], ""),
-        ([(1.0, 0.3), (0.1, 0.14)], ""),
-        ([(1.0, 0.3), (1.0, 1.2), (1.0, 1.4)], " But on the records set aside it makes c worse: "
-         "1.4 m/s with it, 1 m/s without."),
-        ([(1.0, 1.3), (1.0, 1.4)], None),
-    ],
-)  # fmt: skip
-def test_the_first_sentence_names_another_channel_that_records_set_aside_show_worse(errors, says):
-    used, apart = boats((1.0, 0.3), (1.0, 0.3), (1.0, 0.3)), boats(*errors).gap
-    before, after = (Span(x, 0.9 * x, 1.1 * x) for x in errors[0])
-    apart = dataclasses.replace(apart, before=before, after=after)
-    told = lead(dataclasses.replace(used, held_out=apart))
-    if says is None:
-        assert "does not hold on the records set aside" in told and "it makes" not in told
-    else:
-        assert told == f"46 % of the gap is mass.{says}"
-
-
-@pytest.mark.parametrize(("error", "said"), [(1.2, False), (2.0, True)])
-def test_the_first_sentence_says_where_only_records_set_aside_have_a_gap(error, said):
-    found = result(NO_GAP, effects=[])
-    noise = Span(1.0, 0.9, 1.1)
-    before = Span(error, 0.9 * error, 1.1 * error)
-    apart = dataclasses.replace(found.gap, before=before, noise_floor=noise)
-    says = lead(dataclasses.replace(found, held_out=apart))
-    assert says.startswith("No gap above the noise: ")
-    assert (
-        "But the records set aside have one: there the 1 s error of angle is 2 rad" in says
-    ) is said
 
 
 def test_other_channels_have_their_errors_below_the_table():
@@ -197,54 +45,6 @@ def test_other_channels_have_their_errors_below_the_table():
     says = summary(dataclasses.replace(found, gap=dataclasses.replace(alone, no_better=3)))
     assert "  rate: nominal 5, corrected 2, noise floor 1 rad/s\n" in says
     assert "the corrected simulator forecasts volts no better" in " ".join(says.split())
-
-
-@pytest.mark.parametrize(
-    ("verdicts", "first"),
-    [
-        ([MASS], "98 % of the gap is mass."),
-        ([MASS, FRICTION], "98 % of the gap is mass and dissipation."),
-        (
-            [MASS, dataclasses.replace(FRICTION, family="", form=())],
-            "98 % of the gap is mass and Coulomb friction.",
-        ),
-        ([DELAY], "98 % of the gap is delay at voltage or actuator lag at voltage."),
-        (
-            [MASS, dataclasses.replace(DELAY, alternatives=(), doubts=("unsteady",))],
-            "98 % of the gap is mass and perhaps delay at voltage.",
-        ),
-        ([rest(1.0)], "The gap has no name: the 1 s error of angle is 1 rad."),
-    ],
-)
-def test_the_first_sentence_is_the_share_that_has_a_name(verdicts, first):
-    assert lead(result(*verdicts)) == first
-    assert summary(result(*verdicts)).startswith(first)
-
-
-def test_what_is_certain_and_next_to_nothing_is_told_last():
-    mass = dataclasses.replace(MASS, kind="ambiguous", alternatives=(), same_motion=())
-    late = dataclasses.replace(DELAY, kind="confirmed", alternatives=(), doubts=())
-    found = result(late, mass)
-    assert lead(found) == "98 % of the gap is perhaps mass, and delay at voltage, which is certain."
-
-
-def test_no_gap_and_nothing_that_matters_are_different_answers():
-    nothing = result(NO_GAP, effects=[])
-    assert lead(nothing).startswith("No gap above the noise: ")
-    assert lead(nothing, tolerance=2.0).startswith("Nothing that matters: ")
-    assert lead(result(MASS), tolerance=0.5) == lead(result(MASS))
-
-
-def test_too_few_data_that_err_as_by_noise_may_hold_a_gap_or_none():
-    found = result(rest(1.0), effects=[], blocks=2)
-    table = dataclasses.replace(found.gap, noise_floor=Span(0.9, 0.8, 1.2))
-    few = dataclasses.replace(found, gap=table)
-    assert lead(few).startswith("Too few data to tell whether there is a gap: ")
-    assert headline(few.verdicts[0], few) == "These data cannot tell whether there is a gap."
-    assert "4 are needed" in summary(few)
-    assert lead(found).startswith("The gap has no name: ")
-    enough = dataclasses.replace(few, gap=dataclasses.replace(table, blocks=20))
-    assert lead(enough).startswith("The gap has no name: ")
 
 
 def test_a_number_at_its_bound_pretends_no_interval_and_says_why_it_is_not_certain():
