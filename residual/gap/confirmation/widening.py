@@ -87,8 +87,8 @@ def _beside_rivals(search: Search, key: Key, claim: Claim, claims: Sequence[Clai
             n = numbers[knob.field]
             numbers[knob.field] = dataclasses.replace(
                 n,
-                low=max(min(n.low, value - reach), knob.low),
-                high=min(max(n.high, value + reach), knob.high),
+                low=min(n.low, max(value - reach, knob.low)),
+                high=max(n.high, min(value + reach, knob.high)),
             )
     return dataclasses.replace(claim, numbers=numbers)
 

@@ -11,10 +11,11 @@ from residual.gap.confirmation.claim import Claim
 from residual.gap.result import Number
 
 
-def told(monkeypatch, merit, error):
-    """The interval of one effect, 2 (1.9 to 2.1), that would be 1 beside a second one."""
+def told(monkeypatch, merit, error, most=10.0):
+    """The interval of one effect, 2 (1.9 to 2.1), that would be 1 beside a second one, where it is
+    bounded otherwise."""
     search = Toy({(): 1.0, (0,): 0.1, (0, 1): error}, merits={(0,): 100.0, (0, 1): merit})
-    knob = SimpleNamespace(field="change", low=-10.0, high=10.0)
+    knob = SimpleNamespace(field="change", low=-10.0, high=most)
     for key, values in (((0,), [2.0]), ((0, 1), [1.0, 5.0])):
         fit = search.tried[key]
         fit.theta = np.array(values)
@@ -34,3 +35,9 @@ def test_an_interval_holds_in_a_larger_set_that_leaves_half_of_the_loss(monkeypa
 @pytest.mark.parametrize(("merit", "error"), [(80.0, 0.12), (40.0, 0.2)])
 def test_not_in_one_that_fits_hardly_better_or_forecasts_clearly_worse(monkeypatch, merit, error):
     assert told(monkeypatch, merit, error) == (1.9, 2.1)
+
+
+def test_bounds_of_the_larger_set_take_nothing_off(monkeypatch):
+    """Beside a gain a saturation may lie beyond all commands."""
+    low, high = told(monkeypatch, merit=40.0, error=0.12, most=1.5)
+    assert low == pytest.approx(1.0 - 1.96 * 0.05) and high == 2.1
