@@ -20,14 +20,14 @@ Kind = Literal[
 ]
 #: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
 #: between folds or with the numerics, lies at its bound, parameters within their tolerance do as
-#: well, or there was no time to ask that, it is a time shorter than half a sample, one effect that
-#: differs between records does better, records that were set aside are foretold worse, its interval
-#: holds zero, few blocks of data leave much without a name, or an effect of another kind does as
-#: well.
+#: well, or there was no time to ask that, it is a time shorter than half a sample, a number is out
+#: of all proportion, one effect that differs between records does better, records that were set
+#: aside are foretold worse, its interval holds zero, few blocks of data leave much without a name,
+#: or an effect of another kind does as well.
 Doubt = Literal[
     "not_needed", "unsteady", "creeps", "numerics", "at_bound", "calibration", "slight",
-    "no_time", "clock", "gross", "conventions", "records", "set_aside", "may_be_zero",
-    "share_may_be_zero", "few_blocks", "rivals",
+    "no_time", "clock", "gross", "conventions", "extreme", "records", "set_aside",
+    "may_be_zero", "share_may_be_zero", "few_blocks", "rivals",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.
 WORSE = 1.05

@@ -13,6 +13,8 @@ DOUBTS: dict[Doubt, str] = {
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
     "conventions": "it has to be seen first whether the log counts as the simulator does",
+    "extreme": "a parameter or an input would be more than ten times off, so see first whether the "
+    "simulator has it right",
     "records": "one effect with its own size in each record does better than all that is named",
     "set_aside": "the corrected simulator is worse on the records that were set aside",
     "gross": "a sensor is seldom wrong by a fifth of all that it showed, and something that the "
@@ -50,6 +52,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "clock": claim.brief,
         "gross": claim.gross,
         "conventions": claim.counted,
+        "extreme": claim.extreme,
         "records": claim.unlike,
         "set_aside": claim.refuted,
         "may_be_zero": vanishes,

@@ -88,6 +88,7 @@ def claims(
                 gross=not adequate and not twins and gross_fault(search, key, place),
                 by_fit=by_fit(search, key, number),
                 creeps=creeps(search, key, number),
+                extreme=key in search.extreme,
             )
         )
     return sorted(found, key=lambda claim: -claim.share[0])

@@ -42,6 +42,7 @@ class Claim:
         unasked: Whether there was no time to ask that.
         brief: Whether it is a time too short for the log's own clock.
         counted: Whether the log may count otherwise than the simulator does.
+        extreme: Whether a number of its set is out of all proportion to the simulator's.
         unlike: Whether one effect, in a size of its own in each record, does better than all named.
         refuted: Whether the corrected simulator forecasts records that were set aside worse.
         gross: Whether it is a sensor further off than sensors are, beside a remainder.
@@ -69,6 +70,7 @@ class Claim:
     brief: bool = False
     gross: bool = False
     counted: bool = False
+    extreme: bool = False
     unlike: bool = False
     refuted: bool = False
     by_fit: bool = False
@@ -96,6 +98,7 @@ class Claim:
             self.brief,
             self.gross,
             self.counted,
+            self.extreme,
             self.unlike,
             self.refuted,
             self.rivals,

@@ -51,7 +51,8 @@ class Search:
         nominal: The simulator as it was given; ``before``: its forecasts.
         tried: Every fitted set: sorted candidate numbers -> fit; ``unfit``: not converged.
         refused: Sets that cannot be right whatever they take off, and why.
-        nearly: Those of them that could be, as far as their numbers are known.
+        nearly: Those of them that could be, as far as their numbers are known; ``extreme``: sets
+            with numbers as large, that explain what moved.
         halved: Those that were fitted at half the step, too, see ``numerics.at_half_step``.
         validated: Cross-validated forecasts of the sets; ``currency``: relative errors.
     """
@@ -84,6 +85,7 @@ class Search:
         self.unfit: set[Key] = set()
         self.refused: dict[Key, str] = {}
         self.nearly: set[Key] = set()
+        self.extreme: set[Key] = set()
         self.halved: dict[Key, Fit] = {}
         self._noise, self._globally = noise, GlobalSearch(noise, until)
         self._from_longer_leads: dict[Key, Array] = {}
@@ -228,7 +230,9 @@ class Search:
         self.tried[key] = found
         self.validated[key] = validate(self.fitter, found)
         number, reason = absurd(found.model, found.theta, self.fitter.samples)
-        if reason and not told_by_data(found, self.nominal, self.fitter, self._noise):
+        if reason and told_by_data(found, self.nominal, self.fitter, self._noise):
+            self.extreme.add(key)
+        elif reason:
             self.refused[key] = reason
             if nearly(found, number, self.fitter):
                 self.nearly.add(key)
@@ -244,6 +248,7 @@ class Search:
         self.unfit.discard(key)
         self.refused.pop(key, None)
         self.nearly.discard(key)
+        self.extreme.discard(key)
         self.halved.pop(key, None)
         self._from_longer_leads.pop(key, None)
         self._signatures.pop(key, None)

@@ -79,7 +79,7 @@ class Toy:
             )
             for key, error in errors.items()
         }
-        self.unfit, self.refused, self.nearly = set(), {}, set()
+        self.unfit, self.refused, self.nearly, self.extreme = set(), {}, set(), set()
         self.candidates = [
             SimpleNamespace(
                 effect=e, label=str(e), knobs=(SimpleNamespace(field="change", strength=True),)
