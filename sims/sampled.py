@@ -177,10 +177,8 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _read(self, observation: Any, info: dict[str, Any]) -> Array:
         if self._state_of is not None:
             whose = f"the function state_of for {self._name}"
-            given, what = (
-                answered(whose, self._state_of, self.env, observation),
-                "state_of returned",
-            )
+            given = answered(whose, self._state_of, self.env, observation)
+            what = "state_of returned"
         elif isinstance(info, Mapping) and "state" in info:
             given, what = info["state"], "info['state'] is"
         else:

@@ -111,14 +111,8 @@ def find_gap(
         answer = known.answer
         tell("do the records differ?")
         differ = unlike(answer) if asked and not clock.late else ()
-        if any(one.instead for one in differ):
-            doubted = tuple(replace(claim, unlike=True) for claim in answer.claims)
-            answer = replace(answer, claims=doubted)
         clock.lap("confirm")
 
-        if conventions is not None:  # it is asked first, so that nothing is certain before
-            doubted = tuple(replace(claim, counted=True) for claim in answer.claims)
-            answer = replace(answer, claims=doubted)
         table, apart = summed_up(answer), None
         if held:
             others, _ = excerpt(
@@ -127,9 +121,18 @@ def find_gap(
             if on_rest:
                 others = tuple(from_rest(simulator, others))
             apart = judged_apart(answer, known.prepared, others, table)
-            if apart.refutes:
-                doubted = tuple(replace(claim, refuted=True) for claim in answer.claims)
-                answer = replace(answer, claims=doubted)
+        answer = replace(
+            answer,
+            claims=tuple(
+                replace(
+                    claim,
+                    counted=conventions is not None,
+                    unlike=any(one.instead for one in differ),
+                    refuted=apart is not None and apart.refutes,
+                )
+                for claim in answer.claims
+            ),
+        )
         clock.lap("forecast")
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
     quality = [*log.findings, *log.left_out, *other, *on_hold, *on_rest, *on_more, *known.says]

@@ -24,6 +24,7 @@ from residual.gap.preparation.numerics import held_otherwise, how_held
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.search.explain import Explanation, explain
 from residual.gap.search.sets import Search
+from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 
@@ -220,9 +221,7 @@ class Inquiry:
         if longer.horizon < LONGER * log.horizon or time.process_time() > self.clock.search_until:
             return known
         self.tell("once more over longer forecasts, of which the records hold fewer")
-        ready = prepare(simulator, longer.runs, longer.horizon)
-        again = self.explained(simulator, ready)
-        answer = confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
+        ready, answer = self._asked_of(simulator, longer.runs, longer.horizon, tolerance)
         if not explains_the_rest(answer):
             return known
         says = (
@@ -230,6 +229,19 @@ class Inquiry:
             "records hold more, nothing can be named"
         )
         return Confirmed(ready, answer, (says,))
+
+    def _asked_of(
+        self,
+        simulator: HostSimulator,
+        runs: Sequence[Trajectory],
+        horizon: float,
+        tolerance: float,
+    ) -> tuple[Prepared, Answer]:
+        """What is found in windows of other runs, or of another length, and these windows."""
+        ready = prepare(simulator, runs, horizon)
+        again = self.explained(simulator, ready)
+        until = self.clock.confirm_until
+        return ready, confirm(again, self.offered.groups, True, tolerance, until)
 
     def _asked_again(
         self,
@@ -268,9 +280,8 @@ class Inquiry:
             return known.and_says(stretch.says(left_out=False))
         self.tell("once more without a stretch that nothing explains")
         simulator = known.answer.found.search.simulator
-        ready = prepare(simulator, stretch.cut_from(log.runs), log.horizon)
-        again = self.explained(simulator, ready)
-        answer = confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
+        runs = stretch.cut_from(log.runs)
+        ready, answer = self._asked_of(simulator, runs, log.horizon, tolerance)
         if not explains_the_rest(answer):
             return known.and_says(stretch.says(left_out=False))
         return Confirmed(ready, answer, (stretch.says(left_out=True),))
