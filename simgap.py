@@ -13,6 +13,7 @@ import importlib.util
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from types import TracebackType
 
 _HOMES = {
     "sims": (
@@ -70,6 +71,16 @@ def check_packages() -> None:
             )
 
 
+def say_stopped(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """What Python says of an error at the end: a line for Ctrl-C while a command is loaded."""
+    if issubclass(kind, KeyboardInterrupt):
+        sys.stderr.write("\nstopped; nothing had begun\n")
+    else:
+        sys.__excepthook__(kind, error, trace)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command ``simgap``: one of the studies by name."""
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -93,11 +104,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except ImportError as error:
         sys.stderr.write(f"error: {error}\n")
         raise SystemExit(2) from None
-    try:
-        study = importlib.import_module(COMMANDS[given[0]][0])
-    except KeyboardInterrupt:
-        sys.stderr.write("\nstopped; nothing had begun\n")
-        raise SystemExit(130) from None
+    sys.excepthook = say_stopped
+    study = importlib.import_module(COMMANDS[given[0]][0])
     study.main(given[1:])
 
 

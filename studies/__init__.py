@@ -4,11 +4,15 @@ import sys
 
 import simgap
 
+AS_COMMAND = sys.argv[:1] == ["-m"]
+"""Whether this is loaded as the package of a command, before the command can say anything."""
+
+if AS_COMMAND:
+    sys.excepthook = simgap.say_stopped
 try:
     simgap.check_packages()
 except ImportError as error:
-    if sys.argv[:1] != ["-m"]:
+    if not AS_COMMAND:
         raise
-    # As the package of a command, before the command can say it.
     sys.stderr.write(f"error: {error}\n")
     raise SystemExit(2) from None
