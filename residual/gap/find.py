@@ -6,20 +6,18 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from residual.gap.answer.answer import judged_apart, matters, summed_up, told
+from residual.gap.answer.answer import matters, summed_up, told
+from residual.gap.answer.apart import judged_apart
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.records import unlike
 from residual.gap.clock import Clock
-from residual.gap.confirmation.rest import from_rest
-from residual.gap.data.examine import examine
-from residual.gap.data.excerpt import excerpt
 from residual.gap.inquiry import Inquiry
 from residual.gap.log import look, settle
 from residual.gap.model.workers import workers
 from residual.gap.offered import Offered
 from residual.gap.preparation.conventions import otherwise
 from residual.gap.preparation.horizon import other_length
-from residual.gap.preparation.numerics import held_as, stride_for
+from residual.gap.preparation.numerics import held_as
 from residual.gap.result import GapResult
 from residual.gap.search.finals import on_more_windows
 from residual.gap.search.known import KNOWN
@@ -115,12 +113,7 @@ def find_gap(
 
         table, apart = summed_up(answer), None
         if held:
-            others, _ = excerpt(
-                examine(simulator, held).trajectories, stride_for(held, known.prepared.horizon)
-            )
-            if on_rest:
-                others = tuple(from_rest(simulator, others))
-            apart = judged_apart(answer, known.prepared, others, table)
+            apart = judged_apart(answer, known.prepared, held, table, rested=bool(on_rest))
         answer = replace(
             answer,
             claims=tuple(

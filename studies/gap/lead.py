@@ -126,6 +126,12 @@ def _but_worse_apart(result: GapResult) -> str:
     if apart.helps:
         return _but_worse_elsewhere(result, apart)
     before, after = (quantity_text(s.value, apart.unit) for s in (apart.before, apart.after))
+    if not apart.exceeds_noise(1.0) and not apart.exceeds_noise(OFF, corrected=True):
+        alone = quantity_text(apart.noise_floor.value, apart.unit)
+        return (
+            f" The records set aside cannot tell: there noise alone makes {alone}, and the "
+            f"{ahead(apart)} is {after} with it and {before} without."
+        )
     if not apart.refutes:
         return (
             f" But it does not help on the records set aside, where the {ahead(apart)} is {after} "

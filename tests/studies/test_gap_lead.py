@@ -55,6 +55,16 @@ def test_the_first_sentence_says_where_the_corrected_simulator_is_no_better(
     assert ("records set aside" in says) is not helps
 
 
+def test_records_in_which_nothing_shows_are_not_said_to_speak_against_a_name():
+    found = result(MASS)
+    noise = Span(1.3, 1.2, 1.4)
+    before, after = Span(1.0, 0.9, 1.1), Span(1.02, 0.9, 1.1)
+    apart = dataclasses.replace(found.gap, before=before, after=after, noise_floor=noise)
+    says = lead(dataclasses.replace(found, held_out=apart))
+    assert "The records set aside cannot tell: there noise alone makes 1.3 rad, and" in says
+    assert "not help" not in says
+
+
 def boats(*errors):
     """A result about several quantities, each with these errors before and after."""
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from residual.gap.answer.evidence import evidence
-from residual.gap.answer.table import gap, held_out, rollouts
+from residual.gap.answer.table import gap, rollouts
 from residual.gap.answer.verdicts import (
     blind_verdict,
     calibrated_verdict,
@@ -30,10 +30,6 @@ from residual.gap.confirmation.numerics import other_numerics, with_enough_subst
 from residual.gap.confirmation.size import may_vanish
 from residual.gap.confirmation.tolerance import allow_for_parameters
 from residual.gap.fitting.forecasts import fitted_floor, main_channel, noise_floor
-from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.model.model import Model
-from residual.gap.preparation.numerics import enough_for, own_substeps
-from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.result import Gap, GapResult, Verdict
 from residual.gap.search.choice import helps, material
 from residual.gap.search.exchange import add_exchanged
@@ -42,7 +38,6 @@ from residual.gap.search.imitation import imitated
 from residual.gap.search.known import KNOWN
 from residual.gap.search.redundant import doubles
 from residual.gap.search.sets import Key, Search
-from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
 #: Effects tried in place of each that is left when one cannot be named.
@@ -156,25 +151,6 @@ def summed_up(answer: Answer) -> Gap:
     left = search.fitter.left(search.tried[answer.key], found.floor)
     order = [claim.number for claim in answer.claims]
     return gap(search, answer.key, order, floor, (found.nominal_left.ratio, left.ratio))
-
-
-def judged_apart(answer: Answer, prepared: Prepared, runs: Sequence[Trajectory], table: Gap) -> Gap:
-    """The same table for records that were set aside."""
-    search = answer.found.search
-    other = prepare(search.simulator, runs, prepared.horizon).fitter
-    other = other.weighed_like(search.fitter)
-    tried = (search.nominal, search.tried[answer.key])
-    nominal, found = (fit.model.bind(fit.theta) for fit in tried)
-    if isinstance(other, SmoothFitter):
-        # As fine as was searched, and as what was found needs here.
-        samples = other.samples
-        most = own_substeps(answer.corrected, runs, samples.stride)
-        few = enough_for(found, search.simulator, samples, other.nodes, other.sigma, most)
-        searched = min(most, search.fitter.samples.substeps)
-        other = other.with_substeps(max(few, searched, samples.substeps))
-    fits = [other.fit(Model(simulator), np.zeros(0)) for simulator in (nominal, found)]
-    floor = noise_floor(other, fits[1], answer.found.floor.sigma)
-    return held_out(table, other, fits[0], fits[1], floor)
 
 
 def told(

@@ -54,7 +54,8 @@ def nearly_in_sensors(effects: Iterable[Effect], search: Search) -> tuple[str, .
 
 def _matters(simulator: HostSimulator, fitter: SmoothFitter, time: float) -> Array:
     """By how much one control period ends elsewhere if an input is late by a time, (n_a,)."""
-    samples = fitter.samples
+    # Its own effects may have memory, which these states do not hold.
+    simulator, samples = simulator.with_effects(()), fitter.samples
     rows = np.unique(np.linspace(0, len(samples) - 1, min(len(samples), ROWS)).astype(int))
     states = fitter.nodes[rows, : len(simulator.physical_channels)]
     scale = np.maximum(fitter.scale[: states.shape[1]], 1e-300)

@@ -62,33 +62,51 @@ def fits_better_from_rest(
     if not isinstance(fitter, SmoothFitter) or any(run.before is not None for run in runs):
         return None
     ordered = in_order(runs, fitter.samples.stride)
-    rested = from_rest(search.simulator, ordered)
-    if all(run.before is None for run in rested):
+    if all(run.before is None for run in from_rest(search.simulator, ordered)):
         return None
     lagging = _with_lags(search, key)
     if lagging is None:
         return None
     model, theta = search.model(lagging[0]), lagging[1]
-
-    def fit(runs: Sequence[Trajectory]) -> Fit:
-        recorded = tuple(
-            dataclasses.replace(one, before=run.before)
-            for one, run in zip(fitter.samples.recorded, runs, strict=True)
-        )
-        samples = dataclasses.replace(fitter.samples, recorded=recorded)
-        begun = dataclasses.replace(fitter, samples=samples)
-        return begun.fit(model, theta, search.tried[key])
-
-    usual, begun = fit(ordered), fit(rested)
-    gained = np.bincount(fitter.blocks.windows.run, usual.loss - begun.loss, minlength=len(ordered))
-    chosen = [
-        late if won > 0 else run for late, run, won in zip(rested, ordered, gained, strict=True)
-    ]
+    usual = fitter.fit(model, theta, search.tried[key])
+    chosen = each_as_it_fits(fitter, usual, ordered)
     if all(run.before is None for run in chosen):
         return None
     least = min(usual.merit, search.tried[key].merit)
     needed = max(CLEARER * least, fitter.tie(search.tried[()]))
-    return chosen if least - fit(chosen).merit > needed else None
+    begun = beginning_as(fitter, chosen).fit(model, theta, search.tried[key])
+    return chosen if least - begun.merit > needed else None
+
+
+def each_as_it_fits(
+    fitter: SmoothFitter, usual: Fit, ordered: Sequence[Trajectory]
+) -> list[Trajectory]:
+    """The runs, those taken to have begun from rest that fit better so.
+
+    Args:
+        fitter: Holds the runs, and ``usual``, its fit with the first input as what came before.
+        ordered: The runs in the order of the fitter.
+    """
+    rested = from_rest(usual.model.simulator, ordered)
+    if all(run.before is None for run in rested):
+        return rested
+    begun = beginning_as(fitter, rested).fit(usual.model, usual.theta, usual)
+    run = fitter.blocks.windows.run
+    gained = np.bincount(run, usual.loss - begun.loss, minlength=len(ordered))
+    return [
+        late if won > 0 else run for late, run, won in zip(rested, ordered, gained, strict=True)
+    ]
+
+
+def beginning_as(fitter: SmoothFitter, ordered: Sequence[Trajectory]) -> SmoothFitter:
+    """The fitter with what came before each run as these runs have it."""
+    recorded = tuple(
+        dataclasses.replace(one, before=run.before)
+        for one, run in zip(fitter.samples.recorded, ordered, strict=True)
+    )
+    return dataclasses.replace(
+        fitter, samples=dataclasses.replace(fitter.samples, recorded=recorded)
+    )
 
 
 def _with_lags(search: Search, key: Key) -> tuple[Key, Array] | None:

@@ -6,8 +6,8 @@ everything else is said, and left as it is.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Container, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,7 +36,7 @@ from sims.host import HostSimulator
 _SLOWEST = 100.0
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Examined:
     """Measured runs after a look at them.
 
@@ -54,7 +54,8 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
 
     Args:
         simulator: Gives the control period, the channels and their bounds.
-        trajectories: Measured runs.
+        trajectories: Measured runs; what they hold of the memory of the simulator's own effects,
+            which nothing measures, is left out.
 
     Returns:
         The runs without the samples that cannot be true, and all findings.
@@ -62,6 +63,8 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
     Raises:
         ValueError: No answer could mean anything; the message says why and what to do.
     """
+    physical = slice(len(simulator.physical_channels))
+    trajectories = [replace(run, states=run.states[:, physical]) for run in trajectories]
     trajectories, copied = once(trajectories)
     trajectories, wild = without_wild_inputs(simulator, trajectories)
     found = [*copied, *wild, *findings(simulator, trajectories)]
@@ -130,6 +133,4 @@ def _without_faults(
             changed = changed or bool(gone.any())
     if not changed:
         return list(trajectories)
-    return [
-        dataclasses.replace(run, states=own) for run, own in zip(trajectories, states, strict=True)
-    ]
+    return [replace(run, states=own) for run, own in zip(trajectories, states, strict=True)]

@@ -1,11 +1,13 @@
 """A delay of one of two inputs is told to look like late sensors where the other one is slow."""
 
+import dataclasses
 from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
+from residual.gap import find_gap
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.preparation.prepare import prepare
 from residual.trajectories import Trajectory
@@ -43,6 +45,19 @@ def searched(swerves):
         states[k + 1] = simulator.step(states[k : k + 1], inputs[k : k + 1])[0]
     runs = [Trajectory("run", times, states, inputs)]
     return SimpleNamespace(simulator=simulator, fitter=prepare(simulator, runs, 1.0).fitter), runs
+
+
+def test_a_simulator_with_a_delay_of_its_own_is_asked_like_any_other():
+    """Its states hold what the delay remembers; the log, and what is asked of it, do not."""
+    search, (run,) = searched(1)
+    search.simulator = Turning(effects=[Delay("steer", LATE)])
+    assert nearly_in_sensors([Delay("steer", LATE)], search) == ("delay@steer",)
+    memory = np.full((len(run.times), 4), np.nan)
+    seen = np.hstack([run.states, memory[:, : len(search.simulator.state_channels) - 1]])
+    runs = [dataclasses.replace(run, states=seen)]
+    found = find_gap(search.simulator, runs, effects=["delay", "length"], parameter_tolerance=0)
+    # The car of this log is never late, and a delay beside the nominal one makes it no earlier.
+    assert [e.name for e in found.effects if e.name == "delay"] == []
 
 
 @pytest.mark.parametrize(("swerves", "told"), [(1, ("delay@steer",)), (40, ())])

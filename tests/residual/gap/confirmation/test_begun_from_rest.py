@@ -60,6 +60,17 @@ def test_records_set_aside_are_judged_likewise():
     assert found.held_out.after.value < 0.1 * found.held_out.before.value
 
 
+def test_a_record_set_aside_that_goes_on_is_not_taken_to_begin_from_rest():
+    """As where a step test is cut in two: a lag has nothing to do in the second half."""
+    ends = [Trajectory(f"end {i}", t.times[60:], t.states[60:], t.actions[60:]) for i, t in
+            enumerate(TESTS)]  # fmt: skip
+    found = find_gap(Oven(), TESTS, held=ends, effects=OFFERED)
+    assert lag_of(found) == pytest.approx(LAG, rel=0.05)
+    assert told(found)
+    noise = found.held_out.noise_floor.value
+    assert found.held_out.after.value < 1.5 * noise
+
+
 def test_what_came_before_a_record_has_an_entry_for_each_input():
     one = TESTS[0]
     with pytest.raises(ValueError, match=r"run 0: before has shape \(2,\), expected \(1,\)"):
