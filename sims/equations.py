@@ -221,6 +221,7 @@ class FirstOrderSystem(_Equations):
             SimpleNamespace(**self.parameter_values()),
             smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
             dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
+            by_force=True,
         )
         x = np.ascontiguousarray(np.asarray(states, float).T)
         inputs = np.asarray(inputs, float)

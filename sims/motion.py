@@ -28,6 +28,7 @@ class Motion:
         drive_force: (q, v, u, parameters) -> (n_joints, n).
         parameters: Each a scalar or (n,).
         smooth, dry, plays: Effects with the number of the joint they act on.
+        by_force: Whether a force on a joint is an acceleration of that joint, and of no other.
     """
 
     acceleration: Callable[[Array, Array, Array, Array, SimpleNamespace], Array]
@@ -36,6 +37,7 @@ class Motion:
     smooth: tuple[tuple[int, JointEffect], ...] = ()
     dry: tuple[tuple[int, DryFriction], ...] = ()
     plays: tuple[tuple[int, Backlash], ...] = ()
+    by_force: bool = False
 
     def take(self, rows: Rows) -> Motion:
         """The same for some rows."""
@@ -46,6 +48,7 @@ class Motion:
             tuple((j, effect.take(rows)) for j, effect in self.smooth),
             tuple((j, effect.take(rows)) for j, effect in self.dry),
             tuple((j, effect.take(rows)) for j, effect in self.plays),
+            self.by_force,
         )
 
     @property
@@ -84,6 +87,9 @@ class Motion:
         """
         joints = len(q)
         found = np.zeros((joints, joints, rows.size))
+        if self.by_force:
+            found[range(joints), range(joints)] = asked[:, rows]
+            return found
         # One call for all joints.
         places = [np.flatnonzero(asked[j, rows]) for j in range(joints)]
         index = rows[np.concatenate(places)]

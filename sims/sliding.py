@@ -134,7 +134,7 @@ class _Stages(NamedTuple):
         motion, stuck, held = self.motion, self.mode.stuck, self.held
         load, running = _loads(motion, self.limits, self.mode, q, v, x, u)
         acceleration = motion.accelerate(q, v, u, load)
-        if held.size and len(q) > 1:
+        if held.size and len(q) > 1 and not motion.by_force:
             mobility = motion.mobility(q, v, u, load, acceleration, stuck, held)
             keep(acceleration, mobility, held, stuck)
         elif held.size:
