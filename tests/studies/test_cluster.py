@@ -18,13 +18,13 @@ GRID = """
 budget: {iterations: 1, idealised_steps: 500, difference_steps: 400}
 ddpg: {hidden: [16, 16], warm_up: 300}
 grid:
-- seed: [0, 1, 2]
+- seed: [0, 1]
   budget.true_samples: [40]
   estimator:
   - {class_path: residual.Linear}
   - {class_path: residual.DropoutNet, init_args: {hidden: [16], epochs: 2}}
 """
-TRIALS = 6
+TRIALS = 4
 
 
 def arguments(folder, *more):

@@ -2,51 +2,112 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 from numpy.typing import NDArray
 
+from sims.compiled import compiled
+
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 #: Part of the usual interval of a row by which others may differ and still count alike.
 EVEN = 0.2
 
 
-def merged(driven: Array, durations: Array, count: int) -> Array:
-    """Inputs in ``count`` equal sub-steps of every row, with the integral and the first moment that
-    the recorded intervals have in them.
+@dataclasses.dataclass(frozen=True)
+class Merging:
+    """How the intervals of one record make those of its rows, whatever the input.
+
+    A row's sub-steps have the integral and the first moment that the recorded intervals have in
+    them. What is left to do for an input is a sum.
+
+    Attributes:
+        at: Recorded interval of every part of a row, (rows, width).
+        uneven: Place of a row in ``weights``, -1 where its intervals count alike, (rows,).
+        weights: Of mean and rise in every sub-step of the parts, in mean and rise of a row's,
+            (uneven rows, width times fine, 2, count, 2).
+        fine: Sub-steps of a recorded interval.
+        count: Sub-steps of a row.
+    """
+
+    at: Integers
+    uneven: Integers
+    weights: Array
+    fine: int
+    count: int
+
+    @classmethod
+    def of(cls, at: Integers, durations: Array, fine: int, count: int) -> Merging:
+        """Prepared for a record.
+
+        Args:
+            at: See the class.
+            durations: Of each part, (rows, width); of a row that has fewer, the others take no
+                time.
+            fine, count: See the class.
+        """
+        differ = np.ptp(durations, axis=1) > EVEN * durations.mean(axis=1)
+        uneven = np.where(differ, np.cumsum(differ) - 1, -1)
+        weights = _by_time(np.repeat(durations[differ], fine, axis=1) / fine, count)
+        return cls(at, uneven, weights, fine, count)
+
+    def rows(self, driven: Array) -> Array:
+        """Inputs of the rows, and last of one that holds what the record ends with.
+
+        Args:
+            driven: Mean and rise in every sub-step of the recorded intervals,
+                (V, T, ``fine``, n_a, 2).
+
+        Returns:
+            (V, rows + 1, ``count``, n_a, 2).
+        """
+        variants, _, _, inputs, _ = driven.shape
+        found = np.zeros((variants, len(self.at) + 1, self.count, inputs, 2))
+        each = self.at.shape[1] * self.fine // self.count
+        _merge(np.ascontiguousarray(driven), self.at, self.uneven, self.weights, found)
+        found[:, -1] = driven[:, -1:, -1]
+        found[:, -1, ..., 1] /= each
+        return found
+
+
+@compiled
+def _merge(driven: Array, at: Integers, uneven: Integers, weights: Array, found: Array) -> None:
+    """Sums of ``Merging.rows`` into ``found``, all but its last row."""
+    fine, inputs, count = driven.shape[2], driven.shape[3], found.shape[2]
+    total = at.shape[1] * fine
+    each = total // count
+    for v in range(len(driven)):
+        for r in range(len(at)):
+            for s in range(total):
+                part = driven[v, at[r, s // fine], s % fine]
+                if uneven[r] >= 0:
+                    weight = weights[uneven[r], s]
+                    for c in range(count):
+                        for i in range(inputs):
+                            for k in range(2):
+                                found[v, r, c, i, k] += (
+                                    weight[0, c, k] * part[i, 0] + weight[1, c, k] * part[i, 1]
+                                )
+                else:
+                    c = s // each
+                    place = s - c * each - 0.5 * (each - 1)
+                    for i in range(inputs):
+                        found[v, r, c, i, 0] += part[i, 0] / each
+                        found[v, r, c, i, 1] += (12 * part[i, 0] * place + part[i, 1]) / each**2
+
+
+def _by_time(durations: Array, count: int) -> Array:
+    """Weights where sub-steps take unlike times, which are counted in those of their row.
 
     Args:
-        driven: Mean and rise in every sub-step of the recorded intervals, (V, rows, s, n_a, 2).
-        durations: Of the recorded intervals, each of as many sub-steps, (rows, intervals); of a
-            row that has fewer, the others take no time.
+        durations: (rows, s).
         count: Sub-steps of a row.
 
     Returns:
-        (V, rows, count, n_a, 2).
+        See ``Merging.weights``.
     """
-    total = driven.shape[2]
-    uneven = np.ptp(durations, axis=1) > EVEN * durations.mean(axis=1)
-    found = _alike(driven, total // count)
-    if uneven.any():
-        steps = np.repeat(durations[uneven], total // durations.shape[1], axis=1)
-        found[:, uneven] = _by_time(driven[:, uneven], steps, count)
-    return found
-
-
-def _alike(driven: Array, each: int) -> Array:
-    """Every ``each`` sub-steps as one."""
-    if each == 1:
-        return driven.copy()
-    variants, rows, total, inputs, _ = driven.shape
-    parts = driven.reshape(variants, rows, total // each, each, inputs, 2)
-    place = (np.arange(each) - 0.5 * (each - 1))[:, None]
-    mean = parts[..., 0].mean(axis=3)
-    rise = (12 * (parts[..., 0] * place).sum(axis=3) + parts[..., 1].sum(axis=3)) / each**2
-    return np.stack([mean, rise], axis=-1)
-
-
-def _by_time(driven: Array, durations: Array, count: int) -> Array:
-    """The same where sub-steps take unlike times, which are counted in those of their row."""
     width = durations / durations.sum(axis=1, keepdims=True)
     end = np.cumsum(width, axis=1)
     middle = end - 0.5 * width
@@ -57,13 +118,7 @@ def _by_time(driven: Array, durations: Array, count: int) -> Array:
     wide = np.maximum(width, np.finfo(float).tiny)[..., None]  # those without width hold nothing
     slant = ((x - middle[..., None]) ** 2 - (0.5 * width[..., None]) ** 2) / (2 * wide)
     cubes = (x**3 - begin**3) / 3 - middle[..., None] * (x**2 - begin**2) / 2
-    mean, rise = driven[..., 0], driven[..., 1]
-
-    def before(of_mean: Array, of_rise: Array) -> Array:
-        by_mean = np.einsum("vrsn,rse->vren", mean, of_mean)
-        return by_mean + np.einsum("vrsn,rse->vren", rise, of_rise)
-
-    area = np.diff(before(x - begin, slant), axis=2)
-    moment = np.diff(before((x**2 - begin**2) / 2, cubes / wide), axis=2)
-    centre = (np.arange(count) + 0.5)[:, None] / count
+    area = np.diff(np.stack([x - begin, slant], axis=2))
+    moment = np.diff(np.stack([(x**2 - begin**2) / 2, cubes / wide], axis=2))
+    centre = (np.arange(count) + 0.5) / count
     return np.stack([area * count, 12 * (moment - centre * area) * count**2], axis=-1)

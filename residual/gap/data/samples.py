@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import itertools
 import math
@@ -11,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.data.merging import merged
+from residual.gap.data.merging import Merging
 from residual.trajectories import Trajectory
 
 Array = NDArray[np.float64]
@@ -126,32 +127,38 @@ class Samples:
         """Usual seconds between two rows."""
         return float(np.median(self.durations))
 
+    @property
+    def recorded_substeps(self) -> int:
+        """Sub-steps of a recorded interval."""
+        return max(1, self.substeps // self.stride)
+
     def in_intervals(self, run: int, driven: Array) -> Array:
         """Inputs of recorded intervals put together to those of a run's rows.
 
         Args:
             run: Number of the run.
             driven: Mean and rise in every sub-step of the recorded intervals,
-                (V, T, substeps, n_a, 2).
+                (V, T, ``recorded_substeps``, n_a, 2).
 
         Returns:
             (V, rows, ``self.substeps``, n_a, 2).
         """
-        if self.stride == 1:
-            return driven
-        variants, _, fine, inputs, _ = driven.shape
-        recorded = self.recorded[run]
-        first, end = recorded.rows[:-1, None], recorded.rows[1:, None]
-        # Where readings are rare, intervals differ; the shorter ones end with some of no length.
-        times = int((end - first).max(initial=1))
-        width = self.stride * 2 ** max(0, math.ceil(math.log2(times / self.stride)))
-        at = first + np.arange(width)
-        durations = np.where(at < end, recorded.durations[np.minimum(at, end - 1)], 0.0)
-        whole = driven[:, np.minimum(at, end - 1)]
-        whole = whole.reshape(variants, len(first), width * fine, inputs, 2)
-        last = np.repeat(driven[:, -1:, -1:], width * fine, axis=2)
-        each = np.vstack([durations, np.ones((1, width))])
-        return merged(np.concatenate([whole, last], axis=1), each, self.substeps)
+        return driven if self.stride == 1 else self._merging[run].rows(driven)
+
+    @functools.cached_property
+    def _merging(self) -> tuple[Merging, ...]:
+        """How the recorded intervals of every run make those of its rows."""
+        found = []
+        for recorded in self.recorded:
+            first, end = recorded.rows[:-1, None], recorded.rows[1:, None]
+            # Where readings are rare, rows differ; the shorter ones end with parts of no length.
+            times = int((end - first).max(initial=1))
+            width = self.stride * 2 ** max(0, math.ceil(math.log2(times / self.stride)))
+            at = first + np.arange(width)
+            durations = np.where(at < end, recorded.durations[np.minimum(at, end - 1)], 0.0)
+            at = np.minimum(at, end - 1)
+            found.append(Merging.of(at, durations, self.recorded_substeps, self.substeps))
+        return tuple(found)
 
 
 def in_order(trajectories: Sequence[Trajectory], stride: int) -> list[Trajectory]:

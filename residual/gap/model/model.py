@@ -133,7 +133,7 @@ class Model:
                 self._drives.clear()
             host = self.bind(theta)
             parts = []
-            fine = max(1, samples.substeps // samples.stride)
+            fine = samples.recorded_substeps
             for run, recorded in enumerate(samples.recorded):
                 before = None if recorded.before is None else recorded.before[None]
                 part = host.drive(

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from residual.gap import find_gap
-from residual.gap.data.merging import EVEN, merged
+from residual.gap.data.merging import EVEN, Merging
 from residual.trajectories import Trajectory
 from sims import Channel, FirstOrderSystem, Parameter
 
@@ -33,7 +33,8 @@ def test_integral_and_first_moment_stay(seed, count, unlike):
     driven, durations = rng.standard_normal((8, 2)), np.exp(unlike * rng.standard_normal(8))
     if np.ptp(durations) < EVEN * durations.mean():
         durations = np.ones(8)
-    found = merged(driven[None, None, :, None], durations[None], count)[0, 0, :, 0]
+    merging = Merging.of(np.arange(8)[None], durations[None], 1, count)
+    found, last = merging.rows(driven[None, :, None, None])[0, :, :, 0]
     edges = durations.sum() * np.arange(count + 1) / count
     area, moment = integrals(driven, durations, edges)
     width = edges[1]
@@ -42,6 +43,8 @@ def test_integral_and_first_moment_stay(seed, count, unlike):
     slant = found[:, 1] * width**2 / 12
     wanted = moment - middle * area
     np.testing.assert_allclose(slant, wanted, atol=2e-4 * durations.sum() ** 2)
+    # Whatever comes after the record is as it ended, in sub-steps that are as many times shorter.
+    np.testing.assert_allclose(last, np.tile(driven[-1] / [1, 8 // count], (count, 1)))
 
 
 class Body(FirstOrderSystem):

@@ -23,7 +23,7 @@ from studies.robots.drives import measure
 
 def test_a_payload_is_found_and_windows_are_followed_past_impacts():
     simulator = nominal("hopper")
-    logs = measure("hopper", {"mass of body torso": 0.6}, seed=1, runs=8)
+    logs = measure("hopper", {"mass of body torso": 0.6}, seed=1, runs=4)
     runs = examine(simulator, logs).trajectories
     fitter, _ = impact_fitter(simulator, runs, usual_horizon(simulator, runs), most=40)
     (payload,) = candidates(
