@@ -12,7 +12,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sims.compiled import compiled
+from sims.compiled import compiled, inlined
 from sims.effects.actuator import ActuatorEffect, ActuatorLag, Delay, StaticActuatorEffect
 from sims.simulator import Array, Hold
 
@@ -64,7 +64,7 @@ def substep_inputs(
     Returns:
         Means and rises, each (rows, T, substeps).
     """
-    rows, length = samples.shape
+    rows = len(samples)
     following = np.concatenate([samples[:, 1:], samples[:, -1:]], axis=1)
     slope = (following - samples) if hold == "linear" else np.zeros_like(samples)
     middles = (np.arange(substeps) + 0.5) / substeps
@@ -73,33 +73,48 @@ def substep_inputs(
     late = np.broadcast_to(np.asarray(delay, float), (rows,))
     if not late.any():
         return prompt, prompt_rise
+    means, rises = prompt.copy(), np.array(prompt_rise)
     starts = np.concatenate([[0.0], np.cumsum(durations)])
-    lengths = np.broadcast_to(durations, samples.shape)
     # Integrals of the input, and of its integral, up to every sample.
-    once = _running(samples * lengths + 0.5 * slope * lengths)
-    twice = _running(once[:, :-1] * lengths + 0.5 * samples * lengths**2 + slope * lengths**2 / 6)
-    edges = starts[:-1, None] + durations[:, None] * np.arange(substeps) / substeps
-    times = np.append(edges.ravel(), starts[-1]) - late[:, None]
-    k = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, length - 1)
-    into = times - starts[k]
-    value = np.take_along_axis(samples, k, axis=1)
-    steep = np.where(into < 0, 0.0, np.take_along_axis(slope, k, axis=1) / durations[k])
-    first = np.take_along_axis(once, k, axis=1)
-    integral = first + into * (value + 0.5 * steep * into)
-    area = np.take_along_axis(twice, k, axis=1) + into * (
-        first + into * (0.5 * value + steep * into / 6)
+    once = _running(samples * durations + 0.5 * slope * durations)
+    twice = _running(
+        once[:, :-1] * durations + 0.5 * samples * durations**2 + slope * durations**2 / 6
     )
-    h = np.repeat(durations / substeps, substeps)
-    means = np.diff(integral, axis=1) / h
-    # By parts: the moment about the middle is h (I0 + I1) / 2 - (A1 - A0).
-    moment = 0.5 * h * (integral[:, :-1] + integral[:, 1:]) - np.diff(area, axis=1)
-    rises = 12 * moment / (h * h)
-    shape = (rows, length, substeps)
-    there = late[:, None, None] > 0
-    return (
-        np.where(there, means.reshape(shape), prompt),
-        np.where(there, rises.reshape(shape), prompt_rise),
-    )
+    _delayed(np.ascontiguousarray(samples), slope, starts, once, twice, late, means, rises)
+    return means, rises
+
+
+@compiled
+def _delayed(
+    samples: Array, slope: Array, starts: Array, once: Array, twice: Array, late: Array,
+    means: Array, rises: Array,
+) -> None:  # fmt: skip
+    """Writes means and rises of the rows that are late; see ``substep_inputs``."""
+    _, length, substeps = means.shape
+    for v in range(len(means)):
+        if not late[v] > 0:
+            continue
+        k, before, below = 0, 0.0, 0.0
+        for at in range(length * substeps + 1):
+            t, s = divmod(at, substeps)
+            time = starts[t] - late[v]
+            if t < length:
+                time += (starts[t + 1] - starts[t]) * s / substeps
+            while k < length - 1 and starts[k + 1] <= time:
+                k += 1
+            into = time - starts[k]
+            steep = 0.0 if into < 0 else slope[v, k] / (starts[k + 1] - starts[k])
+            value, first = samples[v, k], once[v, k]
+            integral = first + into * (value + 0.5 * steep * into)
+            area = twice[v, k] + into * (first + into * (0.5 * value + steep * into / 6))
+            if at > 0:
+                t, s = divmod(at - 1, substeps)
+                h = (starts[t + 1] - starts[t]) / substeps
+                means[v, t, s] = (integral - before) / h
+                # By parts: the moment about the middle is h (I0 + I1) / 2 - (A1 - A0).
+                moment = 0.5 * h * (before + integral) - (area - below)
+                rises[v, t, s] = 12 * moment / (h * h)
+            before, below = integral, area
 
 
 def _running(parts: Array) -> Array:
@@ -125,49 +140,43 @@ def lagged(
     Returns:
         Means and rises of the output, same shapes, and its last value, (rows,).
     """
-    substeps = means.shape[2]
-    constants = np.broadcast_to(np.asarray(time_constant, float), len(means))
-    with np.errstate(divide="ignore"):
-        ratio = (durations / substeps) / constants[:, None]
-    stays = np.exp(-ratio)
-    # The output follows the line at a distance, and what it lacked at first fades.
-    behind = rises / ratio[..., None]
-    first, last = means - 0.5 * rises - behind, means + 0.5 * rises - behind
-    gained = last - first * stays[..., None]
-    # Only from interval to interval is it a recursion; inside, all rows at once.
-    added = np.zeros_like(ratio)
-    for i in range(substeps):
-        added = added * stays + gained[:, :, i]
-    begins, y = _carried(
-        stays**substeps, added, np.array(np.broadcast_to(start, len(means)), float)
-    )
-    share, tilt = -np.expm1(-ratio) / ratio, _tilt(ratio)
-    filtered, tilted = np.empty_like(means), np.empty_like(means)
-    now = begins
-    for i in range(substeps):
-        lack = now - first[:, :, i]
-        filtered[:, :, i] = means[:, :, i] - behind[:, :, i] + lack * share
-        tilted[:, :, i] = rises[:, :, i] + lack * tilt
-        now = stays * now + gained[:, :, i]
+    constants = np.array(np.broadcast_to(np.asarray(time_constant, float), len(means)))
+    filtered, tilted = np.empty(means.shape), np.empty(means.shape)
+    y = np.array(np.broadcast_to(start, len(means)), float)
+    lengths = np.ascontiguousarray(durations, dtype=float)
+    _filtered(means, rises, lengths, constants, filtered, tilted, y)
     return filtered, tilted, y
 
 
 @compiled
-def _carried(kept: Array, added: Array, start: Array) -> tuple[Array, Array]:
-    """Values before each interval of ``y = kept y + added``, and those after the last."""
-    before, y = np.empty_like(kept), start.copy()
-    for i in range(len(kept)):
-        for k in range(kept.shape[1]):
-            before[i, k] = y[i]
-            y[i] = kept[i, k] * y[i] + added[i, k]
-    return before, y
+def _filtered(
+    means: Array, rises: Array, durations: Array, constants: Array, filtered: Array,
+    tilted: Array, y: Array,
+) -> None:  # fmt: skip
+    """Writes the output of ``lagged``; ``y`` holds where it begins, and then where it ends."""
+    rows, length, substeps = means.shape
+    for v in range(rows):
+        for t in range(length):
+            ratio = durations[t] / substeps / constants[v]
+            stays = np.exp(-ratio)
+            share, tilt = -np.expm1(-ratio) / ratio, _tilt(ratio)
+            for s in range(substeps):
+                # The output follows the line at a distance, and what it lacked at first fades.
+                behind = rises[v, t, s] / ratio
+                first = means[v, t, s] - 0.5 * rises[v, t, s] - behind
+                last = means[v, t, s] + 0.5 * rises[v, t, s] - behind
+                lack = y[v] - first
+                filtered[v, t, s] = means[v, t, s] - behind + lack * share
+                tilted[v, t, s] = rises[v, t, s] + lack * tilt
+                y[v] = stays * y[v] + last - first * stays
 
 
-def _tilt(ratio: Array) -> Array:
+@inlined
+def _tilt(ratio: float) -> float:
     """Rise of the line with the mean and first moment of exp(-ratio s), s in [0, 1]."""
-    large = np.minimum(np.maximum(ratio, 0.02), 700.0)
-    faded = np.exp(-large)
-    exact = 12 * ((1 - faded - large * faded) / large**2 - (1 - faded) / (2 * large))
-    small = np.minimum(ratio, 0.02)
-    series = -small * (1 - small / 2 + 3 * small**2 / 20 - small**3 / 30)
-    return np.where(ratio < 0.02, series, np.where(np.isinf(ratio), 0.0, exact))
+    if ratio < 0.02:
+        return -ratio * (1 - ratio / 2 + 3 * ratio**2 / 20 - ratio**3 / 30)
+    if np.isinf(ratio):
+        return 0.0
+    faded = np.exp(-ratio)
+    return 12 * ((1 - faded - ratio * faded) / ratio**2 - (1 - faded) / (2 * ratio))
