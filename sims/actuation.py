@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -52,6 +53,7 @@ def driven(
     hold: Hold | Sequence[Hold] | None,
     before: ArrayLike | None,
     rises: bool,
+    begins: Sequence[int],
 ) -> Array:
     """Effective inputs of a recorded trajectory; see ``HostSimulator.drive``."""
     actions, durations = np.asarray(actions, float), np.asarray(durations, float)
@@ -70,7 +72,9 @@ def driven(
     k = len(earlier)
     durations = np.concatenate([np.full(k, durations[:1]), durations])
     commands = clipped(simulator, np.concatenate([earlier, actions]))
-    inputs = recorded_inputs(simulator, commands, durations, substeps or simulator.substeps, hold)
+    bounds = [0, *(k + begin for begin in begins), len(commands)]
+    fine = substeps or simulator.substeps
+    inputs = recorded_inputs(simulator, commands, durations, fine, hold, bounds)
     inputs = inputs[:, k:] if rises else inputs[:, k:, ..., 0]
     rows = {e.rows for e in simulator.effects if isinstance(e, ActuatorEffect)} - {None}
     return np.broadcast_to(inputs, (rows.pop() or 1, *inputs.shape[1:])) if rows else inputs[0]
@@ -115,8 +119,9 @@ def recorded_inputs(
     durations: Array,
     substeps: int,
     holds: Sequence[Hold],
+    bounds: Sequence[int],
 ) -> Array:
-    """Mean and rise of every input in every sub-step of a record, (V, T, substeps, n_a, 2).
+    """Mean and rise of every input in every sub-step of records, (V, T, substeps, n_a, 2).
 
     Args:
         simulator: Gives the effects on the inputs.
@@ -124,6 +129,7 @@ def recorded_inputs(
         durations: (T,) seconds.
         substeps: In each interval.
         holds: How each input runs between samples.
+        bounds: Where each record begins, and T.
     """
     columns = []
     for j, channel in enumerate(simulator.action_channels):
@@ -132,12 +138,17 @@ def recorded_inputs(
         late = path.total_delay(effects)
         if np.ndim(late):
             samples = np.broadcast_to(samples, (len(np.asarray(late)), samples.shape[1]))
-        means, rises = path.substep_inputs(samples, durations, substeps, late, holds[j])
+        means, rises = path.substep_inputs(samples, durations, substeps, late, holds[j], bounds)
         for lag in path.lags(effects):
             shape = (lag.rows or len(means), *means.shape[1:])
-            means, rises = np.broadcast_to(means, shape), np.broadcast_to(rises, shape)
-            start = np.broadcast_to(samples[:, 0], len(means))
-            means, rises, _ = simulator.lagged(means, rises, durations, lag.time_constant, start)
+            means, rises = np.array(np.broadcast_to(means, shape)), np.broadcast_to(rises, shape)
+            rises = np.array(rises)
+            for begin, end in itertools.pairwise(bounds):
+                one = slice(begin, end)
+                start = np.broadcast_to(samples[:, begin], len(means))
+                means[:, one], rises[:, one], _ = simulator.lagged(
+                    means[:, one], rises[:, one], durations[one], lag.time_constant, start
+                )
         columns.append(np.stack([means, rises], axis=-1))
     if not columns:
         return np.empty((1, len(commands), substeps, 0, 2))
@@ -182,6 +193,7 @@ def next_inputs(
             simulator.substeps,
             path.total_delay(effects),
             "linear" if straight else "zero",
+            (0, commands.shape[1]),
         )
         means, rises = means[:, kept : kept + 1], rises[:, kept : kept + 1]
         for lag in path.lags(effects):

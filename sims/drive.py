@@ -8,13 +8,16 @@ it, every jump inside a sub-step would leave a lasting error of the position.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sims.compiled import compiled, inlined
 from sims.effects.actuator import ActuatorEffect, ActuatorLag, Delay, StaticActuatorEffect
 from sims.simulator import Array, Hold
+
+Integers = NDArray[np.int64]
 
 
 def column(value: float | Array) -> float | Array:
@@ -45,7 +48,12 @@ def lags(effects: Iterable[ActuatorEffect]) -> list[ActuatorLag]:
 
 
 def substep_inputs(
-    samples: Array, durations: Array, substeps: int, delay: float | Array, hold: Hold
+    samples: Array,
+    durations: Array,
+    substeps: int,
+    delay: float | Array,
+    hold: Hold,
+    bounds: Sequence[int],
 ) -> tuple[Array, Array]:
     """Mean and rise of a delayed input in every sub-step.
 
@@ -58,68 +66,64 @@ def substep_inputs(
         substeps: Equal sub-steps in each interval.
         delay: Seconds, scalar or (rows,).
         hold: ``"zero"``: each value is held over its interval; ``"linear"``: the input runs
-            straight to the next value (and holds the last one). Before the first sample the
-            input has its first value.
+            straight to the next value (and holds the last one).
+        bounds: Where each record begins, and T. Before its first sample the input has its first
+            value.
 
     Returns:
         Means and rises, each (rows, T, substeps).
     """
-    rows = len(samples)
-    following = np.concatenate([samples[:, 1:], samples[:, -1:]], axis=1)
-    slope = (following - samples) if hold == "linear" else np.zeros_like(samples)
+    slope = np.zeros_like(samples)
+    if hold == "linear":
+        slope[:, :-1] = np.diff(samples, axis=1)
+        slope[:, np.asarray(bounds[1:]) - 1] = 0.0
     middles = (np.arange(substeps) + 0.5) / substeps
-    prompt = samples[:, :, None] + slope[:, :, None] * middles
-    prompt_rise = np.broadcast_to(slope[:, :, None] / substeps, prompt.shape)
-    late = np.broadcast_to(np.asarray(delay, float), (rows,))
-    if not late.any():
-        return prompt, prompt_rise
-    means, rises = prompt.copy(), np.array(prompt_rise)
-    starts = np.concatenate([[0.0], np.cumsum(durations)])
-    # Integrals of the input, and of its integral, up to every sample.
-    once = _running(samples * durations + 0.5 * slope * durations)
-    twice = _running(
-        once[:, :-1] * durations + 0.5 * samples * durations**2 + slope * durations**2 / 6
-    )
-    _delayed(np.ascontiguousarray(samples), slope, starts, once, twice, late, means, rises)
+    means = samples[:, :, None] + slope[:, :, None] * middles
+    rises = np.repeat(slope[:, :, None] / substeps, substeps, axis=2)
+    late = np.array(np.broadcast_to(np.asarray(delay, float), len(samples)))
+    if late.any():
+        values, ends = np.ascontiguousarray(samples), np.asarray(bounds, np.int64)
+        _delayed(values, slope, durations, ends, late, means, rises)
     return means, rises
 
 
 @compiled
 def _delayed(
-    samples: Array, slope: Array, starts: Array, once: Array, twice: Array, late: Array,
-    means: Array, rises: Array,
+    samples: Array, slope: Array, durations: Array, bounds: Integers, late: Array, means: Array,
+    rises: Array,
 ) -> None:  # fmt: skip
     """Writes means and rises of the rows that are late; see ``substep_inputs``."""
-    _, length, substeps = means.shape
+    substeps = means.shape[2]
     for v in range(len(means)):
         if not late[v] > 0:
             continue
-        k, before, below = 0, 0.0, 0.0
-        for at in range(length * substeps + 1):
-            t, s = divmod(at, substeps)
-            time = starts[t] - late[v]
-            if t < length:
-                time += (starts[t + 1] - starts[t]) * s / substeps
-            while k < length - 1 and starts[k + 1] <= time:
-                k += 1
-            into = time - starts[k]
-            steep = 0.0 if into < 0 else slope[v, k] / (starts[k + 1] - starts[k])
-            value, first = samples[v, k], once[v, k]
-            integral = first + into * (value + 0.5 * steep * into)
-            area = twice[v, k] + into * (first + into * (0.5 * value + steep * into / 6))
-            if at > 0:
-                t, s = divmod(at - 1, substeps)
-                h = (starts[t + 1] - starts[t]) / substeps
-                means[v, t, s] = (integral - before) / h
-                # By parts: the moment about the middle is h (I0 + I1) / 2 - (A1 - A0).
-                moment = 0.5 * h * (before + integral) - (area - below)
-                rises[v, t, s] = 12 * moment / (h * h)
-            before, below = integral, area
-
-
-def _running(parts: Array) -> Array:
-    """Sums of the first 0, 1, 2, ... parts along the second axis."""
-    return np.concatenate([np.zeros((len(parts), 1)), np.cumsum(parts, axis=1)], axis=1)
+        for record in range(len(bounds) - 1):
+            stop = bounds[record + 1]
+            # Beside the sample that is received: when it began, and up to then the integral of
+            # the input and that of this integral.
+            k, begun, once, twice = bounds[record], 0.0, 0.0, 0.0
+            before, below, edge = 0.0, 0.0, 0.0
+            for t in range(bounds[record], stop):
+                h = durations[t] / substeps
+                for s in range(substeps + 1):
+                    time = edge + durations[t] * s / substeps - late[v]
+                    while k < stop - 1 and begun + durations[k] <= time:
+                        d = durations[k]
+                        twice += once * d + 0.5 * samples[v, k] * d**2 + slope[v, k] * d**2 / 6
+                        once += (samples[v, k] + 0.5 * slope[v, k]) * d
+                        begun += d
+                        k += 1
+                    into, value = time - begun, samples[v, k]
+                    steep = 0.0 if into < 0 else slope[v, k] / durations[k]
+                    integral = once + into * (value + 0.5 * steep * into)
+                    area = twice + into * (once + into * (0.5 * value + steep * into / 6))
+                    if s > 0:
+                        means[v, t, s - 1] = (integral - before) / h
+                        # By parts: the moment about the middle is h (I0 + I1) / 2 - (A1 - A0).
+                        moment = 0.5 * h * (before + integral) - (area - below)
+                        rises[v, t, s - 1] = 12 * moment / (h * h)
+                    before, below = integral, area
+                edge += durations[t]
 
 
 def lagged(

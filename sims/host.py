@@ -247,6 +247,7 @@ class HostSimulator(Simulator):
         hold: Hold | Sequence[Hold] | None = None,
         before: ArrayLike | None = None,
         rises: bool = False,
+        begins: Sequence[int] = (),
     ) -> Array:
         """Effective inputs of a recorded trajectory: its commands through the actuator path.
 
@@ -262,6 +263,8 @@ class HostSimulator(Simulator):
             rises: Whether to tell how the input runs within sub-steps too. ``integrate`` is
                 then more accurate after jumps between sub-steps, with lags, and with
                 ``hold="linear"``.
+            begins: Rows beside the first at which another record begins, of which the path
+                remembers nothing from before.
 
         Returns:
             Mean input of each sub-step, shape (T, substeps, n_a), or, if values of actuator
@@ -271,7 +274,7 @@ class HostSimulator(Simulator):
         Raises:
             ValueError: The shapes do not fit, or a duration is not positive.
         """
-        return driven(self, actions, durations, substeps, hold, before, rises)
+        return driven(self, actions, durations, substeps, hold, before, rises, begins)
 
     def sense(self, states: Array) -> Array:
         """What the sensors read of true states, (n, n_i) -> (n, n_i)."""

@@ -164,3 +164,19 @@ def test_durations_that_do_not_fit_are_explained():
         PENDULUM.drive([[1.0], [2.0]], [0.05])
     with pytest.raises(ValueError, match="positive"):
         PENDULUM.drive([[1.0], [2.0]], [0.05, -0.05])
+
+
+@pytest.mark.parametrize("hold", ["zero", "linear"])
+@pytest.mark.parametrize(
+    "effects",
+    [[], [Delay("voltage", 0.13)], [Delay("voltage", 0.02), ActuatorLag("voltage", 0.2)]],
+    ids=["prompt", "late", "late and lagging"],
+)
+def test_of_several_records_none_remembers_another(hold, effects):
+    rng = np.random.default_rng(3)
+    actions, durations = rng.standard_normal((30, 1)), rng.uniform(0.03, 0.06, 30)
+    simulator = PENDULUM.with_effects(effects)
+    together = simulator.drive(actions, durations, 4, hold, rises=True, begins=[7, 8, 21])
+    pieces = [slice(0, 7), slice(7, 8), slice(8, 21), slice(21, 30)]
+    alone = [simulator.drive(actions[p], durations[p], 4, hold, rises=True) for p in pieces]
+    assert np.array_equal(together, np.concatenate(alone))

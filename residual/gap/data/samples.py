@@ -41,6 +41,23 @@ class Recorded:
 
 
 @dataclasses.dataclass(frozen=True)
+class Commands:
+    """Inputs as recorded, of all runs.
+
+    Attributes:
+        actions: Action held from each sample to the next, shape (T, n_a).
+        durations: Seconds to the next sample, shape (T,).
+        own: Which were recorded; the others were held before a run, (T,).
+        begins: Where every run but the first begins.
+    """
+
+    actions: Array
+    durations: Array
+    own: NDArray[np.bool_]
+    begins: list[int]
+
+
+@dataclasses.dataclass(frozen=True)
 class Samples:
     """Samples of all runs, one row each, runs one after the other.
 
@@ -132,18 +149,40 @@ class Samples:
         """Sub-steps of a recorded interval."""
         return max(1, self.substeps // self.stride)
 
-    def in_intervals(self, run: int, driven: Array) -> Array:
-        """Inputs of recorded intervals put together to those of a run's rows.
+    @functools.cached_property
+    def commands(self) -> Commands:
+        """What was recorded of the inputs, all runs below each other."""
+        actions, durations, own = [], [], []
+        for recorded in self.recorded:
+            earlier = 0 if recorded.before is None else 1
+            if recorded.before is not None:
+                actions.append(recorded.before[None])
+            actions.append(recorded.actions)
+            durations += [recorded.durations[:earlier], recorded.durations]
+            own.append(np.arange(earlier + len(recorded.actions)) >= earlier)
+        begins = np.cumsum([len(one) for one in own])[:-1].tolist()
+        return Commands(
+            np.concatenate(actions), np.concatenate(durations), np.concatenate(own), begins
+        )
+
+    def in_intervals(self, driven: Array) -> Array:
+        """Inputs of recorded intervals put together to those of rows.
 
         Args:
-            run: Number of the run.
-            driven: Mean and rise in every sub-step of the recorded intervals,
+            driven: Mean and rise in every sub-step of the intervals of ``commands``,
                 (V, T, ``recorded_substeps``, n_a, 2).
 
         Returns:
             (V, rows, ``self.substeps``, n_a, 2).
         """
-        return driven if self.stride == 1 else self._merging[run].rows(driven)
+        if not self.commands.own.all():
+            driven = driven[:, self.commands.own]
+        if self.stride == 1:
+            return driven
+        ends = np.cumsum([len(recorded.actions) for recorded in self.recorded])
+        runs = np.split(driven, ends[:-1], axis=1)
+        parts = [one.rows(run) for one, run in zip(self._merging, runs, strict=True)]
+        return np.concatenate(parts, axis=1)
 
     @functools.cached_property
     def _merging(self) -> tuple[Merging, ...]:

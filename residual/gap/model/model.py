@@ -131,18 +131,13 @@ class Model:
         if key not in self._drives:
             if len(self._drives) > 4:
                 self._drives.clear()
-            host = self.bind(theta)
-            parts = []
-            fine = samples.recorded_substeps
-            for run, recorded in enumerate(samples.recorded):
-                before = None if recorded.before is None else recorded.before[None]
-                part = host.drive(
-                    recorded.actions, recorded.durations, fine, before=before, rises=True
-                )
-                parts.append(samples.in_intervals(run, part if part.ndim == 5 else part[None]))
-            rows = max(len(part) for part in parts)
-            parts = [np.broadcast_to(p, (rows, *p.shape[1:])) for p in parts]
-            self._drives[key] = (samples, np.concatenate(parts, axis=1))
+            commands = samples.commands
+            driven = self.bind(theta).drive(
+                commands.actions, commands.durations, samples.recorded_substeps, rises=True,
+                begins=commands.begins,
+            )  # fmt: skip
+            driven = samples.in_intervals(driven if driven.ndim == 5 else driven[None])
+            self._drives[key] = (samples, driven)
         return self._drives[key][1]
 
     def advance(

@@ -45,7 +45,7 @@ def test_inputs_between_rows_keep_their_integral_wherever_the_readings_are(strid
     rows = samples.recorded[0].rows
     held = run.actions[:, 0]
     driven = np.append(held, held[-1])[None, :, None, None, None] * np.array([1.0, 0.0])
-    found = samples.in_intervals(0, driven)[0, :-1, 0, 0, 0]
+    found = samples.in_intervals(driven)[0, :-1, 0, 0, 0]
     parts = [(held * run.durations)[a:b].sum() for a, b in itertools.pairwise(rows)]
     np.testing.assert_allclose(found * samples.durations[:-1], parts)
 
