@@ -1,4 +1,4 @@
-"""Whether positions and their measured rates are on one scale."""
+"""Whether positions and their measured rates are on one scale, and tell of one time."""
 
 from __future__ import annotations
 
@@ -18,6 +18,10 @@ Array = NDArray[np.float64]
 
 #: Values of a position that tell nothing of a scale.
 FEW = 8
+#: Sampling steps by which a rate may be early or late for the way in which it was computed.
+LATE = 0.75
+
+Rule = Callable[[Array, Array], float]
 
 
 def kinematics(
@@ -26,7 +30,8 @@ def kinematics(
     """Compare the change of each position with the integral of its measured rate.
 
     A rate on another scale than its position is a fault of the log, not of the simulator; left
-    alone it would be taken for missing physics. It is put on the position's scale.
+    alone it would be taken for missing physics. It is put on the position's scale. A sensor that
+    is late beside the other is told.
 
     Args:
         simulator: Gives the channels.
@@ -42,54 +47,109 @@ def kinematics(
         if channel.kind != "rate" or channel.rate_of not in names:
             continue
         position = names.index(channel.rate_of)
-        scale, error = _scale(runs, position, column, _simpson)
-        rough, _ = _scale(runs, position, column, np.trapezoid)
+        fine, rough = (_Stretches.of(runs, position, column, rule) for rule in RULES)
+        if fine is None or rough is None:
+            continue
+        (scale, error), (other, _) = fine.scale(), rough.scale()
         # Two rules that disagree say that the sampling is too coarse for this check.
-        fine = abs(scale - rough) < 0.25 * abs(scale - 1)
-        if fine and abs(scale - 1) > max(4 * error, 0.005):
+        if abs(scale - other) < 0.25 * abs(scale - 1) and abs(scale - 1) > max(4 * error, 0.005):
             says = (
                 f"{channel.rate_of} changes {scale:.4f} times as much as the integral of "
                 f"{channel.name}: {channel.name} was multiplied by {scale:.4f}"
             )
             findings.append(Finding("kinematics", channel.name, says, {"scale": scale}, "warning"))
             runs = [_multiplied(run, column, scale) for run in runs]
+        (late, error), (other, _) = fine.late(), rough.late()
+        least = max(5 * error, LATE * fine.step)
+        if abs(late) > least and abs(late - other) < 0.25 * abs(late):
+            findings.append(_late(channel.rate_of, channel.name, late))
     return runs, findings
 
 
-def _scale(
-    runs: Sequence[Trajectory], position: int, rate: int, rule: Callable[[Array, Array], float]
-) -> tuple[float, float]:
-    """Change of the position per integral of the rate, with its standard error over stretches."""
-    moved, integrals, noises = [], [], []
-    seen = np.concatenate([run.states[:, position] for run in runs])
-    if len(np.unique(seen[np.isfinite(seen)])) < FEW:
-        return np.nan, np.inf
-    for run in runs:
-        x, v = run.states[:, position], run.states[:, rate]
-        for a in range(0, len(run) - 7, 8):
-            part = slice(a, a + 9)
-            if np.isfinite(x[part]).all() and np.isfinite(v[part]).all():
-                times = run.times[part]
-                moved.append(x[part][-1] - x[part][0])
-                integrals.append(float(rule(v[part], times)))
-                noises.append((_roughness(x[part], times), _roughness(v[part], times)))
-    if len(moved) < 10:
-        return np.nan, np.inf
-    y, z = np.array(moved), np.array(integrals)
-    of_x, of_v = np.median(np.array(noises), axis=0)
-    # Where most readings repeat, a cubic leaves nothing, and rounding is all the noise there is.
-    of_x = max(of_x, rounding([run.states[:, position] for run in runs]) ** 2 / 12)
-    of_v = max(of_v, rounding([run.states[:, rate] for run in runs]) ** 2 / 12)
-    step = float(np.median([np.median(run.durations) for run in runs]))
-    # Variance of the change (two readings) and of the integral (eight steps of readings).
-    in_y, in_z = max(2 * of_x, 1e-300), max(8 * step**2 * of_v, 1e-300)
-    if z @ z < 4 * len(z) * in_z:
-        return np.nan, np.inf
-    scale = _through_origin(z, y, in_y / in_z)
-    left = y - scale * z
-    # Both have noise, so the part of the residual that belongs to z goes back to it.
-    cleaned = z + left * scale * in_z / (in_y + scale**2 * in_z)
-    return scale, float(np.linalg.norm(left * cleaned) / (cleaned @ cleaned))
+def _late(position: str, rate: str, late: float) -> Finding:
+    """That one of two sensors of one motion is late."""
+    behind, ahead = (position, f"the integral of {rate}") if late > 0 else (rate, position)
+    says = (
+        f"{behind} comes {abs(late):.2g} s after {ahead}: one of the two sensors is late or "
+        "filtered, which no effect of the library is; shift its column by that, or leave one of "
+        "the two out"
+    )
+    return Finding("late", behind, says, {"seconds": abs(late)}, "warning")
+
+
+@dataclasses.dataclass(frozen=True)
+class _Stretches:
+    """What a position and its rate do in stretches of eight steps.
+
+    Attributes:
+        moved: Change of the position.
+        integral: Of the rate.
+        faster: Change of the rate.
+        of_position, of_rate: Variances of their noise.
+        step: Seconds between two samples.
+    """
+
+    moved: Array
+    integral: Array
+    faster: Array
+    of_position: float
+    of_rate: float
+    step: float
+
+    @classmethod
+    def of(
+        cls, runs: Sequence[Trajectory], position: int, rate: int, rule: Rule
+    ) -> _Stretches | None:
+        """None if there are too few of them, or readings, to tell anything."""
+        rows, noises = [], []
+        seen = np.concatenate([run.states[:, position] for run in runs])
+        if len(np.unique(seen[np.isfinite(seen)])) < FEW:
+            return None
+        for run in runs:
+            x, v = run.states[:, position], run.states[:, rate]
+            for a in range(0, len(run) - 7, 8):
+                part = slice(a, a + 9)
+                if np.isfinite(x[part]).all() and np.isfinite(v[part]).all():
+                    times, q, dq = run.times[part], x[part], v[part]
+                    rows.append((q[-1] - q[0], float(rule(dq, times)), dq[-1] - dq[0]))
+                    noises.append((_roughness(q, times), _roughness(dq, times)))
+        if len(rows) < 10:
+            return None
+        of_x, of_v = np.median(np.array(noises), axis=0)
+        # Where most readings repeat, a cubic leaves nothing, and rounding is all their noise.
+        of_x = max(of_x, rounding([run.states[:, position] for run in runs]) ** 2 / 12)
+        of_v = max(of_v, rounding([run.states[:, rate] for run in runs]) ** 2 / 12)
+        step = float(np.median([np.median(run.durations) for run in runs]))
+        moved, integral, faster = np.array(rows).T
+        return cls(moved, integral, faster, of_x, of_v, step)
+
+    def scale(self) -> tuple[float, float]:
+        """Change of the position per integral of the rate, with its standard error."""
+        y, z = self.moved, self.integral
+        # Variance of the change (two readings) and of the integral (eight steps of readings).
+        in_y = max(2 * self.of_position, 1e-300)
+        in_z = max(8 * self.step**2 * self.of_rate, 1e-300)
+        if z @ z < 4 * len(z) * in_z:
+            return np.nan, np.inf
+        scale = _through_origin(z, y, in_y / in_z)
+        left = y - scale * z
+        # Both have noise, so the part of the residual that belongs to z goes back to it.
+        cleaned = z + left * scale * in_z / (in_y + scale**2 * in_z)
+        return scale, float(np.linalg.norm(left * cleaned) / (cleaned @ cleaned))
+
+    def late(self) -> tuple[float, float]:
+        """Seconds by which the position comes after the integral of its rate, with their error.
+
+        A position that comes T late lacks T times by how much the rate grew. Noise of the rate
+        makes it look less late than it is.
+        """
+        y, both = self.moved, np.stack([self.integral, self.faster], axis=1)
+        if self.faster @ self.faster < 8 * len(y) * self.of_rate:
+            return np.nan, np.inf
+        found, *_ = np.linalg.lstsq(both, y, rcond=None)
+        inverse = np.linalg.pinv(both.T @ both)
+        left = (y - both @ found)[:, None] * both
+        return -float(found[1]), float(np.sqrt((inverse @ (left.T @ left) @ inverse)[1, 1]))
 
 
 def _through_origin(z: Array, y: Array, ratio: float) -> float:
@@ -122,3 +182,7 @@ def _multiplied(run: Trajectory, column: int, factor: float) -> Trajectory:
     states = np.array(run.states, float)
     states[:, column] *= factor
     return dataclasses.replace(run, states=states)
+
+
+#: Of which the first is the better one.
+RULES: tuple[Rule, Rule] = (_simpson, np.trapezoid)

@@ -45,6 +45,42 @@ def test_noise_in_the_rate_is_not_taken_for_a_smaller_scale():
     assert kinematics(PendulumEquation(), logs) == (logs, [])
 
 
+def two_sensors(late_angle, late_rate, noise, seed):
+    """Readings every 10 ms of an angle and its rate, each late by a time and with noise of a share
+    of what it spans; several sines of up to 2 Hz."""
+    rng = np.random.default_rng(seed)
+    pace, size, phase = rng.uniform(1, 12, 5), rng.uniform(0.1, 0.5, 5), rng.uniform(0, 6, 5)
+    times = 0.01 * np.arange(1500)
+    at = np.multiply.outer(times - late_angle, pace) + phase
+    angle = np.pi + np.sin(at) @ size
+    at = np.multiply.outer(times - late_rate, pace) + phase
+    states = np.stack([angle, np.cos(at) @ (size * pace)], axis=1)
+    states += noise * np.ptp(states, axis=0) * rng.standard_normal(states.shape)
+    return [Trajectory("run", times, states, np.zeros((1499, 1)))]
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 5e-3])
+@pytest.mark.parametrize(
+    ("angle", "rate", "who"), [(0.03, 0.0, "angle"), (0.0, 0.02, "rate"), (0.05, 0.03, "angle")]
+)
+def test_a_sensor_that_is_late_beside_the_other_is_told(angle, rate, who, noise):
+    logs = two_sensors(angle, rate, noise, 7)
+    runs, found = kinematics(PendulumEquation(), logs)
+    assert runs == logs  # nothing is moved
+    (finding,) = found
+    assert (finding.kind, finding.where) == ("late", who)
+    assert finding.numbers["seconds"] == pytest.approx(abs(angle - rate), rel=0.15)
+    assert "late or filtered" in finding.says
+
+
+@given(
+    late=st.floats(0, 0.2), noise=st.sampled_from([1e-4, 3e-3, 1e-2, 3e-2]), seed=st.integers(0, 99)
+)
+@settings(max_examples=25, deadline=None)
+def test_sensors_that_are_equally_late_are_not_told_apart(late, noise, seed):
+    assert kinematics(PendulumEquation(), two_sensors(late, late, noise, seed))[1] == []
+
+
 def test_times_in_ms_are_refused():
     (run,) = swings(1.0)
     examine(PendulumEquation(), [run])
