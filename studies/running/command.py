@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 
 import jsonargparse
 import yaml
+from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from simgap_files import safe_yaml
 from sims.loading import in_file, not_found
@@ -28,6 +29,12 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 # How jsonargparse begins a list of all classes that it knows.
 _LISTED = ", known subclasses: "
 _IMPORT_PATH = re.compile(r"\w+(\.\w+)+")
+# What numbers of these types are, in words.
+_NUMBERS: dict[Any, str] = {
+    PositiveFloat: "a number above 0",
+    NonNegativeFloat: "a number, 0 or more",
+    PositiveInt: "a whole number, 1 or more",
+}
 
 
 # Files of settings that were given, by path with their option, to say where something is wrong.
@@ -58,6 +65,7 @@ class Parser(jsonargparse.ArgumentParser):
         options.setdefault("epilog", says)
         super().__init__(*given, **options)
         self._given: Any = None
+        self._words: list[str] = []
 
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, *rest: Any, **options: Any
@@ -67,10 +75,14 @@ class Parser(jsonargparse.ArgumentParser):
         kinds = {o: getattr(a, "_typehint", None) for a in self._actions for o in a.option_strings}
         lists = {name for name, kind in kinds.items() if typing.get_origin(kind) in (list, tuple)}
         given = _with_lists(list(sys.argv[1:] if args is None else args), lists)
+        self._words = given
         try:
             for i, text in enumerate(given):
                 name, equals, value = text.partition("=")
-                _check_given(name, value if equals else "".join(given[i + 1 : i + 2]))
+                if not equals:
+                    value = "".join(given[i + 1 : i + 2])
+                _check_given(name, value)
+                _check_number(name, value, kinds.get(name))
                 if name in _SIMULATORS and equals:
                     given[i] = f"{name}={_simulator(value)}"
                 elif name in _SIMULATORS and i + 1 < len(given):
@@ -116,8 +128,20 @@ class Parser(jsonargparse.ArgumentParser):
         """Say what is wrong and how to learn more, in one line."""
         unknown = self._unknown() if isinstance(ex, KeyError) else ""
         reason = unknown or re.sub(r"\s*\n\s*-?\s*", " ", str(message).strip())
+        if ex is None:  # of the words that were given, not of what one of them means
+            reason += self._likely(message)
         sys.stderr.write(f"error: {reason} (see --help)\n")
         raise SystemExit(2)
+
+    def _likely(self, message: str) -> str:
+        """The option that is likely meant by a word that is none and that an error tells."""
+        known = [option for action in self._actions for option in action.option_strings]
+        for word in self._words:
+            name = word.partition("=")[0]
+            if name.startswith("--") and name not in known and name in message:
+                near = difflib.get_close_matches(name, known, 1)
+                return f"; did you mean {near[0]}?" if near else ""
+        return ""
 
     def _unknown(self) -> str:
         """The first setting given that there is not, with its place; empty if there is none."""
@@ -216,6 +240,22 @@ def _check_given(name: str, value: str) -> None:
         lacking = in_file(value) or (not_found(value) if path else "")
     if lacking:
         raise ValueError(f"{name}: {lacking}")
+
+
+def _check_number(name: str, value: str, kind: Any) -> None:
+    """Refuse what is no number, or beyond its bounds, before the parser says so in many words.
+
+    Raises:
+        ValueError: The message names the option and what was expected.
+    """
+    kinds = typing.get_args(kind) or (kind,)
+    number = next((one for one in kinds if one in _NUMBERS), None)
+    if number is None or (type(None) in kinds and value in ("null", "None")):
+        return
+    try:
+        number(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} {value}: expected {_NUMBERS[number]}") from None
 
 
 def _settings(source: str | Path) -> dict[str, Any] | None:

@@ -216,8 +216,13 @@ SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
         ("learn", (*SYSTEM, "--corrected", "none.yaml"), "--corrected none.yaml: there is no"),
         ("learn", (*SYSTEM, "--estimator", "residual.No"), "--estimator: there is no class res"),
         ("learn", (*SYSTEM, "--estimator", "sklearn.cluster.KMeans"), "is no regressor (clus"),
+        ("find_gap", (*SIMULATOR, "--parameter_tolerance", "-1"), "expected a number, 0"),
         ("learn", ("--system", "sims.simulator.wrap"), "cannot be called without argu"),
         ("learn", (*SYSTEM, "--backend", "dask"), "--backend dask runs the trials of a grid"),
+        ("learn", (*SYSTEM, "--ddpg.hiden", "9"), "--ddpg.hiden 9; did you mean --ddpg.hidden?"),
+        ("find_gap", (*SIMULATOR, "--minuts", "3"), "--minuts 3; did you mean --minutes?"),
+        ("find_gap", (*SIMULATOR, "--horizon", "0"), "--horizon 0: expected a number above 0"),
+        ("find_gap", (*SIMULATOR, "--jobs=two"), "--jobs two: expected a whole number, 1 or more"),
     ],
 )  # fmt: skip
 def test_what_is_not_there_is_named(name, arguments, says, capsys, tmp_path, monkeypatch):
