@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -141,14 +140,11 @@ def recorded_inputs(
         means, rises = path.substep_inputs(samples, durations, substeps, late, holds[j], bounds)
         for lag in path.lags(effects):
             shape = (lag.rows or len(means), *means.shape[1:])
-            means, rises = np.array(np.broadcast_to(means, shape)), np.broadcast_to(rises, shape)
-            rises = np.array(rises)
-            for begin, end in itertools.pairwise(bounds):
-                one = slice(begin, end)
-                start = np.broadcast_to(samples[:, begin], len(means))
-                means[:, one], rises[:, one], _ = simulator.lagged(
-                    means[:, one], rises[:, one], durations[one], lag.time_constant, start
-                )
+            means, rises = np.broadcast_to(means, shape), np.broadcast_to(rises, shape)
+            start = np.broadcast_to(samples[:, bounds[:-1]], (len(means), len(bounds) - 1))
+            means, rises, _ = simulator.lagged(
+                means, rises, durations, lag.time_constant, start, bounds
+            )
         columns.append(np.stack([means, rises], axis=-1))
     if not columns:
         return np.empty((1, len(commands), substeps, 0, 2))
@@ -198,8 +194,9 @@ def next_inputs(
         means, rises = means[:, kept : kept + 1], rises[:, kept : kept + 1]
         for lag in path.lags(effects):
             means, rises, after[:, at] = simulator.lagged(
-                means, rises, np.array([simulator.dt]), lag.time_constant, memory[:, at]
-            )
+                means, rises, np.array([simulator.dt]), lag.time_constant, memory[:, at, None],
+                (0, 1),
+            )  # fmt: skip
             at += 1
         inputs[:, :, j] = np.stack([means[:, 0], rises[:, 0]], axis=-1)
     return inputs, after

@@ -132,6 +132,7 @@ def lagged(
     durations: Array,
     time_constant: float | Array,
     start: Array,
+    bounds: Sequence[int],
 ) -> tuple[Array, Array, Array]:
     """First-order filter of an input that runs straight in each sub-step, exactly.
 
@@ -139,28 +140,44 @@ def lagged(
         means, rises: (rows, T, substeps).
         durations: (T,) seconds.
         time_constant: Seconds, scalar or (rows,); zero leaves the input as it is.
-        start: (rows,) output before the first sub-step.
+        start: Output before the first sub-step of each record, (rows, records).
+        bounds: Where each record begins, and T.
 
     Returns:
         Means and rises of the output, same shapes, and its last value, (rows,).
     """
-    constants = np.array(np.broadcast_to(np.asarray(time_constant, float), len(means)))
+    given = contiguous(means, rises, durations, time_constant, start, bounds)
     filtered, tilted = np.empty(means.shape), np.empty(means.shape)
-    y = np.array(np.broadcast_to(start, len(means)), float)
-    lengths = np.ascontiguousarray(durations, dtype=float)
-    _filtered(means, rises, lengths, constants, filtered, tilted, y)
-    return filtered, tilted, y
+    return filtered, tilted, _filtered(*given, filtered, tilted)
+
+
+def contiguous(
+    means: Array, rises: Array, durations: Array, time_constant: float | Array, start: Array,
+    bounds: Sequence[int],
+) -> tuple[Array, Array, Array, Array, Array, Integers]:  # fmt: skip
+    """Arguments of ``lagged`` as compiled code wants them, the time constant for every row."""
+    constants = np.broadcast_to(np.asarray(time_constant, float), len(means))
+    return (
+        np.ascontiguousarray(means, float), np.ascontiguousarray(rises, float),
+        np.ascontiguousarray(durations, float), np.ascontiguousarray(constants),
+        np.ascontiguousarray(start, float), np.asarray(bounds, np.int64),
+    )  # fmt: skip
 
 
 @compiled
 def _filtered(
-    means: Array, rises: Array, durations: Array, constants: Array, filtered: Array,
-    tilted: Array, y: Array,
-) -> None:  # fmt: skip
-    """Writes the output of ``lagged``; ``y`` holds where it begins, and then where it ends."""
+    means: Array, rises: Array, durations: Array, constants: Array, start: Array,
+    bounds: Integers, filtered: Array, tilted: Array,
+) -> Array:  # fmt: skip
+    """Writes means and rises of the output of ``lagged``, and returns where it ends."""
     rows, length, substeps = means.shape
+    y = np.empty(rows)
     for v in range(rows):
+        record = 0
         for t in range(length):
+            if t == bounds[record]:
+                y[v] = start[v, record]
+                record += 1
             ratio = durations[t] / substeps / constants[v]
             stays = np.exp(-ratio)
             share, tilt = -np.expm1(-ratio) / ratio, _tilt(ratio)
@@ -173,6 +190,7 @@ def _filtered(
                 filtered[v, t, s] = means[v, t, s] - behind + lack * share
                 tilted[v, t, s] = rises[v, t, s] + lack * tilt
                 y[v] = stays * y[v] + last - first * stays
+    return y
 
 
 @inlined

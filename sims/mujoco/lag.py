@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from sims.drive import column
+from sims.compiled import compiled
+from sims.drive import Integers, contiguous
 from sims.simulator import Array
 
 
@@ -14,6 +17,7 @@ def lagged_at_ends(
     durations: Array,
     time_constant: float | Array,
     start: Array,
+    bounds: Sequence[int],
 ) -> tuple[Array, Array, Array]:
     """First-order filter of an input that is held in each sub-step, sampled at its end.
 
@@ -21,26 +25,28 @@ def lagged_at_ends(
     corrected model file moves as the corrected simulator. Arguments and values are those of
     ``sims.drive.lagged``; rises are zero.
     """
-    substeps = means.shape[2]
-    constants = np.broadcast_to(np.asarray(time_constant, float), len(means))
-    with np.errstate(divide="ignore"):
-        ratio = (durations / substeps) / constants[:, None]
-    stays = np.exp(-ratio)
-    gained = means * -np.expm1(-ratio)[..., None]
-    # Only from interval to interval is it a recursion in Python; inside, all rows at once.
-    added = np.zeros_like(ratio)
-    for i in range(substeps):
-        added = added * stays + gained[:, :, i]
-    kept = stays**substeps
-    begins = np.empty_like(ratio)
-    y = np.array(np.broadcast_to(start, len(means)), float)
-    for k in range(ratio.shape[1]):
-        begins[:, k] = y
-        y = kept[:, k] * y + added[:, k]
-    ends = np.empty_like(means)
-    now = begins
-    for i in range(substeps):
-        now = stays * now + gained[:, :, i]
-        ends[:, :, i] = now
-    there = np.asarray(column(constants))[..., None] > 0
-    return np.where(there, ends, means), np.zeros_like(means), y
+    given = contiguous(means, rises, durations, time_constant, start, bounds)
+    ends = np.empty(means.shape)
+    return ends, np.zeros(means.shape), _at_ends(*given, ends)
+
+
+@compiled
+def _at_ends(
+    means: Array, _: Array, durations: Array, constants: Array, start: Array, bounds: Integers,
+    ends: Array,
+) -> Array:  # fmt: skip
+    """Writes the output, and returns where it ends, (rows,)."""
+    rows, length, substeps = means.shape
+    y = np.empty(rows)
+    for v in range(rows):
+        record = 0
+        for t in range(length):
+            if t == bounds[record]:
+                y[v] = start[v, record]
+                record += 1
+            ratio = durations[t] / substeps / constants[v]
+            stays, comes = np.exp(-ratio), -np.expm1(-ratio)
+            for s in range(substeps):
+                y[v] = stays * y[v] + means[v, t, s] * comes
+                ends[v, t, s] = y[v]
+    return y
