@@ -54,10 +54,11 @@ def kinematics(
         # Two rules that disagree say that the sampling is too coarse for this check.
         if abs(scale - other) < 0.25 * abs(scale - 1) and abs(scale - 1) > max(4 * error, 0.005):
             says = (
-                f"{channel.rate_of} changes {scale:.4f} times as much as the integral of "
-                f"{channel.name}: {channel.name} was multiplied by {scale:.4f}"
+                f"changes {scale:.4f} times as much as the integral of {channel.name}: "
+                f"{channel.name} was multiplied by {scale:.4f}"
             )
-            findings.append(Finding("kinematics", channel.name, says, {"scale": scale}, "warning"))
+            numbers = {"scale": scale}
+            findings.append(Finding("kinematics", channel.rate_of, says, numbers, "warning"))
             runs = [_multiplied(run, column, scale) for run in runs]
         (late, error), (other, _) = fine.late(), rough.late()
         least = max(5 * error, LATE * fine.step)
@@ -70,7 +71,7 @@ def _late(position: str, rate: str, late: float) -> Finding:
     """That one of two sensors of one motion is late."""
     behind, ahead = (position, f"the integral of {rate}") if late > 0 else (rate, position)
     says = (
-        f"{behind} comes {abs(late):.2g} s after {ahead}: one of the two sensors is late or "
+        f"comes {abs(late):.2g} s after {ahead}: one of the two sensors is late or "
         "filtered, which no effect of the library is; shift its column by that, or leave one of "
         "the two out"
     )

@@ -37,6 +37,8 @@ THROUGH = 0.1
 #: Residual over noise of the nominal simulator that has to be explained, and of what explains it;
 #: or the residual of that as a part of the motion itself.
 FAR, CLOSE, UNMOVED = 3.0, 1.5, 0.2
+#: Part of the largest command by which an input is negative by chance, and of the time.
+SLIGHTLY, SELDOM = 0.02, 0.05
 #: Part of two effects that is left of both together, below which they undo each other.
 UNDONE = 0.25
 
@@ -160,15 +162,31 @@ def gross(effect: Effect, simulator: HostSimulator, samples: Samples) -> bool:
     return bool(np.max(np.abs(effect.offset)) > USUAL * span)
 
 
-def surprises(fit: Fit) -> int:
-    """Effects of a fitted set that are larger than their kind usually is, end at a bound, or undo
-    nearly all of another.
+def surprises(fit: Fit, samples: Samples) -> int:
+    """Effects of a fitted set that are larger than their kind usually is, end at a bound, undo
+    nearly all of another, or make an input negative that never is.
 
     What a bound has stopped is no optimum: the data would have it elsewhere.
     """
     ended = {int(fit.model.owner[j]) for j in range(len(fit.theta)) if at_bound(fit, j)}
     own = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
-    return sum(effect.surprising or i in ended for i, effect in enumerate(own)) + undone(fit)
+    return sum(effect.surprising or i in ended for i, effect in enumerate(own)) + (
+        undone(fit) + _pulling(fit, samples)
+    )
+
+
+def _pulling(fit: Fit, samples: Samples) -> int:
+    """Inputs that a fitted set makes negative where their bounds say that they cannot be.
+
+    No heater cools, and no propeller on one side pulls: what looks so is a dead zone, or a load.
+    """
+    actions = fit.model.simulator.action_channels
+    one_sided = [j for j, channel in enumerate(actions) if channel.low == 0]
+    if not one_sided or not any(isinstance(c.effect, ActuatorEffect) for c in fit.model.chosen):
+        return 0
+    means = fit.model.inputs(samples, fit.theta[None])[0][..., one_sided, 0]
+    negative = means < -SLIGHTLY * samples.actions[:, one_sided].max(axis=0)
+    return int((negative.mean(axis=(0, 1)) > SELDOM).sum())
 
 
 def undone(fit: Fit) -> int:

@@ -133,9 +133,8 @@ class Search:
         return max(3, len(self.fitter.blocks.windows) // 2)
 
     def surprises(self, key: Key) -> int:
-        """Effects of a set that are larger than their kind usually is, end at a bound, or undo
-        nearly all of another."""
-        return surprises(self.tried[key])
+        """Effects of a set that are larger than usual, end at a bound, or are unlikely so."""
+        return surprises(self.tried[key], self.fitter.samples)
 
     def undone(self, key: Key) -> int:
         """Pairs of a set that undo nearly all of each other."""

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from oven import Oven, steps
 
 from residual.gap.data.samples import Samples
 from residual.gap.fitting import plausible
@@ -12,8 +13,10 @@ from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
 from residual.trajectories import Trajectory
 from sims.effects import (
+    ActuatorBias,
     ActuatorGain,
     DeadZone,
+    Delay,
     LinearSpring,
     ParameterChange,
     Saturation,
@@ -22,6 +25,7 @@ from sims.effects import (
     ViscousFriction,
 )
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel
 
 
 def built(effect, **values):
@@ -95,7 +99,7 @@ def test_a_limit_that_the_input_reaches_once_is_refused():
 
 def test_what_ends_at_a_bound_surprises():
     """It is no optimum: the bound has stopped it."""
-    model, theta, _ = built(LinearSpring("pivot"), stiffness=0.1, rest=0.2)
+    model, theta, samples = built(LinearSpring("pivot"), stiffness=0.1, rest=0.2)
     rest = [knob.field for knob in model.knobs].index("rest")
 
     def fit():
@@ -103,9 +107,32 @@ def test_what_ends_at_a_bound_surprises():
             model=model, theta=theta, by_knob=np.ones((1, 5, len(theta))), weights=np.ones(1)
         )
 
-    assert surprises(fit()) == 0
+    assert surprises(fit(), samples) == 0
     theta[rest] = model.knobs[rest].low
-    assert surprises(fit()) == 1
+    assert surprises(fit(), samples) == 1
+
+
+@pytest.mark.parametrize(
+    ("effect", "size", "low", "unlikely"),
+    [
+        (ActuatorBias("duty"), -0.3, 0.0, 1),
+        (ActuatorBias("duty"), -0.3, -1.0, 0),  # may be negative
+        (ActuatorBias("duty"), 0.3, 0.0, 0),
+        (DeadZone("duty"), 0.3, 0.0, 0),
+        (Delay("duty"), 3.0, 0.0, 0),
+    ],
+)
+def test_a_heater_that_would_cool_surprises(effect, size, low, unlikely):
+    """Where all commands are well above zero a bias is a dead zone; below, only one is possible."""
+
+    class Bounded(Oven):
+        action_channels = (Channel("duty", "1", "input", scale=0.5, low=low, high=1.0),)
+
+    samples = Samples.join([steps(0, [0.8, 0.1, 0.5, 0.2], 0.4)], 4)
+    (candidate,) = candidates(Bounded(), [effect], samples)
+    model, theta = Model(Bounded(), [candidate]), np.array([size])
+    fit = SimpleNamespace(model=model, theta=theta, by_knob=np.ones((1, 5, 1)), weights=np.ones(1))
+    assert surprises(fit, samples) == unlikely
 
 
 @pytest.mark.parametrize(("sizes", "pairs"), [
