@@ -21,6 +21,9 @@ _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
 
+#: A number with its unit behind it.
+_WITH_UNIT = re.compile(r"[-+]?[\d.,]*\d(?:[eE][-+]?\d+)? ?([^\W\d_]{1,4}|[%°µ]\w{0,3})")
+
 
 class LogError(ValueError):
     """A log cannot be used; the one-line message names file, row, column and the fix."""
@@ -155,7 +158,10 @@ class Table:
                 if text.lower() not in _MISSING:
                     comma = "," in text and decimal == "."
                     fix = "set decimal: ','" if comma else "correct the value or leave it empty"
-                    if looks_dated(text):
+                    if with_unit := _WITH_UNIT.fullmatch(text):
+                        unit = with_unit[1]
+                        fix = f"leave {unit} out of the cells, and say `unit: {unit}` of the column"
+                    elif looks_dated(text):
                         fix = f"write times in seconds, or {DATED}"
                     raise LogError(
                         f"found {shortened(text)}, expected a number; {fix}",

@@ -79,12 +79,15 @@ def by_place(names: Sequence[str]) -> list[str]:
 
 
 def found_once(findings: Iterable[tuple[Any, str]]) -> list[tuple[Any, str]]:
-    """What was found in files, equal findings as one: of ``run.csv and 2 more``."""
-    places: dict[Any, list[str]] = {}
+    """What was found in places, equal findings as one: of ``run.csv and 2 more``."""
+    places: dict[Any, dict[str, str]] = {}
     for what, where in findings:
-        places.setdefault(what, []).append(Path(where).name)
+        places.setdefault(what, {})[where] = Path(where).name
     return [
-        (what, names[0] + (f" and {len(names) - 1} more" if len(names) > 1 else ""))
+        (
+            what,
+            next(iter(names.values())) + (f" and {len(names) - 1} more" if len(names) > 1 else ""),
+        )
         for what, names in places.items()
     ]
 

@@ -45,6 +45,16 @@ def test_text_in_a_number_is_found_in_its_row(csv):
     assert message.startswith(f"{path}, row {row}, column 'voltage': found 'oops', expected a num")
 
 
+@pytest.mark.parametrize(("cell", "unit"), [("-100%", "%"), ("2.5 mV", "mV"), ("1e3°C", "°C")])
+def test_a_unit_in_a_cell_belongs_elsewhere(csv, cell, unit):
+    def change(lines):
+        return [*lines[:8], f"0.35,{cell},0,1", *lines[9:]]
+
+    message = error(csv(change))
+    assert "row 9, column 'angle': found " in message
+    assert message.endswith(f"leave {unit} out of the cells, and say `unit: {unit}` of the column")
+
+
 def test_a_comma_that_may_part_thousands_is_asked_for(csv):
     def change(lines):
         return [lines[0].replace(",", ";"), *(f"{i};0.1;1;1,50{i % 10}" for i in range(200))]
