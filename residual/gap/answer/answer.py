@@ -31,7 +31,7 @@ from residual.gap.confirmation.size import may_vanish
 from residual.gap.confirmation.tolerance import allow_for_parameters
 from residual.gap.fitting.forecasts import fitted_floor, main_channel, noise_floor
 from residual.gap.result import Gap, GapResult, Verdict
-from residual.gap.search.choice import helps, material
+from residual.gap.search.choice import better_fit, helps, material
 from residual.gap.search.exchange import add_exchanged
 from residual.gap.search.explain import FOOTNOTE, Explanation
 from residual.gap.search.imitation import imitated
@@ -47,6 +47,8 @@ NEAR_NOISE = 1.5
 #: Forecast error over that by noise alone beyond which something is missing although impacts hide
 #: it from the fit: the integration step makes some of it.
 PARTED = 2.0
+#: Part by which another set errs less that is asked in place of what is left of one.
+LIKELIER = 0.1
 #: Rise of the loss with inputs held the other way, as a share of it, that rules that out.
 OTHER_HOLD = 0.5
 
@@ -103,6 +105,7 @@ def confirm(
     """
     search, key = found.search, found.key if asked else ()
     leads: tuple[str, ...] = ()
+    asked_before = {key}
 
     def exchange(key: Key) -> None:
         add_exchanged(search, key, 0 if time.process_time() > until else RIVALS)
@@ -134,6 +137,7 @@ def confirm(
                 exchange(key)
                 continue
         if not lost:
+            leads = tuple(label for label in leads if label not in search.labels(key))
             return Answer(found, key, tuple(made), leads)
         # The one that matters least goes first: what is left may have fewer rivals.
         gone = lost[-1].number
@@ -141,6 +145,25 @@ def confirm(
         key, theta = search.merged(key, (), drop=(gone,))
         search.add({key: theta})
         exchange(key)
+        if not found.adequate:
+            key = likelier(search, key, asked_before)
+        asked_before.add(key)
+
+
+def likelier(search: Search, key: Key, asked: set[Key]) -> Key:
+    """What is left of a set, or another as small that forecasts clearly better.
+
+    What is left of the best set of three need not be the best set of two.
+
+    Args:
+        search: With what was tried.
+        key: What is left.
+        asked: Sets that lost a member already.
+    """
+    fewer = [k for k in search.usable() if len(k) <= len(key) and k not in asked]
+    small = [k for k in fewer if search.numbers(k) <= search.numbers(key)]
+    best = better_fit(search, small) if small else key
+    return best if (1 + LIKELIER) * search.error(best) < search.error(key) else key
 
 
 def summed_up(answer: Answer) -> Gap:

@@ -68,7 +68,7 @@ def choose(search: Search, enough: Callable[[Key], bool] = lambda _: False) -> C
     open_ = search.usable()
     best = min(open_, key=search.error)
     fewest = min(search.numbers(key) for key in open_ if as_good(search, key, best))
-    key = _better_fit(search, [key for key in open_ if search.numbers(key) <= fewest])
+    key = better_fit(search, [key for key in open_ if search.numbers(key) <= fewest])
     minor: list[int] = []
     passed: list[Key] = []
     while key:
@@ -140,7 +140,7 @@ def _fits_far_better(search: Search, key: Key, among: list[Key]) -> Key:
     likeliest = min(far, key=lambda k: score(search, k))
     least = score(search, likeliest) + search.fitter.tie(search.tried[()])
     near = [k for k in far if score(search, k) <= least]
-    return _better_fit(search, near)
+    return better_fit(search, near)
 
 
 def _ahead_by_one_block(search: Search, key: Key, other: Key) -> bool:
@@ -154,7 +154,7 @@ def _ahead_by_one_block(search: Search, key: Key, other: Key) -> bool:
     return all(search.currency.clearly(its, own, joint, True) <= 1.0 for joint in joints)
 
 
-def _better_fit(search: Search, keys: list[Key]) -> Key:
+def better_fit(search: Search, keys: list[Key]) -> Key:
     """The set that forecasts best, or one that is as good within chance, of sizes that surprise
     less, and fits better; of sets that no data tell apart the one with the least to be otherwise
     than was known, and of those that move exactly alike the one in the simulator's own terms."""
@@ -196,7 +196,7 @@ def _plainer(search: Search, key: Key, among: list[Key]) -> Key:
         and search.surprises(k) < search.surprises(key)
         and _does_as_well(search, k, key)
     ]
-    return _better_fit(search, near) if near else key
+    return better_fit(search, near) if near else key
 
 
 def _smaller(search: Search, key: Key, among: list[Key]) -> list[Key]:
