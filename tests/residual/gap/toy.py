@@ -106,6 +106,9 @@ class Toy:
     def undone(self, key):
         return int(key in self.undoing)
 
+    def labels(self, key):
+        return tuple(self.candidates[number].label for number in key)
+
     def usable(self):
         return [k for k in self.validated if k not in self.unfit and k not in self.refused]
 
