@@ -162,7 +162,9 @@ def likelier(search: Search, key: Key, asked: set[Key]) -> Key:
     """
     fewer = [k for k in search.usable() if len(k) <= len(key) and k not in asked]
     small = [k for k in fewer if search.numbers(k) <= search.numbers(key)]
-    best = better_fit(search, small) if small else key
+    if not small:
+        return key
+    best = better_fit(search, small)
     return best if (1 + LIKELIER) * search.error(best) < search.error(key) else key
 
 
