@@ -130,6 +130,7 @@ def test_a_killed_worker_loses_no_finished_trial(alone, cluster, tmp_path):
     assert not differing(tmp_path, alone)
 
 
+@pytest.mark.long  # tests/fuzz/soak.py does the same many times
 def test_a_killed_command_continues_with_what_is_missing(alone, cluster, tmp_path):
     command = [sys.executable, quick_gap.__file__, *arguments(tmp_path, *on(cluster))]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL)

@@ -21,6 +21,7 @@ from studies.robots.cases import NOISE, nominal
 from studies.robots.drives import measure
 
 
+@pytest.mark.long  # the ball below is a quicker system that strikes the ground
 def test_a_payload_is_found_and_windows_are_followed_past_impacts():
     simulator = nominal("hopper")
     logs = measure("hopper", {"mass of body torso": 0.6}, seed=1, runs=4)
