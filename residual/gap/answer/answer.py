@@ -31,7 +31,8 @@ from residual.gap.confirmation.size import may_vanish
 from residual.gap.confirmation.tolerance import allow_for_parameters
 from residual.gap.fitting.forecasts import fitted_floor, main_channel, noise_floor
 from residual.gap.result import Gap, GapResult, Verdict
-from residual.gap.search.choice import better_fit, helps, material
+from residual.gap.search.choice import better_fit
+from residual.gap.search.comparisons import helps, material
 from residual.gap.search.exchange import add_exchanged
 from residual.gap.search.explain import FOOTNOTE, Explanation
 from residual.gap.search.imitation import imitated
@@ -162,10 +163,8 @@ def likelier(search: Search, key: Key, asked: set[Key]) -> Key:
     """
     fewer = [k for k in search.usable() if len(k) <= len(key) and k not in asked]
     small = [k for k in fewer if search.numbers(k) <= search.numbers(key)]
-    if not small:
-        return key
-    best = better_fit(search, small)
-    return best if (1 + LIKELIER) * search.error(best) < search.error(key) else key
+    best = better_fit(search, small) if small else ()
+    return best if small and (1 + LIKELIER) * search.error(best) < search.error(key) else key
 
 
 def summed_up(answer: Answer) -> Gap:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from residual.gap.result import Rival
-from residual.gap.search.choice import material, reasons
+from residual.gap.search.comparisons import material
 from residual.gap.search.explain import Explanation
+from residual.gap.search.reasons import reasons
 from residual.gap.search.sets import Key
 
 #: Sets that are listed.

@@ -8,7 +8,7 @@ from residual.gap.answer.answer import Answer, summed_up, within_noise
 from residual.gap.confirmation.tolerance import allowed, calibrated
 from residual.gap.fitting.intervals import at_bound
 from residual.gap.model.candidates import Candidate
-from residual.gap.search.choice import takes_off
+from residual.gap.search.comparisons import takes_off
 from residual.gap.search.explain import FOOTNOTE
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from residual.gap.answer.answer import Answer
 from residual.gap.data.blocks import ENOUGH
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.search.choice import takes_off
+from residual.gap.search.comparisons import takes_off
 from residual.trajectories import Trajectory
 
 #: Share of the nominal simulator's squared error, all joints averaged, that lies in one block.

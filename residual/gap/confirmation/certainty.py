@@ -12,7 +12,7 @@ from residual.gap.confirmation.constancy import creeps
 from residual.gap.confirmation.numerics import at_half_step
 from residual.gap.fitting.intervals import bounded, deviations, ended
 from residual.gap.fitting.plausible import gross
-from residual.gap.search.choice import AT_ONE, no_match
+from residual.gap.search.comparisons import AT_ONE, no_match
 from residual.gap.search.exchange import exchanged, split
 from residual.gap.search.sets import Key, Search, all_but
 from residual.gap.search.significance import BETTER, score, tie

@@ -19,28 +19,34 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.search.currency import Currency
+from residual.gap.search.comparisons import (
+    ALIKE,
+    MATERIAL,
+    SAME,
+    TRIFLE,
+    as_good,
+    helps,
+    material,
+    no_match,
+)
 from residual.gap.search.known import departures, parameters
+from residual.gap.search.reasons import reasons
 from residual.gap.search.sets import Key, Search
 from residual.gap.search.significance import score
 
 Array = NDArray[np.float64]
 
-#: Part of the remaining error that an effect must take off: over all joints, or at one of them.
-MATERIAL, AT_ONE = 0.2, 0.3
-#: And of the nominal error.
-TRIFLE = 0.005
 #: Forecasts so many times as bad are not as good, whatever the chance is.
 NEAR = 1.5
-#: Loss over that of another set from which on a fit is no match, and the part of all blocks that
-#: the other set may forecast worse.
-NO_MATCH, ASTRAY = 9.0, 0.25
-#: The same where one block alone says that the other set forecasts better.
+#: Part of all blocks that a set which is no match for the fit of another may forecast better.
+ASTRAY = 0.25
+#: Loss over that of another set from which on a fit is no match where one block alone says that it
+#: forecasts better.
 FITS_BETTER = 2.0
+#: Effects, or parameters far off, by which a set of one number more has to depart less.
+LESS = 0.5
 #: Difference of the losses of sets that move exactly alike, as a share.
 ROUNDING = 1e-4
-#: Differences of relative errors below this are none, nor such below a part of the best error.
-SAME, ALIKE = 0.01, 0.1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,6 +88,7 @@ def choose(search: Search, enough: Callable[[Key], bool] = lambda _: False) -> C
         key = short
     if key:
         key = _fits_far_better(search, _plainer(search, key, open_), open_)
+        key = _less_departed(search, key, open_)
     if key and not helps(search, (), key):
         key = ()
     kept = tuple(number for number in dict.fromkeys(minor) if number not in key)
@@ -112,11 +119,6 @@ def gives_up(search: Search, key: Key, passed: Sequence[Key]) -> bool:
         if search.error(key) > max(least / (1 - MATERIAL) ** steps, least + steps * TRIFLE):
             return True
     return False
-
-
-def no_match(search: Search, key: Key, other: Key) -> bool:
-    """Whether a set leaves so much more of the data than another that it is out."""
-    return search.tried[key].merit > NO_MATCH * search.tried[other].merit
 
 
 def _fits_far_better(search: Search, key: Key, among: list[Key]) -> Key:
@@ -199,93 +201,25 @@ def _plainer(search: Search, key: Key, among: list[Key]) -> Key:
     return better_fit(search, near) if near else key
 
 
+def _less_departed(search: Search, key: Key, among: list[Key]) -> Key:
+    """A set of no more effects and one number more that forecasts no worse, and departs less from
+    what was known by half an effect or more: a spring beside a parameter within its tolerance,
+    before two parameters that are far off."""
+    near = [
+        k
+        for k in among
+        if len(k) <= len(key)
+        and search.numbers(k) == search.numbers(key) + 1
+        and search.error(k) <= search.error(key)
+        and search.surprises(k) <= search.surprises(key)
+        and departures(search, k) <= departures(search, key) - LESS
+    ]
+    return better_fit(search, near) if near else key
+
+
 def _smaller(search: Search, key: Key, among: list[Key]) -> list[Key]:
     """The best set of fewer free numbers, and the set without each member, best first."""
     fewer = [k for k in among if search.numbers(k) < search.numbers(key)]
     best = min(fewer, key=search.error)
     nested = [k for k in among if len(k) == len(key) - 1 and set(k) < set(key)]
     return sorted({best, *nested}, key=search.error)
-
-
-def as_good(search: Search, key: Key, best: Key) -> bool:
-    """Whether a set forecasts as well as the best at every joint: within chance, or next to it."""
-    currency = search.currency
-    own, its = (search.validated[k].squares for k in (key, best))
-    behind = currency.by_group(own) - currency.by_group(its)
-    slack = np.minimum(SAME, ALIKE * currency.by_group(its))
-    return all(
-        behind[group] <= slack[group] or currency.clearly(own, its, group) <= 1.0
-        for group in range(len(behind))
-    )
-
-
-def material(search: Search, smaller: Key, larger: Key) -> bool:
-    """Whether a set takes a fifth off what a smaller one leaves, or three tenths at one joint."""
-    squares = search.validated
-    return takes_off(search.currency, squares[smaller].squares, squares[larger].squares)
-
-
-def takes_off(currency: Currency, worse: Array, better: Array) -> bool:
-    """The same of mean squared errors of blocks, each (B, m)."""
-    before, after = currency.by_group(worse), currency.by_group(better)
-    gained = before - after
-    if gained.mean() <= 0:
-        return False
-    over_all = gained.mean() > max(MATERIAL * before.mean(), TRIFLE)
-    return bool(over_all or ((gained > AT_ONE * before) & (gained > TRIFLE)).any())
-
-
-def helps(search: Search, smaller: Key, larger: Key) -> bool:
-    """Whether a set forecasts better than a smaller one beyond a standard error."""
-    squares = search.validated
-    gained, error = search.currency.difference(squares[smaller].squares, squares[larger].squares)
-    return gained > error
-
-
-def reasons(search: Search, chosen: Key) -> dict[Key, str]:
-    """One reason for every set that was tried and not chosen."""
-    found = {}
-    own = search.error(chosen)
-    for key in search.tried:
-        if key == chosen:
-            continue
-        if key in search.unfit:
-            found[key] = "did not converge"
-        elif key in search.refused:
-            found[key] = search.refused[key]
-        elif search.error(key) > own + SAME:
-            found[key] = f"{search.error(key) / max(own, 1e-12):.2g} times the error" + _worst(
-                search, key, chosen
-            )
-        elif set(chosen) < set(key):
-            found[key] = _not_enough(search, key, chosen)
-        else:
-            found[key] = "as good, with as many or more numbers"
-    return found
-
-
-def _not_enough(search: Search, key: Key, chosen: Key) -> str:
-    """Why what a set holds beyond the chosen one is not asked for."""
-    taken = max(1 - search.error(key) / max(search.error(chosen), 1e-12), 0.0)
-    more = len(key) - len(chosen)
-    off = f"{100 * taken:.2g} % off what remains" + (f" with {more} effects more" * (more > 1))
-    if taken < 1 - (1 - MATERIAL) ** more:
-        return f"takes only {off}"
-    if as_good(search, chosen, key):
-        return f"takes {off}, no more than chance may"
-    if score(search, chosen) <= score(search, key):
-        return f"takes {off}, and fits no better"
-    return f"takes {off}, but these data do not establish it"
-
-
-def _worst(search: Search, key: Key, chosen: Key) -> str:
-    """The block in which a set falls behind most."""
-    currency, blocks = search.currency, search.fitter.blocks
-    behind = currency.by_block(search.validated[key].squares).sum(axis=1)
-    behind -= currency.by_block(search.validated[chosen].squares).sum(axis=1)
-    number = int(behind.argmax())
-    windows, samples = blocks.windows, search.fitter.samples
-    first = int((blocks.block == number).argmax())
-    start = samples.times[windows.index[first, 0]]
-    digits = 6 if start < 1e6 else 12  # of a date, counted from 1970
-    return f", most at {start:.{digits}g} s of {samples.names[windows.run[first]]}"

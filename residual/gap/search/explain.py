@@ -15,9 +15,10 @@ from residual.gap.fitting.noise import Noise
 from residual.gap.model.candidates import Candidate
 from residual.gap.preparation.effort import Effort
 from residual.gap.search.beam import extend, improves, run
-from residual.gap.search.choice import Choice, choose, reasons
+from residual.gap.search.choice import Choice, choose
 from residual.gap.search.continuation import add_handed_over
 from residual.gap.search.exchange import add_exchanged, add_pairs_exchanged
+from residual.gap.search.reasons import reasons
 from residual.gap.search.redundant import curves_in_place
 from residual.gap.search.sets import Key, Proposals, Search, Twins
 from residual.gap.search.significance import score, significant

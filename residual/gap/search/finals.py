@@ -13,8 +13,9 @@ from collections.abc import Callable
 
 from residual.gap.fitting.contract import Fitter
 from residual.gap.preparation.prepare import Prepared
-from residual.gap.search.choice import Choice, reasons
+from residual.gap.search.choice import Choice
 from residual.gap.search.explain import Explanation
+from residual.gap.search.reasons import reasons
 from residual.gap.search.sets import Key, Search
 from residual.gap.search.significance import score, significant, tie
 

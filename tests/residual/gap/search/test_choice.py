@@ -82,6 +82,22 @@ def test_what_would_be_surprisingly_large_comes_after_what_does_as_well():
     assert choose(Toy({(0,): 0.400, (3,): 0.201}, merits, surprising={3})).key == (3,)
 
 
+@pytest.mark.parametrize(
+    ("error", "mass", "first"),
+    [
+        (0.199, 0.02, (0, 3)),
+        (0.199, 0.30, (1, 4)),  # the mass would be far off, too
+        (0.205, 0.02, (1, 4)),  # forecasts worse
+    ],
+)
+def test_what_departs_less_may_have_one_number_more(error, mass, first):
+    """A spring and a mass off by 2 % come before two effects of one number each."""
+    known = PendulumEquation().parameters["mass"].value
+    toy = Toy({(1, 4): 0.200, (0, 3): error}, mass=mass * known)
+    toy.numbers = lambda key: len(key) + (3 in key)
+    assert choose(toy).key == first
+
+
 def test_a_surprise_has_to_be_better_by_more_than_a_tenth():
     """Each block says the same, so that chance excuses nothing."""
     assert choose(Toy({(0,): 0.215, (3,): 0.2})).key == (3,)

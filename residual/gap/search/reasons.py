@@ -1,0 +1,56 @@
+"""Why each set of effects was not chosen, in words."""
+
+from __future__ import annotations
+
+from residual.gap.search.comparisons import MATERIAL, SAME, as_good
+from residual.gap.search.sets import Key, Search
+from residual.gap.search.significance import score
+
+
+def reasons(search: Search, chosen: Key) -> dict[Key, str]:
+    """One reason for every set that was tried and not chosen."""
+    found = {}
+    own = search.error(chosen)
+    for key in search.tried:
+        if key == chosen:
+            continue
+        if key in search.unfit:
+            found[key] = "did not converge"
+        elif key in search.refused:
+            found[key] = search.refused[key]
+        elif search.error(key) > own + SAME:
+            found[key] = f"{search.error(key) / max(own, 1e-12):.2g} times the error" + _worst(
+                search, key, chosen
+            )
+        elif set(chosen) < set(key):
+            found[key] = _not_enough(search, key, chosen)
+        else:
+            found[key] = "as good, with as many or more numbers"
+    return found
+
+
+def _not_enough(search: Search, key: Key, chosen: Key) -> str:
+    """Why what a set holds beyond the chosen one is not asked for."""
+    taken = max(1 - search.error(key) / max(search.error(chosen), 1e-12), 0.0)
+    more = len(key) - len(chosen)
+    off = f"{100 * taken:.2g} % off what remains" + (f" with {more} effects more" * (more > 1))
+    if taken < 1 - (1 - MATERIAL) ** more:
+        return f"takes only {off}"
+    if as_good(search, chosen, key):
+        return f"takes {off}, no more than chance may"
+    if score(search, chosen) <= score(search, key):
+        return f"takes {off}, and fits no better"
+    return f"takes {off}, but these data do not establish it"
+
+
+def _worst(search: Search, key: Key, chosen: Key) -> str:
+    """The block in which a set falls behind most."""
+    currency, blocks = search.currency, search.fitter.blocks
+    behind = currency.by_block(search.validated[key].squares).sum(axis=1)
+    behind -= currency.by_block(search.validated[chosen].squares).sum(axis=1)
+    number = int(behind.argmax())
+    windows, samples = blocks.windows, search.fitter.samples
+    first = int((blocks.block == number).argmax())
+    start = samples.times[windows.index[first, 0]]
+    digits = 6 if start < 1e6 else 12  # of a date, counted from 1970
+    return f", most at {start:.{digits}g} s of {samples.names[windows.run[first]]}"
