@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from residual.gap.search.comparisons import MATERIAL, SAME, as_good
+from residual.gap.search.known import departures
 from residual.gap.search.sets import Key, Search
 from residual.gap.search.significance import score
 
@@ -19,14 +20,22 @@ def reasons(search: Search, chosen: Key) -> dict[Key, str]:
         elif key in search.refused:
             found[key] = search.refused[key]
         elif search.error(key) > own + SAME:
-            found[key] = f"{search.error(key) / max(own, 1e-12):.2g} times the error" + _worst(
-                search, key, chosen
-            )
+            found[key] = _errs_more(search, key, chosen)
         elif set(chosen) < set(key):
             found[key] = _not_enough(search, key, chosen)
-        else:
+        elif search.numbers(key) >= search.numbers(chosen):
             found[key] = "as good, with as many or more numbers"
+        elif departures(search, key) > departures(search, chosen):
+            found[key] = "as good, but departs more from what was known beforehand"
+        else:
+            found[key] = _errs_more(search, key, chosen)
     return found
+
+
+def _errs_more(search: Search, key: Key, chosen: Key) -> str:
+    """How much more a set errs, and where most."""
+    times = search.error(key) / max(search.error(chosen), 1e-12)
+    return f"{times:.2g} times the error" + _worst(search, key, chosen)
 
 
 def _not_enough(search: Search, key: Key, chosen: Key) -> str:
