@@ -263,8 +263,7 @@ class HostSimulator(Simulator):
             rises: Whether to tell how the input runs within sub-steps too. ``integrate`` is
                 then more accurate after jumps between sub-steps, with lags, and with
                 ``hold="linear"``.
-            begins: Rows beside the first at which another record begins, of which the path
-                remembers nothing from before.
+            begins: Rows at which another record begins: nothing from before is remembered.
 
         Returns:
             Mean input of each sub-step, shape (T, substeps, n_a), or, if values of actuator
