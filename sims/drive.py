@@ -146,22 +146,14 @@ def lagged(
     Returns:
         Means and rises of the output, same shapes, and its last value, (rows,).
     """
-    given = contiguous(means, rises, durations, time_constant, start, bounds)
-    filtered, tilted = np.empty(means.shape), np.empty(means.shape)
-    return filtered, tilted, _filtered(*given, filtered, tilted)
-
-
-def contiguous(
-    means: Array, rises: Array, durations: Array, time_constant: float | Array, start: Array,
-    bounds: Sequence[int],
-) -> tuple[Array, Array, Array, Array, Array, Integers]:  # fmt: skip
-    """Arguments of ``lagged`` as compiled code wants them, the time constant for every row."""
     constants = np.broadcast_to(np.asarray(time_constant, float), len(means))
-    return (
+    filtered, tilted = np.empty(means.shape), np.empty(means.shape)
+    last = _filtered(
         np.ascontiguousarray(means, float), np.ascontiguousarray(rises, float),
         np.ascontiguousarray(durations, float), np.ascontiguousarray(constants),
-        np.ascontiguousarray(start, float), np.asarray(bounds, np.int64),
+        np.ascontiguousarray(start, float), np.asarray(bounds, np.int64), filtered, tilted,
     )  # fmt: skip
+    return filtered, tilted, last
 
 
 @compiled

@@ -28,8 +28,7 @@ class Motion:
         drive_force: (q, v, u, parameters) -> (n_joints, n).
         parameters: Each a scalar or (n,).
         smooth, dry, plays: Effects with the number of the joint they act on.
-        by_force: Whether a force on a joint is an acceleration of that joint, and of no other, and
-            positions matter to nothing, as in first-order systems.
+        by_force: Whether a force on a joint is an acceleration of that joint, and of no other.
     """
 
     acceleration: Callable[[Array, Array, Array, Array, SimpleNamespace], Array]
@@ -139,12 +138,6 @@ def advance_smoothly(motion: Motion, state: State, u: Array, h: Array) -> State:
 
     q, v, x = state
     middle, half = 0.5 * (u[0] + u[1]), 0.5 * h
-    if motion.by_force:  # positions are not used
-        a1 = accelerations(q, v, u[0])
-        a2 = accelerations(q, v + half * a1, middle)
-        a3 = accelerations(q, v + half * a2, middle)
-        a4 = accelerations(q, v + h * a3, u[1])
-        return State(q, v + h / 6 * (a1 + 2 * (a2 + a3) + a4), x)
     a1 = accelerations(q, v, u[0])
     v2 = v + half * a1
     a2 = accelerations(q + half * v, v2, middle)

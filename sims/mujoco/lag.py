@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sims.compiled import compiled
-from sims.drive import Integers, contiguous
+from sims.drive import lagged
 from sims.simulator import Array
 
 
@@ -25,28 +24,13 @@ def lagged_at_ends(
     corrected model file moves as the corrected simulator. Arguments and values are those of
     ``sims.drive.lagged``; rises are zero.
     """
-    given = contiguous(means, rises, durations, time_constant, start, bounds)
-    ends = np.empty(means.shape)
-    return ends, np.zeros(means.shape), _at_ends(*given, ends)
-
-
-@compiled
-def _at_ends(
-    means: Array, _: Array, durations: Array, constants: Array, start: Array, bounds: Integers,
-    ends: Array,
-) -> Array:  # fmt: skip
-    """Writes the output, and returns where it ends, (rows,)."""
-    rows, length, substeps = means.shape
-    y = np.empty(rows)
-    for v in range(rows):
-        record = 0
-        for t in range(length):
-            if t == bounds[record]:
-                y[v] = start[v, record]
-                record += 1
-            ratio = durations[t] / substeps / constants[v]
-            stays, comes = np.exp(-ratio), -np.expm1(-ratio)
-            for s in range(substeps):
-                y[v] = stays * y[v] + means[v, t, s] * comes
-                ends[v, t, s] = y[v]
-    return y
+    through, tilts, last = lagged(
+        means, np.zeros(means.shape), durations, time_constant, start, bounds
+    )
+    constants = np.broadcast_to(np.asarray(time_constant, float), len(means))
+    with np.errstate(divide="ignore"):
+        ratio = durations / means.shape[2] / constants[:, None]
+    # Of what the output lacks at first so much is left at the end, over what is in the mean.
+    large = np.minimum(ratio, 700.0)
+    left = np.where(ratio < 700.0, large / np.expm1(large), 0.0)
+    return means + (through - means) * left[..., None], np.zeros_like(tilts), last

@@ -83,12 +83,10 @@ def found_once(findings: Iterable[tuple[Any, str]]) -> list[tuple[Any, str]]:
     places: dict[Any, dict[str, str]] = {}
     for what, where in findings:
         places.setdefault(what, {})[where] = Path(where).name
+    named = [(what, list(names.values())) for what, names in places.items()]
     return [
-        (
-            what,
-            next(iter(names.values())) + (f" and {len(names) - 1} more" if len(names) > 1 else ""),
-        )
-        for what, names in places.items()
+        (what, names[0] + (f" and {len(names) - 1} more" if len(names) > 1 else ""))
+        for what, names in named
     ]
 
 

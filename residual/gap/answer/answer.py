@@ -157,14 +157,15 @@ def likelier(search: Search, key: Key, asked: set[Key]) -> Key:
     What is left of the best set of three need not be the best set of two.
 
     Args:
-        search: With what was tried.
-        key: What is left.
+        search: With what is left, ``key``.
         asked: Sets that lost a member already.
     """
     fewer = [k for k in search.usable() if len(k) <= len(key) and k not in asked]
     small = [k for k in fewer if search.numbers(k) <= search.numbers(key)]
-    best = better_fit(search, small) if small else ()
-    return best if small and (1 + LIKELIER) * search.error(best) < search.error(key) else key
+    if not small:
+        return key
+    best = better_fit(search, small)
+    return best if (1 + LIKELIER) * search.error(best) < search.error(key) else key
 
 
 def summed_up(answer: Answer) -> Gap:

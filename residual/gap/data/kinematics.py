@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,6 @@ Array = NDArray[np.float64]
 FEW = 8
 #: Sampling steps by which a rate may be early or late for the way in which it was computed.
 LATE = 0.75
-
-Rule = Callable[[Array, Array], float]
 
 
 def kinematics(
@@ -47,10 +45,10 @@ def kinematics(
         if channel.kind != "rate" or channel.rate_of not in names:
             continue
         position = names.index(channel.rate_of)
-        fine, rough = (_Stretches.of(runs, position, column, rule) for rule in RULES)
-        if fine is None or rough is None:
+        seen = _Stretches.of(runs, position, column)
+        if seen is None:
             continue
-        (scale, error), (other, _) = fine.scale(), rough.scale()
+        (scale, error), (other, _) = seen.scale(seen.integral), seen.scale(seen.roughly)
         # Two rules that disagree say that the sampling is too coarse for this check.
         if abs(scale - other) < 0.25 * abs(scale - 1) and abs(scale - 1) > max(4 * error, 0.005):
             says = (
@@ -60,8 +58,8 @@ def kinematics(
             numbers = {"scale": scale}
             findings.append(Finding("kinematics", channel.rate_of, says, numbers, "warning"))
             runs = [_multiplied(run, column, scale) for run in runs]
-        (late, error), (other, _) = fine.late(), rough.late()
-        least = max(5 * error, LATE * fine.step)
+        (late, error), (other, _) = seen.late(seen.integral), seen.late(seen.roughly)
+        least = max(5 * error, LATE * seen.step)
         if abs(late) > least and abs(late - other) < 0.25 * abs(late):
             findings.append(_late(channel.rate_of, channel.name, late))
     return runs, findings
@@ -84,7 +82,7 @@ class _Stretches:
 
     Attributes:
         moved: Change of the position.
-        integral: Of the rate.
+        integral: Of the rate, by Simpson's rule; ``roughly``, by trapezoids.
         faster: Change of the rate.
         of_position, of_rate: Variances of their noise.
         step: Seconds between two samples.
@@ -92,15 +90,14 @@ class _Stretches:
 
     moved: Array
     integral: Array
+    roughly: Array
     faster: Array
     of_position: float
     of_rate: float
     step: float
 
     @classmethod
-    def of(
-        cls, runs: Sequence[Trajectory], position: int, rate: int, rule: Rule
-    ) -> _Stretches | None:
+    def of(cls, runs: Sequence[Trajectory], position: int, rate: int) -> _Stretches | None:
         """None if there are too few of them, or readings, to tell anything."""
         rows, noises = [], []
         seen = np.concatenate([run.states[:, position] for run in runs])
@@ -112,7 +109,8 @@ class _Stretches:
                 part = slice(a, a + 9)
                 if np.isfinite(x[part]).all() and np.isfinite(v[part]).all():
                     times, q, dq = run.times[part], x[part], v[part]
-                    rows.append((q[-1] - q[0], float(rule(dq, times)), dq[-1] - dq[0]))
+                    integrals = _simpson(dq, times), float(np.trapezoid(dq, times))
+                    rows.append((q[-1] - q[0], *integrals, dq[-1] - dq[0]))
                     noises.append((_roughness(q, times), _roughness(dq, times)))
         if len(rows) < 10:
             return None
@@ -121,12 +119,12 @@ class _Stretches:
         of_x = max(of_x, rounding([run.states[:, position] for run in runs]) ** 2 / 12)
         of_v = max(of_v, rounding([run.states[:, rate] for run in runs]) ** 2 / 12)
         step = float(np.median([np.median(run.durations) for run in runs]))
-        moved, integral, faster = np.array(rows).T
-        return cls(moved, integral, faster, of_x, of_v, step)
+        moved, integral, roughly, faster = np.array(rows).T
+        return cls(moved, integral, roughly, faster, of_x, of_v, step)
 
-    def scale(self) -> tuple[float, float]:
+    def scale(self, z: Array) -> tuple[float, float]:
         """Change of the position per integral of the rate, with its standard error."""
-        y, z = self.moved, self.integral
+        y = self.moved
         # Variance of the change (two readings) and of the integral (eight steps of readings).
         in_y = max(2 * self.of_position, 1e-300)
         in_z = max(8 * self.step**2 * self.of_rate, 1e-300)
@@ -138,13 +136,13 @@ class _Stretches:
         cleaned = z + left * scale * in_z / (in_y + scale**2 * in_z)
         return scale, float(np.linalg.norm(left * cleaned) / (cleaned @ cleaned))
 
-    def late(self) -> tuple[float, float]:
+    def late(self, integral: Array) -> tuple[float, float]:
         """Seconds by which the position comes after the integral of its rate, with their error.
 
         A position that comes T late lacks T times by how much the rate grew. Noise of the rate
         makes it look less late than it is.
         """
-        y, both = self.moved, np.stack([self.integral, self.faster], axis=1)
+        y, both = self.moved, np.stack([integral, self.faster], axis=1)
         if self.faster @ self.faster < 8 * len(y) * self.of_rate:
             return np.nan, np.inf
         found, *_ = np.linalg.lstsq(both, y, rcond=None)
@@ -183,7 +181,3 @@ def _multiplied(run: Trajectory, column: int, factor: float) -> Trajectory:
     states = np.array(run.states, float)
     states[:, column] *= factor
     return dataclasses.replace(run, states=states)
-
-
-#: Of which the first is the better one.
-RULES: tuple[Rule, Rule] = (_simpson, np.trapezoid)
