@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.confirmation.numerics import CLEARER
+from residual.gap.data.at_rest import begins_on, rest
 from residual.gap.data.samples import in_order
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.smooth import SmoothFitter
@@ -23,27 +24,13 @@ from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
-#: Part of an input's largest reading from rest below which it rests.
-STILL = 0.05
-
-
-def rest(simulator: HostSimulator) -> Array:
-    """Inputs that do nothing, as far as their bounds allow, (n_a,)."""
-    channels = simulator.action_channels
-    return np.array([np.clip(0.0, channel.low, channel.high) for channel in channels])
-
 
 def from_rest(simulator: HostSimulator, runs: Sequence[Trajectory]) -> list[Trajectory]:
     """The runs, those that begin while an input is on taken to have begun from rest."""
-    if not runs:
-        return []
-    still = rest(simulator)
-    most = np.max([np.abs(run.actions - still).max(axis=0) for run in runs], axis=0)
+    still, on = rest(simulator), begins_on(simulator, runs)
     return [
-        dataclasses.replace(run, before=still)
-        if (np.abs(run.actions[0] - still) > STILL * most).any()
-        else run
-        for run in runs
+        dataclasses.replace(run, before=still) if begins else run
+        for run, begins in zip(runs, on, strict=True)
     ]
 
 

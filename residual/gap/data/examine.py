@@ -27,6 +27,7 @@ from residual.gap.data.inspection import (
 )
 from residual.gap.data.kinematics import kinematics
 from residual.gap.data.nominal import nominal
+from residual.gap.data.onset import begun_late
 from residual.gap.data.wild_inputs import without_wild_inputs
 from residual.logs.checks import Finding
 from residual.trajectories import Trajectory
@@ -74,7 +75,8 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
     useless = {finding.where for finding in found if finding.kind in ("still", "derived")}
     runs = _without_faults(simulator, trajectories, useless)
     runs, scaled = kinematics(simulator, runs)
-    return Examined(tuple(runs), (*found, *scaled))
+    runs, late = begun_late(simulator, runs)
+    return Examined(tuple(runs), (*found, *scaled, *late))
 
 
 def findings(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
