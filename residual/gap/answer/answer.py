@@ -9,11 +9,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from residual.gap.answer.calibrated import calibrated_verdict, moved
 from residual.gap.answer.evidence import evidence
 from residual.gap.answer.table import gap, rollouts
 from residual.gap.answer.verdicts import (
     blind_verdict,
-    calibrated_verdict,
     dependent,
     effect_verdict,
     minor_verdict,
@@ -247,8 +247,8 @@ def verdicts(
         exact = dependent(label, labels, sets)
         made.append(effect_verdict(search, claim, blocks, *exact, times))
     made.sort(key=lambda verdict: verdict.kind != "confirmed")
-    if search.beside:
-        made.append(calibrated_verdict(search, answer.key))
+    if shifted := moved(search, answer.key):
+        made.append(calibrated_verdict(search, shifted))
     if tolerance is not None and table.before.value <= tolerance:
         made.insert(
             0,

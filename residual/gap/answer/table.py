@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.answer.calibrated import moved
 from residual.gap.data.blocks import Blocks
 from residual.gap.fitting.contract import Fit, Fitter
 from residual.gap.fitting.forecasts import main_channel, span
@@ -49,7 +50,7 @@ def gap(
     main = main_channel(simulator, samples.measured, shrunk, floor)
     name = simulator.physical_channels[samples.measured[main]].name
     steps = [Step("", by_channel[name].before)]
-    if search.beside:
+    if moved(search, key):
         squares = search.validated[()].squares[:, main]
         steps.append(Step(BESIDE, span(squares)))
     part: Key = ()

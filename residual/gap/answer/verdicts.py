@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from residual.gap.answer.doubts import DOUBTS, doubts
 from residual.gap.beside import Blind
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.size import may_be_none, may_vanish
 from residual.gap.fitting.contract import Left
-from residual.gap.result import Gap, Kind, Number, Span, Verdict
-from residual.gap.search.sets import Key, Search
+from residual.gap.result import Gap, Kind, Span, Verdict
+from residual.gap.search.sets import Search
 
 #: Families of which an effect may be one and still be worth a name, if forecasts do not clearly
 #: need it. What they do need makes a better simulator, whichever of many it is.
 UNNEEDED = 3
 #: Times the noise from which on what has no name may be another law that few blocks cannot show.
 MUCH = 2.0
-#: Part of what a parameter may change by that is a change.
-MOVED = 1e-3
 
 
 def nameable(search: Search, claim: Claim, blocks: int, adequate: bool) -> bool:
@@ -108,30 +104,6 @@ def effect_verdict(
         tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
         "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
         why, shape=given, meant=claim.meant, beside=claim.beside,
-    )  # fmt: skip
-
-
-def calibrated_verdict(search: Search, key: Key) -> Verdict:
-    """Parameters that were moved within their tolerance so that the rest can be seen.
-
-    Its parameters go by their own names; their intervals are all that was allowed.
-    """
-    fit, first = search.tried[key], search.numbers(key)
-    moved = {
-        str(candidate.effect): Number(float(value), knob.low, knob.high, knob.unit)
-        for candidate, value, knob in zip(
-            search.beside, fit.theta[first:], fit.model.knobs[first:], strict=True
-        )
-    }
-    taken = search.currency.share(
-        search.before.squares, search.validated[()].squares, np.random.default_rng(0)
-    )
-    moved = {name: n for name, n in moved.items() if abs(n.value) > MOVED * (n.high - n.low)}
-    changes = ", ".join(f"{name} {n.value:+.3g} {n.unit}" for name, n in moved.items())
-    return Verdict(
-        "calibrated", "", "", moved, (), "",
-        f"parameters moved within their tolerance, so that the rest can be seen: {changes}",
-        Span(*taken),
     )  # fmt: skip
 
 

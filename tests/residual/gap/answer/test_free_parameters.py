@@ -1,8 +1,12 @@
 """Parameters that are a little off are moved within their tolerance where that helps."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 
 from residual.gap import find_gap
+from residual.gap.answer.calibrated import moved
 from sims.effects import CoulombFriction
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
@@ -25,7 +29,7 @@ def test_parameters_within_their_tolerance_may_be_all_there_is():
     for name, change in verdict.parameters.items():
         size = 0.03 * parameters[name].value
         assert -size <= change.low <= change.value <= change.high <= size
-        assert abs(change.value) > 1e-3 * size
+        assert abs(change.value) > 0.01 * size
     # They are in the corrected simulator, and the table is its.
     assert found.gap.after.value < 0.7 * found.gap.before.value
     assert {e.name for e in found.effects} <= set(parameters)
@@ -53,3 +57,18 @@ def test_an_effect_is_named_beside_parameters_that_are_off():
     assert first.parameters["level"].low <= 5e-4 <= first.parameters["level"].high
     assert [v.kind for v in found.verdicts[:2]] == [first.kind, "calibrated"]
     assert found.gap.windows_after < 1.2
+
+
+@pytest.mark.parametrize(("length", "told"), [(-0.01, {"mass", "length"}), (1e-4, {"mass"})])
+def test_what_stays_where_it_was_is_not_told(length, told):
+    """Free parameters that another effect made needless end near their own values."""
+    knob = SimpleNamespace(low=-0.03, high=0.03, unit="1")
+    fit = SimpleNamespace(
+        theta=np.array([5e-4, 0.02, length]), model=SimpleNamespace(knobs=(None, knob, knob))
+    )
+    search = SimpleNamespace(
+        tried={(0,): fit},
+        numbers=lambda key: len(key),
+        beside=[SimpleNamespace(effect=name) for name in ("mass", "length")],
+    )
+    assert set(moved(search, (0,))) == told
