@@ -74,7 +74,8 @@ def find_gap(
         The verdicts and everything behind them.
 
     Raises:
-        ValueError: There are no trajectories, nothing was measured, samples are too rare, the
+        ValueError: There are no trajectories, nothing was measured, or in those set aside nothing
+            that was measured in the others, samples are too rare, the
             simulator is unsound (``sims.contract``) or returns values that are not finite, or a
             position of a system that strikes the ground was not measured.
     """
@@ -112,8 +113,8 @@ def find_gap(
         clock.lap("confirm")
 
         table, apart = summed_up(answer), None
-        if held:
-            apart = judged_apart(answer, known.prepared, held, table, rested=bool(on_rest))
+        if log.apart:
+            apart = judged_apart(answer, known.prepared, log.apart, table, rested=bool(on_rest))
         answer = replace(
             answer,
             claims=tuple(

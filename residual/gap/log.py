@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from residual.gap.data.copies import copies
 from residual.gap.data.examine import examine
 from residual.gap.data.excerpt import excerpt
@@ -26,6 +28,7 @@ class Log:
         runs: Of those the stretches that are searched.
         horizon: Length of forecasts in s.
         by_user: Whether the user chose the horizon, so that it stays.
+        apart: Runs that are set aside, without what is faulty in them or measured there only.
         findings: What was found about the data, in words.
         left_out: What of the data is not searched, in words.
     """
@@ -35,6 +38,7 @@ class Log:
     runs: Sequence[Trajectory]
     horizon: float
     by_user: bool
+    apart: Sequence[Trajectory]
     findings: list[str]
     left_out: list[str]
 
@@ -53,8 +57,10 @@ def look(
 ) -> Log:
     """Find faults of the data, and how far forecasts go if the user does not say."""
     examined = examine(simulator, trajectories)
-    simulator = simulator.for_motion([run.states for run in [*examined.trajectories, *held]])
     findings = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
+    apart, more = _set_aside(simulator, held, examined.trajectories)
+    findings += [f"records set aside: {says}" for says in more if says not in findings]
+    simulator = simulator.for_motion([run.states for run in [*examined.trajectories, *apart]])
     findings += [
         f"{copy.name} is set aside, and holds the same samples as {first.name}, which is fitted: "
         "what is said of records set aside is no test"
@@ -64,10 +70,37 @@ def look(
     length = (
         held_by_records(simulator, every, horizon) if horizon else usual_horizon(simulator, every)
     )
-    log = Log(simulator, every, every, length, horizon is not None, findings, []).at(length)
+    log = Log(simulator, every, every, length, horizon is not None, apart, findings, []).at(length)
     for says in [*findings, *log.left_out]:
         tell(says)
     return log
+
+
+def _set_aside(
+    simulator: HostSimulator, held: Sequence[Trajectory], fitted: Sequence[Trajectory]
+) -> tuple[list[Trajectory], list[str]]:
+    """Runs that are set aside, with the channels that were measured in the others, and what was
+    found about them."""
+    if not held:
+        return [], []
+    try:
+        examined = examine(simulator, held)
+    except ValueError as error:
+        raise ValueError(f"records set aside: {error}") from None
+    known = np.any([np.isfinite(run.states).any(axis=0) for run in fitted], axis=0)
+    apart = [
+        dataclasses.replace(run, states=np.where(known, run.states, np.nan))
+        for run in examined.trajectories
+    ]
+    if not any(np.isfinite(run.states).any() for run in apart):
+        names = [
+            c.name for c, there in zip(simulator.physical_channels, known, strict=True) if there
+        ]
+        raise ValueError(
+            f"records set aside: none of them measures {' or '.join(names)}, which the others "
+            "measure; give records with these channels"
+        )
+    return apart, [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
 
 
 def settle(simulator: HostSimulator, log: Log, tell: Callable[[str], None]) -> tuple[Log, Prepared]:

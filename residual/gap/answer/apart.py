@@ -9,7 +9,6 @@ import numpy as np
 from residual.gap.answer.answer import Answer
 from residual.gap.answer.table import held_out
 from residual.gap.confirmation.rest import beginning_as, each_as_it_fits
-from residual.gap.data.examine import examine
 from residual.gap.data.excerpt import excerpt
 from residual.gap.data.samples import in_order
 from residual.gap.fitting.forecasts import noise_floor
@@ -28,12 +27,11 @@ def judged_apart(
 
     Args:
         answer: What was found in ``prepared``, whose errors ``table`` holds.
-        held: The records, as measured.
+        held: The records, in which no channel is measured that is not in ``prepared``.
         rested: Whether some that were searched began from rest, so that these may have, too.
     """
     search = answer.found.search
-    sound = examine(search.simulator, held).trajectories
-    runs, _ = excerpt(sound, stride_for(held, prepared.horizon))
+    runs, _ = excerpt(held, stride_for(held, prepared.horizon))
     other = prepare(search.simulator, runs, prepared.horizon).fitter
     other = other.weighed_like(search.fitter)
     tried = (search.nominal, search.tried[answer.key])
@@ -50,5 +48,6 @@ def judged_apart(
             ordered = in_order(runs, samples.stride)
             other = beginning_as(other, each_as_it_fits(other, usual, ordered))
     fits = [other.fit(Model(simulator), np.zeros(0)) for simulator in (nominal, found)]
-    floor = noise_floor(other, fits[1], answer.found.floor.sigma)
+    sigma = other.samples.of_these(search.fitter.samples, answer.found.floor.sigma)
+    floor = noise_floor(other, fits[1], sigma)
     return held_out(table, other, fits[0], fits[1], floor)

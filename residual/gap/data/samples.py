@@ -129,6 +129,15 @@ class Samples:
     def __len__(self) -> int:
         return len(self.seen)
 
+    def of_these(self, other: Samples, values: Array) -> Array:
+        """Of values of another table's measured channels, (m,), those of its own.
+
+        Raises:
+            KeyError: The other one does not measure one of them.
+        """
+        place = {column: i for i, column in enumerate(other.measured)}
+        return values[[place[column] for column in self.measured]]
+
     @property
     def measured(self) -> NDArray[np.int64]:
         """Columns of the channels that were measured at all."""

@@ -78,7 +78,7 @@ class SmoothFitter:
 
     def weighed_like(self, other: Fitter) -> SmoothFitter:
         """See ``Fitter.weighed_like``."""
-        return dataclasses.replace(self, sigma=other.sigma)
+        return dataclasses.replace(self, sigma=self.samples.of_these(other.samples, other.sigma))
 
     def fit(self, model: Model, theta: Array, near: Fit | None = None) -> Fit:
         """See ``Fitter.fit``; always from the measured path, since a rival's may mislead."""

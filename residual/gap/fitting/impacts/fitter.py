@@ -98,7 +98,8 @@ class ImpactFitter:
 
     def weighed_like(self, other: Fitter) -> ImpactFitter:
         """See ``Fitter.weighed_like``."""
-        return dataclasses.replace(self, data=with_noise(self.data, other.sigma, self.scale))
+        sigma = self.samples.of_these(other.samples, other.sigma)
+        return dataclasses.replace(self, data=with_noise(self.data, sigma, self.scale))
 
     def fit(self, model: Model, theta: Array, near: Fit | None = None) -> Fit:
         """See ``Fitter.fit``."""

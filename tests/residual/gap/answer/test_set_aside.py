@@ -1,0 +1,60 @@
+"""Records set aside may measure other channels than those that are fitted."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from residual.gap import find_gap
+from sims.pendulum_equation import PendulumEquation
+from studies.hidden.data import Truth, make_logs
+
+ANGLE, RATE = 0, 1
+
+
+def measuring(runs, *columns):
+    """The runs, other columns not measured."""
+    kept = np.isin(np.arange(2), columns)
+    return [dataclasses.replace(run, states=np.where(kept, run.states, np.nan)) for run in runs]
+
+
+def ask(fitted, held):
+    return find_gap(PendulumEquation(), fitted, held=held, effects=["mass"], hold="zero")
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return make_logs(Truth(mass=0.2), 3, "strong", "A", runs=6)
+
+
+def test_their_noise_is_that_of_their_own_channels(runs):
+    fitted, held = runs[:4], runs[4:]
+    both = ask(fitted, held).held_out.by_channel
+    alone = ask(fitted, measuring(held, RATE)).held_out
+    assert set(alone.by_channel) == {"rate"}
+    assert alone.noise_floor.value == pytest.approx(both["rate"].noise_floor.value, rel=0.5)
+    # From rates alone an angle is hard to tell, and so is what comes next.
+    assert alone.after.value > both["rate"].after.value
+    assert both["angle"].noise_floor.value < 0.2 * both["rate"].noise_floor.value
+
+
+def test_what_only_they_measure_is_not_judged(runs):
+    found = ask(measuring(runs[:4], ANGLE), runs[4:])
+    assert set(found.held_out.by_channel) == {"angle"}
+
+
+def test_nothing_in_common_is_refused_before_the_search(runs):
+    says = "records set aside: none of them measures angle, which the others measure"
+    with pytest.raises(ValueError, match=says):
+        ask(measuring(runs[:4], ANGLE), measuring(runs[4:], RATE))
+
+
+def test_what_is_found_about_them_is_told_as_such(runs):
+    still = [dataclasses.replace(run, states=np.array(run.states)) for run in runs[4:]]
+    for run in still:
+        run.states[:, RATE] = 0.5
+    found = ask(runs[:4], still)
+    assert any(
+        says.startswith("records set aside: rate is 0.5 rad/s in all") for says in found.quality
+    )
+    assert set(found.held_out.by_channel) == {"angle"}
