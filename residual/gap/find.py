@@ -123,6 +123,7 @@ def find_gap(
                     counted=conventions is not None,
                     unlike=any(one.instead for one in differ),
                     refuted=apart is not None and apart.refutes,
+                    helpless=apart is not None and apart.denies,
                 )
                 for claim in answer.claims
             ),

@@ -22,15 +22,17 @@ Kind = Literal[
 #: between folds or with the numerics, lies at its bound, parameters within their tolerance do as
 #: well, or there was no time to ask that, it is a time shorter than half a sample, a number is out
 #: of all proportion, one effect that differs between records does better, records that were set
-#: aside are foretold worse, its interval holds zero, few blocks of data leave much without a name,
-#: or an effect of another kind does as well.
+#: aside are foretold worse, or no better, its interval holds zero, few blocks of data leave much
+#: without a name, or an effect of another kind does as well.
 Doubt = Literal[
     "not_needed", "unsteady", "creeps", "numerics", "at_bound", "calibration", "slight",
-    "no_time", "clock", "gross", "conventions", "extreme", "records", "set_aside",
+    "no_time", "clock", "gross", "conventions", "extreme", "records", "set_aside", "no_help",
     "may_be_zero", "share_may_be_zero", "few_blocks", "rivals",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.
 WORSE = 1.05
+#: Forecast error over that by noise, from which on there is a gap.
+OFF = 1.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -186,6 +188,16 @@ class Gap:
     def helps(self) -> bool:
         """Whether the corrected simulator errs less than the nominal one."""
         return WORSE * self.after.value < self.before.value
+
+    @property
+    def tells(self) -> bool:
+        """Whether more than noise is to be seen, so that it could help."""
+        return self.exceeds_noise(1.0) or self.exceeds_noise(OFF, corrected=True)
+
+    @property
+    def denies(self) -> bool:
+        """Whether it does not help, though it could, and does no clear harm."""
+        return self.tells and not self.helps and not self.refutes
 
     @property
     def refutes(self) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from residual.gap import GapResult
 from residual.gap.answer.doubts import DOUBTS
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
-from residual.gap.result import Gap, Meant, Number, Verdict
+from residual.gap.result import OFF, Gap, Meant, Number, Verdict
 from sims.effects import Curve
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect
@@ -33,8 +33,6 @@ from studies.gap.words import (
 
 #: Share of the gap without a name that is a footnote.
 FOOTNOTE = 0.02
-#: Forecast error over that by noise, from which on there is a gap.
-OFF = 1.5
 #: Verdicts that name no effect.
 NAMELESS = ("unexplained", "calibrated", "needs_data", "no_gap")
 #: Letters of a parameter's name up to which it is a symbol: l and L are two.

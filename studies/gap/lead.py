@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from residual.gap import GapResult
 from residual.gap.fitting.forecasts import own_channels
-from residual.gap.result import ChannelGap, Gap, Verdict
-from studies.gap.answer import OFF, cannot_tell, rivals
+from residual.gap.result import OFF, ChannelGap, Gap, Verdict
+from studies.gap.answer import cannot_tell, rivals
 from studies.gap.records import beside_lead
 from studies.gap.words import (
     ahead,
@@ -126,7 +126,7 @@ def _but_worse_apart(result: GapResult) -> str:
     if apart.helps:
         return _but_worse_elsewhere(result, apart)
     before, after = (quantity_text(s.value, apart.unit) for s in (apart.before, apart.after))
-    if not apart.exceeds_noise(1.0) and not apart.exceeds_noise(OFF, corrected=True):
+    if not apart.tells:
         alone = quantity_text(apart.noise_floor.value, apart.unit)
         return (
             f" The records set aside cannot tell: there noise alone makes {alone}, and the "

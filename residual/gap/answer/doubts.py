@@ -17,6 +17,7 @@ DOUBTS: dict[Doubt, str] = {
     "simulator has it right",
     "records": "one effect with its own size in each record does better than all that is named",
     "set_aside": "the corrected simulator is worse on the records that were set aside",
+    "no_help": "the corrected simulator is no better on the records that were set aside",
     "gross": "a sensor is seldom wrong by a fifth of all that it showed, and something that the "
     "library lacks may look so",
     "no_time": "there was no time to ask whether parameters that are a few percent off would do as "
@@ -55,6 +56,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "extreme": claim.extreme,
         "records": claim.unlike,
         "set_aside": claim.refuted,
+        "no_help": claim.helpless,
         "may_be_zero": vanishes,
         "share_may_be_zero": not claim.gains,
         "few_blocks": thin,

@@ -45,6 +45,7 @@ class Claim:
         extreme: Whether a number of its set is out of all proportion to the simulator's.
         unlike: Whether one effect, in a size of its own in each record, does better than all named.
         refuted: Whether the corrected simulator forecasts records that were set aside worse.
+        helpless: Whether it forecasts them no better, though they show more than noise.
         gross: Whether it is a sensor further off than sensors are, beside a remainder.
         by_fit: Whether a fit to all data leaves three times as much without it: forecasts of single
             blocks may go astray all the same, where motion hangs on a hair.
@@ -73,6 +74,7 @@ class Claim:
     extreme: bool = False
     unlike: bool = False
     refuted: bool = False
+    helpless: bool = False
     by_fit: bool = False
     there: bool = False
     creeps: bool = False
@@ -101,6 +103,7 @@ class Claim:
             self.extreme,
             self.unlike,
             self.refuted,
+            self.helpless,
             self.rivals,
             self.alike,
             self.unasked,

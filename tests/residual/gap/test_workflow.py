@@ -134,14 +134,15 @@ def test_records_set_aside_only_judge():
     assert judged.held_out.after.value < 0.6 * judged.held_out.before.value
 
 
-def test_nothing_is_certain_that_records_set_aside_speak_against():
-    """They are of a lighter rotor, not of a heavier one."""
+@pytest.mark.parametrize(("inertia", "doubt"), [(-0.3, "set_aside"), (0.13, "no_help")])
+def test_nothing_is_certain_that_records_set_aside_speak_against(inertia, doubt):
+    """They are of a lighter rotor, or of one between the nominal one and the heavier one."""
     logs = make_logs(Truth(inertia=0.3), 11, "strong", "A", 4)
-    others = make_logs(Truth(inertia=-0.3), 12, "strong", "A", 2)
+    others = make_logs(Truth(inertia=inertia), 12, "strong", "A", 2)
     found = find_gap(PendulumEquation(), logs, held=others, effects=few(), hold="zero")
     first = found.verdicts[0]
     assert (first.kind, first.effect) == ("ambiguous", "inertia")
-    assert first.doubts == ("set_aside",)
+    assert first.doubts == (doubt,)
 
 
 def test_a_single_record_with_uneven_sampling():
