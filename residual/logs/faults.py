@@ -36,6 +36,8 @@ _COARSE = 3e-4
 _FEW_VALUES = 8
 # Zeros in a row that are a drop-out rather than a time at which nothing happened.
 _LONGEST_DROP = 50
+# Part of the least distance of two values that their common step is at least.
+_PARTS = 0.15
 
 
 def wild_samples(runs: Sequence[Array]) -> list[Mask]:
@@ -238,7 +240,10 @@ def stretches(mask: Mask) -> list[tuple[int, int]]:
 
 
 def grain(runs: Sequence[Array]) -> float:
-    """What all values are multiples of, but for a constant; 0 if there is no such number."""
+    """What all values are multiples of, but for a constant; 0 if there is no such number.
+
+    It may be less than the least distance of two values, which may be two steps and three apart.
+    """
     values = np.concatenate([np.ravel(v) for v in runs] or [np.zeros(0)])
     values = np.unique(values[np.isfinite(values)])
     if len(values) < 8:
@@ -248,6 +253,10 @@ def grain(runs: Sequence[Array]) -> float:
     if not gaps.size:
         return 0.0
     # Numbers printed with few digits are nearly, not exactly, multiples of their last digit.
-    grain = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
-    whole = np.abs(gaps / grain - np.round(gaps / grain)) < 0.02
-    return grain if whole.all() else 0.0
+    least = step = float(np.median(gaps[gaps < 1.1 * gaps.min()]))
+    while step > _PARTS * least:
+        beside = np.abs(gaps / step - np.round(gaps / step))
+        if (beside < 0.02).all():
+            return step
+        step *= float(beside[beside >= 0.02].min())
+    return 0.0

@@ -97,13 +97,14 @@ def beginning_as(fitter: SmoothFitter, ordered: Sequence[Trajectory]) -> SmoothF
 
 
 def _with_lags(search: Search, key: Key) -> tuple[Key, Array] | None:
-    """A set with a lag at every input that it leaves without memory, and where its fit begins;
-    None if it holds none then."""
+    """A set with a lag at every input that it leaves without memory, or a delay where lags are not
+    asked for, and where its fit begins; None if it holds none then."""
     chosen = [search.candidates[number].effect for number in key]
     remembers = {e.where for e in chosen if isinstance(e, ActuatorLag | Delay)}
-    more = [
-        (number, candidate.trials[0].values[0])
-        for number, candidate in enumerate(search.candidates[: search.screened])
-        if isinstance(candidate.effect, ActuatorLag) and candidate.effect.where not in remembers
-    ]
-    return search.merged(key, more) if more or remembers else None
+    more: dict[str, tuple[int, Array]] = {}
+    for kind in (ActuatorLag, Delay):
+        for number, candidate in enumerate(search.candidates[: search.screened]):
+            where = candidate.effect.where
+            if isinstance(candidate.effect, kind) and where not in remembers | set(more):
+                more[where] = number, candidate.trials[0].values[0]
+    return search.merged(key, list(more.values())) if more or remembers else None

@@ -31,6 +31,9 @@ POOR, GOOD = 0.3, 0.5
 #: Times that forecasts have to be better with another convention, and other conventions that do
 #: as well.
 BETTER, ALIKE = 2.0, 1.2
+#: Error from which on a sign is asked after that makes it so many times smaller: what swings by
+#: itself hides a reversed input.
+HIDDEN, CLEARLY = 0.1, 4.0
 #: Zeros from which angles are counted.
 QUARTERS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
 #: Windows that are looked at: all rows at once, and row by row.
@@ -53,6 +56,14 @@ class Convention:
     states: Array
     inputs: Array
 
+    @property
+    def sign(self) -> bool:
+        """Whether nothing but signs is another one."""
+        factors = np.concatenate([self.states[0], self.inputs[0]])
+        return bool((np.abs(factors) == 1).all()) and not (
+            self.states[1].any() or self.inputs[1].any()
+        )
+
 
 def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
     """Conventions with which the nominal simulator forecasts far better.
@@ -69,11 +80,15 @@ def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
     if not isinstance(fitter, SmoothFitter):
         return None
     own = _error(simulator, fitter, _as_said(simulator))
-    if own < POOR:
+    if own < HIDDEN:
         return None
-    errors = [(_error(simulator, fitter, one), one) for one in _conventions(simulator, fitter)]
+    asked = _conventions(simulator, fitter)
+    times = BETTER
+    if own < POOR:
+        asked, times = [one for one in asked if one.sign], CLEARLY
+    errors = [(_error(simulator, fitter, one), one) for one in asked]
     least, best = min(errors, key=lambda pair: pair[0], default=(own, _as_said(simulator)))
-    if BETTER * least > own or least > GOOD:
+    if times * least > own or least > GOOD:
         return None
     beyond = _beyond(best)
     if beyond is not None and BETTER * least > _error(simulator, fitter, beyond):
@@ -89,7 +104,7 @@ def _conventions(simulator: HostSimulator, fitter: SmoothFitter) -> list[Convent
         if action.low < 0 < action.high:
             found.append(_of_input(simulator, f"`scale: -1` for {action.name}", place, -1.0))
         for name, unit in _other_units(action):
-            says = f"`unit: {name}` for {action.name}"
+            says = f"`unit: {name}` for {action.name} ({_beside_a_unit(unit)})"
             found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
     channels = simulator.physical_channels
     measured = set(fitter.samples.measured.tolist())
@@ -129,8 +144,16 @@ def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Conv
             alike = [n for n, u in _other_units(rate) if np.isclose(u.factor, unit.factor)]
             said += [f"`unit: {one}` for {rate.name}" for one in alike]
         if len(said) == len(channels):
-            found.append(_of_states(simulator, " and ".join(said), joint, unit.factor, unit.offset))
+            says = f"{' and '.join(said)} ({_beside_a_unit(unit)})"
+            found.append(_of_states(simulator, says, joint, unit.factor, unit.offset))
     return found
+
+
+def _beside_a_unit(unit: Unit) -> str:
+    """The same change of a column whose unit is stated already, and is not what it should be."""
+    lines = [f"`scale: {unit.factor:.6g}`"] if unit.factor != 1.0 else []
+    lines += [f"`offset: {unit.offset:.6g}`"] if unit.offset else []
+    return f"{' and '.join(lines)} if a unit is stated"
 
 
 def _other_units(channel: Channel) -> list[tuple[str, Unit]]:

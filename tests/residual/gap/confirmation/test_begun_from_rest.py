@@ -55,6 +55,13 @@ def test_without_a_lag_it_makes_no_difference_and_is_not_told():
     assert not told(found)
 
 
+def test_it_is_asked_where_only_a_delay_is_offered():
+    found = find_gap(Oven(), TESTS, effects=("delay", "actuator_gain", "constant_load", "slow"))
+    assert told(found)
+    assert "delay@duty" in [str(effect) for effect in found.effects]
+    assert found.gap.after.value < 0.4 * found.gap.before.value
+
+
 def test_records_set_aside_are_judged_likewise():
     found = find_gap(Oven(), TESTS[:3], held=TESTS[3:], effects=OFFERED)
     assert found.held_out.after.value < 0.1 * found.held_out.before.value

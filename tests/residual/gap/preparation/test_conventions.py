@@ -23,12 +23,12 @@ LARGE = [
 ]  # fmt: skip
 
 
-def log(effects=(), seed=0, dt=0.02):
+def log(effects=(), seed=0, dt=0.02, start=0.3, most=2.0):
     """A pendulum swinging about its lowest point, driven either way."""
     rng = np.random.default_rng(seed)
     simulator = PendulumEquation(dt=dt)
-    volts = np.repeat(rng.uniform(-2.0, 2.0, (1, 40, 1)), 20, axis=1)
-    states = simulator.with_effects(list(effects)).rollout(np.array([[np.pi + 0.3, 0.0]]), volts)[0]
+    volts = np.repeat(rng.uniform(-most, most, (1, 40, 1)), 20, axis=1)
+    states = simulator.with_effects(list(effects)).rollout(np.array([[np.pi + start, 0.0]]), volts)[0]
     states += np.array([0.003, 0.03]) * rng.standard_normal(states.shape)
     return Trajectory("run", dt * np.arange(len(states)), states, volts[0])
 
@@ -51,6 +51,15 @@ def test_a_reversed_input_is_told(effects):
     assert "`scale: -1` for voltage" in told
 
 
+@pytest.mark.parametrize("effects", [(), (CoulombFriction("pivot", 1e-3),)])
+def test_a_reversed_input_is_told_where_it_is_swung_by(effects):
+    """The nominal simulator's forecasts are not poor: most of the motion is a free swing's."""
+    run = log(effects, start=1.0, most=0.7)
+    told = changes(dataclasses.replace(run, actions=-run.actions))
+    assert told == ("`scale: -1` for voltage", "`scale: -1` for angle and rate")
+    assert not changes(run)
+
+
 @pytest.mark.parametrize(("offset", "wanted"), [
     (np.pi, "3.14159"), (-np.pi / 2, "1.5708"), (np.pi / 2, "-1.5708"),
 ])  # fmt: skip
@@ -68,8 +77,9 @@ def test_a_joint_that_counts_the_other_way_round_is_told():
 
 
 @pytest.mark.parametrize(("factors", "volts", "wanted"), [
-    ((180 / np.pi, 180 / np.pi), 1.0, "`unit: deg` for angle and `unit: deg/s` for rate"),
-    ((1.0, 1.0), 1000.0, "`unit: mV` for voltage"),
+    ((180 / np.pi, 180 / np.pi), 1.0,
+     "`unit: deg` for angle and `unit: deg/s` for rate (`scale: 0.0174533` if a unit is stated)"),
+    ((1.0, 1.0), 1000.0, "`unit: mV` for voltage (`scale: 0.001` if a unit is stated)"),
 ])  # fmt: skip
 def test_another_unit_is_told(factors, volts, wanted):
     run = log((CoulombFriction("pivot", 0.003),))
@@ -101,7 +111,10 @@ def test_degrees_celsius_are_no_kelvin():
     simulator = Room()
     warm = simulator.rollout(np.array([[293.0]]), watts)[0]
     warm += 0.1 * rng.standard_normal(warm.shape)
-    for zero, wanted in ((0.0, None), (273.15, ("`unit: degC` for room",))):
+    for zero, wanted in (
+        (0.0, None),
+        (273.15, ("`unit: degC` for room (`offset: 273.15` if a unit is stated)",)),
+    ):
         run = Trajectory("room", 10.0 * np.arange(len(warm)), warm - zero, watts[0])
         found = otherwise(simulator, prepare(simulator, [run], 300.0).fitter)
         assert (found and found.changes) == wanted
@@ -115,7 +128,7 @@ def test_thousandths_are_told_of_any_unit():
     run = Trajectory("room", 10.0 * np.arange(len(warm)), 1000.0 * warm, watts[0])
     found = otherwise(Room(), prepare(Room(), [run], 300.0).fitter)
     assert found is not None
-    assert found.changes == ("`unit: mK` for room",)
+    assert found.changes == ("`unit: mK` for room (`scale: 0.001` if a unit is stated)",)
 
 
 def test_a_turned_sign_of_any_channel_is_told():
