@@ -20,7 +20,7 @@ EFFECTS = ("torso_mass", "friction")
 def search():
     """Short rollouts of the true Leo about its feet's touch-down, and two of its parameters."""
     leo = Leo()
-    states, actions = random_poses(np.random.default_rng(5), rollouts=30, steps=10)
+    states, actions = random_poses(np.random.default_rng(5), rollouts=12, steps=10)
     runs = [
         Trajectory(f"run {i}", leo.dt * np.arange(len(path), dtype=float), path, volts)
         for i, (path, volts) in enumerate(zip(states, actions, strict=True))
