@@ -11,7 +11,7 @@ from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
 
-#: Effects that were hidden, and some that move alike; test_hidden_effects.py offers the whole library.
+#: What is hidden, and what moves alike; test_hidden_effects.py offers the whole library.
 RIVALS = (
     "mass", "length", "gravity", "coulomb_friction", "viscous_friction", "dead_zone", "delay",
     "actuator_lag", "sensor_offset", "saturation", "backlash",
