@@ -173,8 +173,9 @@ def test_an_effect_that_cannot_be_hidden_is_one_line(tmp_path, capsys):
 
 
 def test_fast_subset(tmp_path, capsys, monkeypatch):
-    """With a quarter of the records."""
+    """With a quarter of the records, at the lowest rates."""
     monkeypatch.setattr(sets, "SECONDS", {name: 0.25 * s for name, s in sets.SECONDS.items()})
+    monkeypatch.setattr(sets, "RATES", {name: rates[:1] for name, rates in sets.RATES.items()})
     main(["--config", "studies/configs/hidden_effects/dirty_fast.yaml", "--output", str(tmp_path)])
     assert "or its family" in capsys.readouterr().out
     text = (tmp_path / "dirty.md").read_text()
