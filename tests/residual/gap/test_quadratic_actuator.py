@@ -15,6 +15,8 @@ from sims.equations import EquationOfMotion
 from sims.simulator import Channel, Joint, Parameter
 
 DT, WEIGHT, THRUST, DRAG = 0.02, 6.0, 14.0, 0.9
+#: Enough to be wrong with.
+OFFERED = ("quadratic_actuator", "actuator_gain", "dead_zone", "thrust", "drag", "delay")
 
 
 class RotorArm(EquationOfMotion):
@@ -77,7 +79,7 @@ def test_its_slope_has_no_jump_at_full_command():
 
 @pytest.fixture(scope="module")
 def squares():
-    return find_gap(RotorArm(), [flight(seed) for seed in range(3)])
+    return find_gap(RotorArm(), [flight(seed) for seed in range(3)], effects=OFFERED)
 
 
 def test_thrust_that_grows_with_the_square_is_named(squares):
@@ -106,5 +108,6 @@ def test_the_corrected_simulator_forecasts_fresh_flights(squares):
 
 
 def test_a_propeller_as_in_the_simulator_has_no_gap():
-    found = find_gap(RotorArm(), [flight(seed, power=1.0) for seed in range(3)])
+    runs = [flight(seed, power=1.0) for seed in range(3)]
+    found = find_gap(RotorArm(), runs, effects=OFFERED)
     assert [verdict.kind for verdict in found.verdicts] == ["no_gap"]
