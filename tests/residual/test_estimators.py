@@ -34,8 +34,8 @@ CHECKED = [
     Linear(),
     Linear(features="raw"),
     Linear(features="quadratic", alpha=1.0),
-    GaussianProcess(max_iter=10, random_state=0),
-    GaussianProcess(max_iter=10, max_points=30, inducing=20, kernel="matern", random_state=0),
+    GaussianProcess(max_iter=5, random_state=0),
+    GaussianProcess(max_iter=5, max_points=30, inducing=20, kernel="matern", random_state=0),
     DropoutNet(
         hidden=(32, 32), dropout=0.05, epochs=30, batch_size=32, learning_rate=0.01, random_state=0
     ),
