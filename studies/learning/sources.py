@@ -84,8 +84,14 @@ def _source(name: str) -> Path | None:
     path = getattr(module, "__file__", None) if module else _origin(name)
     if not path or not str(path).endswith(".py"):
         return None
-    file = Path(path).resolve()
+    file = _resolved(str(path))
     return file if top in _OURS or not str(file).startswith(_LIBRARIES) else None
+
+
+@functools.lru_cache(maxsize=4096)
+def _resolved(path: str) -> Path:
+    """Without links, which every step of a run would follow anew for every module."""
+    return Path(path).resolve()
 
 
 @functools.cache

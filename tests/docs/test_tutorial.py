@@ -1,8 +1,11 @@
 """The tutorial runs as it is written, and finds what it hides."""
 
+import contextlib
+import io
 import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -25,6 +28,18 @@ def run(command, folder):
     return done.stdout
 
 
+def script(name, folder):
+    """What a script prints that is started in a folder, without another process."""
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        contextlib.redirect_stdout(io.StringIO()) as printed,
+    ):
+        patch.chdir(folder)
+        patch.syspath_prepend(folder)
+        runpy.run_path(name, run_name="__main__")
+    return printed.getvalue()
+
+
 @pytest.fixture(scope="module")
 def worked(tmp_path_factory):
     """A folder in which the tutorial's files were written and its steps 2 to 4 run."""
@@ -32,14 +47,14 @@ def worked(tmp_path_factory):
     for code in blocks("python"):
         name = code.splitlines()[0].removeprefix("# ")
         (folder / name).write_text(code)
-    run([sys.executable, "measure.py"], folder)
+    script("measure.py", folder)
     (command,) = blocks("bash")
     words = command.split()
     assert words[0] == "python"
     at = words.index("logs/*.csv")
     words[at : at + 1] = sorted(f"logs/{path.name}" for path in (folder / "logs").glob("*.csv"))
     told = run([sys.executable, *words[1:]], folder)
-    used = run([sys.executable, "use.py"], folder)
+    used = script("use.py", folder)
     return json.loads((folder / "gap" / "gap.json").read_text()), told, used
 
 
@@ -67,6 +82,6 @@ def test_the_heater_has_a_longer_time_constant_and_a_delay(tmp_path):
         name = code.splitlines()[0].removeprefix("# ")
         if "heater" in name:
             (tmp_path / name).write_text(code)
-    says = run([sys.executable, "ask_heater.py"], tmp_path)
+    says = script("ask_heater.py", tmp_path)
     assert re.search(r"CONFIRMED +Time constant: \+(29|30)[.\d]* s", says)
     assert re.search(r"CONFIRMED +Delay at power: time (5\.9|6\.[01])\d* s", says)

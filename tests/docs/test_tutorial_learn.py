@@ -1,8 +1,9 @@
-"""The tutorial's systems run as they are written, with less training."""
+"""The tutorial's systems run as they are written, with less training and shorter episodes."""
 
 import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -11,14 +12,15 @@ import numpy as np
 import pytest
 
 from policy import load_policy
+from studies import learn
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial-learn.md"
 LESS = [
-    "--budget.idealised_steps", "700", "--budget.difference_steps", "400",
+    "--budget.idealised_steps", "400", "--budget.difference_steps", "300",
     "--budget.iterations", "1", "--budget.true_samples", "150",
 ]  # fmt: skip
-SMALL_DDPG = ["--ddpg.hidden", "[32, 32]", "--ddpg.warm_up", "300"]
+SMALL_DDPG = ["--ddpg.hidden", "[32, 32]", "--ddpg.warm_up", "200"]
 
 
 def blocks(language):
@@ -38,23 +40,36 @@ def run(command, folder):
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tutorial")
     for code in blocks("python"):
+        code = code.replace("horizon = 200", "horizon = 60")
         (folder / code.splitlines()[0].removeprefix("# ")).write_text(code)
     return folder
 
 
-def learnt(folder, command, more):
+@pytest.fixture
+def here(folder, monkeypatch):
+    """In the folder, as for whoever starts Python there."""
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def learnt(folder, command, more, own_process=False):
     words = command.split()
-    assert words[0] == "python"
+    assert words[:3] == ["python", "-m", "studies.learn"]
     output = f"out{len(list(folder.glob('out*')))}"
-    run([sys.executable, *words[1:], *LESS, *more, "--output", output], folder)
+    given = [*words[3:], *LESS, *more, "--output", output]
+    if own_process:
+        run([sys.executable, *words[1:3], *given], folder)
+    else:
+        learn.main(given)
     assert "Policies" in (folder / output / "report.html").read_text()
     return output, json.loads((folder / output / "results.json").read_text())
 
 
 def test_the_file_is_short_and_the_command_learns(folder):
     assert len((folder / "cart_pole.py").read_text().splitlines()) <= 60
-    command, more = blocks("bash")[0], [*SMALL_DDPG, "--budget.true_samples", "300"]
-    output, found = learnt(folder, command, more)
+    command, more = blocks("bash")[0], [*SMALL_DDPG, "--budget.true_samples", "200"]
+    output, found = learnt(folder, command, more, own_process=True)
     assert [policy["name"] for policy in found["policies"]] == ["idealised", "difference"]
     errors = found["accuracy"][0]["visited"]["one_step"]
     assert max(errors.values()) < 0.2
@@ -72,27 +87,27 @@ def test_the_file_is_short_and_the_command_learns(folder):
         np.testing.assert_array_equal(acted, episode["actions"])
 
 
-def test_the_python_call_runs(folder):
-    code = (folder / "call.py").read_text()
-    few = "from policy import DDPGConfig\nimport cart_pole\ncart_pole.SwingUp.horizon = 60\n" + (
+def test_the_python_call_runs(here, capsys):
+    code = (here / "call.py").read_text()
+    few = "from policy import DDPGConfig\n" + (
         code.replace("samples=450, updates=2", "samples=60, updates=1, steps=300, "
                      "ddpg=DDPGConfig((16, 16), warm_up=100)")
     )  # fmt: skip
     assert few != code
-    (folder / "few.py").write_text(few)
-    assert "Learnt(system: return on the true system" in run([sys.executable, "few.py"], folder)
-    assert (folder / "report.html").exists() and list((folder / "kept").glob("difference-*"))
+    (here / "few.py").write_text(few)
+    runpy.run_path("few.py", run_name="__main__")
+    assert "Learnt(system: return on the true system" in capsys.readouterr().out
+    assert (here / "report.html").exists() and list((here / "kept").glob("difference-*"))
 
 
 @pytest.mark.parametrize("learner", ["ddpg", "sac"])
-def test_a_mujoco_environment_is_the_true_system(folder, learner):
+def test_a_mujoco_environment_is_the_true_system(here, learner):
     pytest.importorskip("mujoco")
     pytest.importorskip("imageio")
     command = blocks("bash")[1 if learner == "ddpg" else 2]
     small = "{policy_kwargs: {net_arch: [16, 16]}, learning_starts: 100}"
-    few = ["--budget.idealised_steps", "500", "--budget.difference_steps", "300"]
-    more = SMALL_DDPG if learner == "ddpg" else ["--learner_options", small, *few]
-    _, found = learnt(folder, command, more)
+    more = SMALL_DDPG if learner == "ddpg" else ["--learner_options", small]
+    _, found = learnt(here, command, more)
     _first, second = found["policies"]
     assert second["true_samples"] == 150 and second["updates"] > 0
     # The truth cannot be set to a state, so accuracy is where the policy goes and nowhere else.

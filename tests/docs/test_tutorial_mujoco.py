@@ -1,14 +1,19 @@
 """The tutorial on MuJoCo runs as it is written: it names what is hidden, and the policy holds."""
 
+import contextlib
+import io
 import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
 
 import mujoco
 import pytest
+
+from studies import learn
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial-mujoco.md"
@@ -28,6 +33,25 @@ def run(words, folder):
     return done.stdout
 
 
+@contextlib.contextmanager
+def inside(folder):
+    """In a folder, as for whoever starts Python there; gives what is printed."""
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        contextlib.redirect_stdout(io.StringIO()) as printed,
+    ):
+        patch.chdir(folder)
+        patch.syspath_prepend(folder)
+        yield printed
+
+
+def script(name, folder):
+    """What a script prints, without another process that imports everything anew."""
+    with inside(folder) as printed:
+        runpy.run_path(name, run_name="__main__")
+    return printed.getvalue()
+
+
 @pytest.fixture(scope="module")
 def worked(tmp_path_factory):
     """A folder in which steps 1 to 3 of the tutorial were done."""
@@ -36,7 +60,7 @@ def worked(tmp_path_factory):
     (folder / "lever.xml").write_text(model)
     for code in (*blocks("python"), *blocks("yaml")):
         (folder / code.splitlines()[0].removeprefix("# ")).write_text(code)
-    run(["measure.py"], folder)
+    script("measure.py", folder)
     command, _ = blocks("bash")
     told = run(command.split()[1:], folder)
     return folder, json.loads((folder / "gap" / "gap.json").read_text()), told
@@ -54,7 +78,7 @@ def test_the_payload_and_the_friction_are_named(worked):
 
 def test_the_corrected_model_is_the_file_with_two_attributes_changed(worked):
     folder, _, _ = worked
-    changed = run(["compare.py"], folder)
+    changed = script("compare.py", folder)
     assert "<!-- hangs down at zero -->" not in changed
     assert 'frictionloss="0.0' in changed
     model = mujoco.MjModel.from_xml_path(str(folder / "gap" / "corrected.xml"))
@@ -63,7 +87,7 @@ def test_the_corrected_model_is_the_file_with_two_attributes_changed(worked):
 
 def test_the_policy_holds_the_robot(worked):
     folder, _, _ = worked
-    told = run(["train.py"], folder)
+    told = script("train.py", folder)
     angle = float(re.search(r"holds ([\d.-]+) rad", told)[1])
     assert angle == pytest.approx(1.0, abs=0.15)
 
@@ -71,8 +95,11 @@ def test_the_policy_holds_the_robot(worked):
 def test_the_loop_runs_on_it(worked):
     folder, _, _ = worked
     _, command = blocks("bash")
-    less = ["--budget.idealised_steps", "600", "--budget.difference_steps", "300"]
-    small = ["--ddpg.hidden", "[32, 32]", "--ddpg.warm_up", "300"]
-    run([*command.split()[1:], *less, *small], folder)
+    less = ["--budget.idealised_steps", "400", "--budget.difference_steps", "300"]
+    small = ["--ddpg.hidden", "[32, 32]", "--ddpg.warm_up", "200"]
+    words = command.split()
+    assert words[:3] == ["python", "-m", "studies.learn"]
+    with inside(folder):
+        learn.main([*words[3:], *less, *small])
     found = json.loads((folder / "learnt" / "results.json").read_text())
     assert [policy["name"] for policy in found["policies"]] == ["idealised", "difference"]

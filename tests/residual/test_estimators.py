@@ -34,12 +34,12 @@ CHECKED = [
     Linear(),
     Linear(features="raw"),
     Linear(features="quadratic", alpha=1.0),
-    GaussianProcess(max_iter=10, random_state=0),
-    GaussianProcess(max_iter=10, max_points=30, inducing=20, kernel="matern", random_state=0),
+    GaussianProcess(max_iter=5, random_state=0),
+    GaussianProcess(max_iter=5, max_points=30, inducing=20, kernel="matern", random_state=0),
     DropoutNet(
-        hidden=(32, 32), dropout=0.05, epochs=60, batch_size=32, learning_rate=0.01, random_state=0
+        hidden=(32, 32), dropout=0.05, epochs=30, batch_size=32, learning_rate=0.01, random_state=0
     ),
-    DropoutNet(hidden=(32,), dropout=0.0, epochs=60, batch_size=32, paper=True, random_state=0),
+    DropoutNet(hidden=(32,), dropout=0.0, epochs=30, batch_size=32, paper=True, random_state=0),
     ChannelFeatures(),
 ]
 
@@ -108,7 +108,7 @@ def test_same_seed_same_bits_whatever_the_global_generators_hold(estimator):
 
 
 @pytest.mark.parametrize("estimator", small(), ids=lambda e: type(e).__name__)
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(
     scale=st.floats(1e-3, 1e3), shift=st.floats(-1e2, 1e2), unit=st.sampled_from([1e-3, 1.0, 1e4])
 )

@@ -232,7 +232,7 @@ def test_the_python_call_is_the_loop(tmp_path):
 
 def test_what_named_effects_named_is_told(tmp_path):
     found = learn_by_difference(
-        SYSTEM.nominal, SYSTEM.true, SYSTEM.task, estimator=NamedEffects(), samples=90, updates=1,
+        SYSTEM.nominal, SYSTEM.true, SYSTEM.task, estimator=NamedEffects(), samples=40, updates=1,
         steps=120, ddpg=DDPG, evaluation=SYSTEM.evaluation, progress=Silent(),
     )  # fmt: skip
     (record,) = found.accuracy

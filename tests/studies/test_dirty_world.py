@@ -24,6 +24,13 @@ SHARP = Sensors(noise=0.0, coloured=0.0)
 LABELS = [(system, label) for system, labels in HIDDEN.items() for label in labels]
 
 
+@pytest.fixture
+def short_records(monkeypatch):
+    """A quarter of the seconds, at the lowest rates."""
+    monkeypatch.setattr(sets, "SECONDS", {name: 0.25 * s for name, s in sets.SECONDS.items()})
+    monkeypatch.setattr(sets, "RATES", {name: rates[:1] for name, rates in sets.RATES.items()})
+
+
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_a_clean_truth_moves_as_the_nominal_simulator(system):
     """Two derivations of the same equations, two integrators."""
@@ -35,7 +42,7 @@ def test_a_clean_truth_moves_as_the_nominal_simulator(system):
 
 
 @pytest.mark.parametrize(("system", "label"), LABELS)
-def test_a_hidden_effect_is_what_the_library_calls_so(system, label):
+def test_a_hidden_effect_is_what_the_library_calls_so(system, label, short_records):
     """With the library's effect at the true strength, nothing is left."""
     name, _, where = label.partition("@")
     made = make_set({"system": system, "hidden": label, "size": 4.0, "layout": "ramp", "seed": 5})
@@ -82,7 +89,7 @@ def test_restarts_at_jumps_change_nothing():
     np.testing.assert_allclose(seen, expected, atol=2e-6)
 
 
-def test_sets_are_repeatable_and_held_runs_are_others():
+def test_sets_are_repeatable_and_held_runs_are_others(short_records):
     config = {"system": "cart", "hidden": "cart_mass", "size": 4.0, "layout": "many", "seed": 8}
     a, b = make_set(config), make_set(config)
     np.testing.assert_array_equal(a.logs[3].states, b.logs[3].states)
@@ -172,9 +179,7 @@ def test_an_effect_that_cannot_be_hidden_is_one_line(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-def test_fast_subset(tmp_path, capsys, monkeypatch):
-    """With a quarter of the records."""
-    monkeypatch.setattr(sets, "SECONDS", {name: 0.25 * s for name, s in sets.SECONDS.items()})
+def test_fast_subset(tmp_path, capsys, short_records):
     main(["--config", "studies/configs/hidden_effects/dirty_fast.yaml", "--output", str(tmp_path)])
     assert "or its family" in capsys.readouterr().out
     text = (tmp_path / "dirty.md").read_text()

@@ -15,6 +15,7 @@ import studies
 from sims.loading import load_simulator
 from sims.pendulum_equation import PendulumEquation
 from studies.find_gap import main, run
+from studies.make_log import main as make_log
 from studies.make_log import write_logs
 
 EQUATION = "sims.pendulum_equation.PendulumEquation"
@@ -61,8 +62,7 @@ def words_of(page):
 
 
 def test_a_first_try_confirms_the_mass_with_default_options(tmp_path):
-    made = command(["--output", "logs", "--runs", 8], tmp_path, "studies.make_log")
-    assert made.returncode == 0, made.stderr
+    make_log(["--output", str(tmp_path / "logs"), "--runs", "8"])
     logs = sorted((tmp_path / "logs").glob("*.csv"))
     done = command(["--simulator", EQUATION, "--output", "gap", "--logs", *logs], tmp_path)
     assert done.returncode == 0, done.stderr

@@ -23,6 +23,9 @@ from studies.hidden.strengths import HIDDEN, sizes, strength, truth
 from studies.hidden_effects import main
 from studies.running.progress import Silent
 
+#: What a play may be taken for.
+ALIKE = ("backlash", "dead_zone", "coulomb_friction", "delay", "sensor_offset")
+
 
 def test_every_strength_makes_the_gap_that_was_asked_for():
     for name in HIDDEN:
@@ -58,7 +61,7 @@ def test_play_moves_as_in_the_simulator():
 
 def test_play_is_named_with_its_width():
     logs = make_logs(Truth(backlash=0.35), 8, "strong", "A", 4)
-    (verdict,) = find_gap(PendulumEquation(), logs).verdicts
+    (verdict,) = find_gap(PendulumEquation(), logs, effects=ALIKE).verdicts
     assert (verdict.kind, verdict.effect) == ("confirmed", "backlash")
     assert verdict.parameters["width"].low <= 0.35 <= verdict.parameters["width"].high
 

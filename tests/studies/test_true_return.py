@@ -25,7 +25,7 @@ def true_return(seed, budget, **options):
 def test_one_update_beats_the_idealised_policy():
     quick = EvaluationProtocol(every=1000, noisy=1)
     small = DDPGConfig(hidden=(64, 48), actor_lr=3e-4)
-    before, after = true_return(0, Budget(400, 1, 10_000, 4000), ddpg=small, evaluation=quick)
+    before, after = true_return(0, Budget(400, 1, 6000, 3000), ddpg=small, evaluation=quick)
     assert after > before
 
 

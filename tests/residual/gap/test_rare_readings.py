@@ -18,6 +18,8 @@ from sims.effects import ConstantLoad, CoulombFriction
 from sims.pendulum_equation import PendulumEquation
 
 NOISE = np.array([0.003, 0.03])
+#: Enough to be wrong with.
+OFFERED = ("coulomb_friction", "viscous_friction", "mass")
 
 
 def log(effects=(), every=(1, 1), seconds=20.0, seed=0):
@@ -70,7 +72,7 @@ def test_noise_is_told_from_motion(every):
     ((CoulombFriction("pivot", 0.003),), "confirmed"), ((), "no_gap"),
 ])  # fmt: skip
 def test_an_answer_does_not_take_every_row_for_a_reading(effects, kind):
-    result = find_gap(PendulumEquation(dt=0.01), [log(effects, (5, 5))])
+    result = find_gap(PendulumEquation(dt=0.01), [log(effects, (5, 5), 12.0)], effects=OFFERED)
     assert result.verdicts[0].kind == kind
     if effects:
         named = result.effects[0]
@@ -83,6 +85,6 @@ def test_what_noise_alone_makes_is_not_put_down_to_parameters():
     """A hundred readings of the angle alone: 46 % of the "gap" were parameters off by 0.1 %."""
     run = log(every=(20, 1))
     alone = dataclasses.replace(run, states=np.where([True, False], run.states, np.nan))
-    result = find_gap(PendulumEquation(dt=0.01), [alone])
+    result = find_gap(PendulumEquation(dt=0.01), [alone], effects=OFFERED)
     assert [verdict.kind for verdict in result.verdicts][:1] == ["no_gap"]
     assert not result.effects

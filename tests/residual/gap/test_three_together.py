@@ -58,6 +58,13 @@ def levels(seed):
     return Trajectory(f"run {seed}", DT * np.arange(len(seen)), seen, pump[:, None])
 
 
+#: The three, and what may be taken for them.
+OFFERED = (
+    "constant_load", "proportional_loss", "sensor_scale", "sensor_offset", "actuator_gain",
+    "upper_hole", "lower_hole",
+)  # fmt: skip
+
+
 def cut(log, row):
     """One record as two."""
     first, second = slice(0, row + 1), slice(row, None)
@@ -71,10 +78,10 @@ def cut(log, row):
 @pytest.mark.parametrize("row", [None, 90], ids=["one record", "cut in two"])
 def test_three_that_help_only_together_are_found(row):
     log = levels(0)
-    found = find_gap(Tanks(), cut(log, row) if row else [log])
+    found = find_gap(Tanks(), cut(log, row) if row else [log], effects=OFFERED)
     sizes = {str(effect): effect for effect in found.effects}
     assert {"upper_hole", "lower_hole"} <= set(sizes)
-    assert {"constant_load@upper", "actuator_bias@pump"} & set(sizes)
+    assert "constant_load@upper" in sizes
     assert 0.03 + sizes["upper_hole"].change == pytest.approx(UPPER, rel=0.15)
     assert found.gap.share.value > 0.9
 
@@ -84,11 +91,7 @@ def offered():
     """A search in which all three are candidates among others, and the three."""
     simulator, names = Tanks(), ("constant_load@upper", "upper_hole", "lower_hole")
     ready = prepare(simulator, [levels(0)], 100.0)
-    chosen = (
-        "constant_load", "proportional_loss", "sensor_scale", "sensor_offset", "actuator_gain",
-        "upper_hole", "lower_hole",
-    )  # fmt: skip
-    pool = candidates(simulator, chosen_effects(simulator, chosen), ready.fitter.samples)
+    pool = candidates(simulator, chosen_effects(simulator, OFFERED), ready.fitter.samples)
     places = {candidate.label: number for number, candidate in enumerate(pool)}
     return Search(simulator, pool, ready.fitter), places, tuple(sorted(places[n] for n in names))
 

@@ -1,5 +1,7 @@
 """The corrected model file: plain MuJoCo moves as our simulator does, the text stays as it was."""
 
+import functools
+
 import mujoco
 import numpy as np
 import pytest
@@ -58,9 +60,14 @@ CASES = [
 ]
 
 
+@functools.cache
+def built(name, integrator):
+    return robot(name, integrator=integrator)
+
+
 @pytest.mark.parametrize(("name", "label", "integrator"), CASES)
 def test_plain_mujoco_gives_the_same_rollout(name, label, integrator, tmp_path):
-    simulator = robot(name, integrator=integrator)
+    simulator = built(name, integrator)
     (effect,) = [e for e in simulator.offered_effects() if str(e) == label]
     changed = simulator.with_effects([at_a_usual_size(effect, simulator)])
     corrected, path = saved(changed, tmp_path)

@@ -46,7 +46,7 @@ def test_it_is_one_whose_error_shrinks():
         states[k + 1] = v, t
     states += rng.normal(0, [0.02, 0.02], states.shape)
     run = Trajectory("run", 0.5 * np.arange(steps + 1), states, thrust[:, None])
-    found = find_gap(Boat(), [run], effects=["coulomb_friction", "constant_load", "delay"])
+    found = find_gap(Boat(), [run], effects=["coulomb_friction", "constant_load"], horizon=10.0)
     assert "coulomb_friction" in {v.effect for v in found.verdicts if v.kind == "confirmed"}
     assert found.gap.channel == "speed"
     assert found.gap.after.value < 0.5 * found.gap.before.value

@@ -160,9 +160,13 @@ def integrated(rhs, start, inputs, dt, noise, seed):
     """A log by SciPy's adaptive integrator, inputs held for 25 samples each."""
     rng = np.random.default_rng(seed)
     states = [np.array(start, float)]
-    for u in inputs:
-        path = solve_ivp(lambda t, x, u=u: rhs(x, u), (0, dt), states[-1], rtol=1e-8, atol=1e-10)
-        states.append(path.y[:, -1])
+    for u in inputs[::25]:
+        within = dt * np.arange(1, 26)
+        path = solve_ivp(
+            lambda t, x, u=u: rhs(x, u), (0, within[-1]), states[-1], t_eval=within, rtol=1e-8,
+            atol=1e-10,
+        )  # fmt: skip
+        states.extend(path.y.T)
     seen = np.array(states) + rng.normal(size=(len(states), len(start))) * noise
     return Trajectory(f"log {seed}", dt * np.arange(len(seen)), seen, inputs[:, None])
 

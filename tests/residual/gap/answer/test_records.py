@@ -66,7 +66,7 @@ def test_what_is_the_same_in_all_records_is_named_beside_what_differs():
 )
 def test_records_that_agree_are_not_said_to_differ(truth):
     """Also where something has no name: a wind that no library holds."""
-    assert ask(logs(*[truth] * 4)).unlike == ()
+    assert ask(logs(*[truth] * 3)).unlike == ()
 
 
 def test_loads_of_a_lift_are_told_in_place_of_what_makes_the_best_of_them():
@@ -82,5 +82,5 @@ def test_loads_of_a_lift_are_told_in_place_of_what_makes_the_best_of_them():
 
 
 def test_nothing_is_said_of_a_single_record():
-    (run,) = make_logs(Truth(wind=4e-3), 5, "strong", "A", runs=1, steps=600)
+    (run,) = make_logs(Truth(wind=4e-3), 5, "strong", "A", runs=1, steps=300)
     assert ask([run]).unlike == ()

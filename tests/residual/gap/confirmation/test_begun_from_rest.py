@@ -27,7 +27,7 @@ TESTS = [steps(s, [duty], 0.0, hold=120) for s, duty in enumerate((0.4, 0.8, 0.6
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_lag_shows_in_step_tests_that_begin_with_the_step(turned):
-    found = find_gap(Oven(), TESTS[::-1] if turned else TESTS)
+    found = find_gap(Oven(), TESTS[::-1] if turned else TESTS, effects=OFFERED)
     assert lag_of(found) == pytest.approx(LAG, rel=0.05)
     assert told(found)
     assert found.gap.after.value < 0.1 * found.gap.before.value

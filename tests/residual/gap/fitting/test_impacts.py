@@ -45,7 +45,7 @@ def test_a_payload_is_found_and_windows_are_followed_past_impacts():
 #: A ball that is pushed off the ground, and falls back on it.
 BALL = """
 <mujoco>
-  <option timestep="0.002" integrator="RK4"/>
+  <option timestep="0.004" integrator="RK4"/>
   <worldbody>
     <geom type="plane" size="5 5 .1" solref="-4000 -10"/>
     <body name="ball" pos="0 0 .1">

@@ -20,7 +20,7 @@ EFFECTS = ("torso_mass", "friction")
 def search():
     """Short rollouts of the true Leo about its feet's touch-down, and two of its parameters."""
     leo = Leo()
-    states, actions = random_poses(np.random.default_rng(5), rollouts=30, steps=10)
+    states, actions = random_poses(np.random.default_rng(5), rollouts=8, steps=8)
     runs = [
         Trajectory(f"run {i}", leo.dt * np.arange(len(path), dtype=float), path, volts)
         for i, (path, volts) in enumerate(zip(states, actions, strict=True))
@@ -46,4 +46,4 @@ def test_start_states_stay_as_they_are_known(search):
     data = search.fitter.data
     np.testing.assert_array_equal(search.nominal.inner.fitted.starts, data.guess)
     for start, stop in itertools.islice(data.samples.runs, 3):
-        assert stop - start == 11
+        assert stop - start == 9

@@ -1,5 +1,7 @@
 """The right model leaves the noise and nothing else; a fit finds the number that was hidden."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from studies.hidden.data import Truth, make_logs
 NOISE = {"A": [0.01, 0.2], "B": [0.002 / np.sqrt(12)], "C": [0.01]}
 
 
+@functools.cache
 def surveyed(truth, excitation, kind, runs=5, seed=3):
     logs = make_logs(truth, seed, excitation, kind, runs)
     fitter, floor = smooth_fitter(PendulumEquation(), logs, 0.5)
@@ -48,7 +51,7 @@ def test_noise_does_not_depend_on_how_many_windows_are_fitted_at_once(kind, monk
     truth = Truth(mass=0.03)
     _, whole = surveyed(truth, "strong", kind, runs=2)
     monkeypatch.setattr("residual.gap.fitting.noise.AT_ONCE", 7)
-    _, parts = surveyed(truth, "strong", kind, runs=2)
+    _, parts = surveyed.__wrapped__(truth, "strong", kind, runs=2)
     for name in ("sigma", "error", "nodes", "force"):
         assert np.array_equal(getattr(parts, name), getattr(whole, name))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import ClassVar
 
 import numpy as np
@@ -23,6 +24,7 @@ LARGE = [
 ]  # fmt: skip
 
 
+@functools.cache
 def log(effects=(), seed=0, dt=0.02, start=0.3, most=2.0):
     """A pendulum swinging about its lowest point, driven either way."""
     rng = np.random.default_rng(seed)
