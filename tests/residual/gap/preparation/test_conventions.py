@@ -30,7 +30,8 @@ def log(effects=(), seed=0, dt=0.02, start=0.3, most=2.0):
     rng = np.random.default_rng(seed)
     simulator = PendulumEquation(dt=dt)
     volts = np.repeat(rng.uniform(-most, most, (1, 40, 1)), 20, axis=1)
-    states = simulator.with_effects(list(effects)).rollout(np.array([[np.pi + start, 0.0]]), volts)[0]
+    first = np.array([[np.pi + start, 0.0]])
+    states = simulator.with_effects(list(effects)).rollout(first, volts)[0]
     states += np.array([0.003, 0.03]) * rng.standard_normal(states.shape)
     return Trajectory("run", dt * np.arange(len(states)), states, volts[0])
 
