@@ -11,17 +11,23 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from residual.gap.answer.answer import Answer
 from residual.gap.data.blocks import ENOUGH
 from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.fitting.validation import by_block
 from residual.gap.search.comparisons import takes_off
 from residual.trajectories import Trajectory
+
+Array = NDArray[np.float64]
 
 #: Share of the nominal simulator's squared error, all joints averaged, that lies in one block.
 MOST = 0.5
 #: Part of its error in that block up to which a set explains it.
 HARDLY = 0.7
+#: Part of the motion over that of the error, from which on it may be the motion that is not known.
+MOVES = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,20 +38,28 @@ class Stretch:
         run: Name of the run.
         begin, end: Its first and last row, in s since the start of the log.
         share: Its part of the nominal simulator's squared error.
+        motion: Its part of the squared way that is gone.
     """
 
     run: str
     begin: float
     end: float
     share: float
+    motion: float
 
     def says(self, left_out: bool) -> str:
         """A sentence for the user."""
         told = (
             f"{self.share:.0%} of the squared error lies in one stretch, {self.run} from "
-            f"{self.begin:.4g} to {self.end:.4g} s, and nothing that was tried explains it: was "
-            "it held, knocked or reset there?"
+            f"{self.begin:.4g} to {self.end:.4g} s, and nothing that was tried explains it: "
         )
+        if self.motion > MOVES * self.share:
+            told += (
+                f"{self.motion:.0%} of the motion lies there, too, so that more of its kind, in "
+                "other records, may tell"
+            )
+            return f"{told}. It was left out of everything that is said" if left_out else told
+        told += "was it held, knocked or reset there?"
         if left_out:
             return f"{told} It was left out of everything that is said"
         return f"{told} Look there, or leave it out"
@@ -88,7 +102,20 @@ def lone_stretch(answer: Answer) -> Stretch | None:
     rows = windows.index[own][windows.inside[own]]
     run = samples.names[int(windows.run[own][0])]
     begin, end = samples.times[rows.min()], samples.times[rows.max()]
-    return Stretch(run, float(begin), float(end), float(stakes[block] / stakes.sum()))
+    share = stakes[block] / stakes.sum()
+    return Stretch(run, float(begin), float(end), float(share), float(_motion(fitter)[block]))
+
+
+def _motion(fitter: SmoothFitter) -> Array:
+    """Every block's part of the squared way from the starts of windows, (B,), all channels
+    averaged."""
+    samples, windows = fitter.samples, fitter.blocks.windows
+    seen = samples.seen[windows.index][..., samples.measured]
+    way = np.where(windows.inside[..., None], seen - seen[:, :1], np.nan)
+    there = np.isfinite(way)
+    mean = np.where(there, way, 0.0) ** 2
+    squares = by_block(mean.sum(axis=1) / np.maximum(there.sum(axis=1), 1), fitter.blocks)
+    return np.nanmean(squares / np.maximum(np.nansum(squares, axis=0), 1e-300), axis=1)
 
 
 def explains_the_rest(second: Answer) -> bool:

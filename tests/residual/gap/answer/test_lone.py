@@ -1,6 +1,7 @@
 """A stretch that was knocked, held or reset does not hide what the rest shows, and is told."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -8,7 +9,9 @@ import pytest
 from residual.gap import find_gap
 from residual.gap.answer.lone import Stretch
 from residual.trajectories import Trajectory
+from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel, Parameter
 from studies.hidden.data import Truth, make_logs
 
 MIDDLE, LONG = 125, 50
@@ -64,12 +67,45 @@ def test_a_run_without_a_stretch_of_its_own_is_two():
         Trajectory(name, times, np.stack([times, times], axis=1), times[:-1, None])
         for name in ("a", "b")
     ]
-    cut = Stretch("b", 3.0, 5.0, 0.9).cut_from(runs)
+    cut = Stretch("b", 3.0, 5.0, 0.9, 0.1).cut_from(runs)
     assert [(run.name, run.times.tolist()) for run in cut] == [
         ("a", times.tolist()),
         ("b", [0.0, 1.0, 2.0]),
         ("b", [6.0, 7.0, 8.0, 9.0]),
     ]
     assert [run.actions[:, 0].tolist() for run in cut[1:]] == [[0.0, 1.0], [6.0, 7.0, 8.0]]
-    (begun,) = Stretch("b", 0.0, 5.0, 0.9).cut_from(runs[1:])
+    (begun,) = Stretch("b", 0.0, 5.0, 0.9, 0.1).cut_from(runs[1:])
     assert begun.times.tolist() == [6.0, 7.0, 8.0, 9.0]
+
+
+def test_a_stretch_that_holds_most_of_the_motion_is_no_matter_of_a_hand():
+    says = Stretch("a", 0.0, 1.0, share=0.6, motion=0.5).says(left_out=False)
+    assert "50% of the motion lies there, too" in says
+    assert "knocked" not in says
+    assert "knocked" in Stretch("a", 0.0, 1.0, share=0.6, motion=0.1).says(left_out=False)
+
+
+class Servo(FirstOrderSystem):
+    """It follows its command as a first-order lag; its speed has no limit."""
+
+    dt = 0.05
+    state_channels = (Channel("angle", "rad", "other", scale=1.0),)
+    action_channels = (Channel("command", "rad", "input", scale=1.0, low=-3.0, high=3.0),)
+    parameters: ClassVar = {"time_constant": Parameter(0.1, "s", "of the servo", low=0.005)}
+
+    def derivative(self, x, u, p):
+        return ((u[:, 0] - x[:, 0]) / p.time_constant)[:, None]
+
+
+def test_where_alone_it_moves_is_told_as_such():
+    """A limit of speed, which no effect is, shows in the one large step."""
+    rng = np.random.default_rng(0)
+    command = np.repeat([0.0, 0.05, 2.5, 2.45, 2.5, 2.45], 40)
+    seen = [0.0]
+    for goal in command[:-1]:
+        seen.append(seen[-1] + float(np.clip(goal - seen[-1], -0.08, 0.08)) * 0.4)
+    states = np.array(seen)[:, None] + 3e-3 * rng.standard_normal((len(seen), 1))
+    run = Trajectory("run", 0.05 * np.arange(len(seen)), states, command[:-1, None])
+    found = find_gap(Servo(), [run], effects=["sensor_offset"])
+    (said,) = [one for one in found.quality if "one stretch" in one]
+    assert "of the motion lies there, too" in said
