@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Gauss-Newton turns of a start state.
-TURNS = 3
+#: Gauss-Newton turns of a start state, and most of them where it is still far off.
+TURNS, MOST = 3, 20
 
 
 def starts(
@@ -39,7 +39,8 @@ def starts(
     there = (fitter.valid & lead[..., None])[:, :length]
     ridges = np.broadcast_to(ridge, (len(windows), *ridge.shape))
     best, least = states, np.full(len(windows), np.inf)
-    for turn in range(TURNS + 1):
+    far = False
+    for turn in range(MOST + 1):
         variants = np.repeat(states[None], 1 + len(free), axis=0)
         for row, column in enumerate(free):
             variants[1 + row, :, column] += moves[row]
@@ -54,7 +55,7 @@ def starts(
         better = cost < least
         best = np.where(better[:, None], states, best)
         least = np.where(better, cost, least)
-        if turn == TURNS:
+        if turn == MOST or (turn >= TURNS and not far):
             break
         with np.errstate(over="ignore"):  # of paths that run away; clipped below
             slope = (path[1:] - path[0]) / moves[:, None, None, None] / fitter.sigma
@@ -64,5 +65,8 @@ def starts(
         right = np.concatenate([gap, np.zeros((len(windows), len(free)))], axis=1)
         step = np.linalg.solve(triangle, basis.transpose(0, 2, 1) @ right[..., None])[..., 0]
         states = states.copy()
-        states[:, free] += np.clip(step, -limit, limit)
+        # As far as is allowed, in its own direction: a part of it alone may lead uphill.
+        beyond = np.maximum(np.abs(step / limit).max(axis=1), 1.0)
+        states[:, free] += step / beyond[:, None]
+        far = bool((better & (beyond > 1.0)).any())
     return best
