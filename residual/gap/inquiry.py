@@ -17,9 +17,9 @@ from residual.gap.confirmation.rest import fits_better_from_rest
 from residual.gap.confirmation.twins import exact_twins, with_twins
 from residual.gap.fitting.smooth import LEAD, SmoothFitter
 from residual.gap.log import Log
+from residual.gap.longer import longer_horizon
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.offered import Offered
-from residual.gap.preparation.horizon import FEWER, usual_horizon
 from residual.gap.preparation.numerics import held_otherwise, how_held
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.search.explain import Explanation, explain
@@ -27,9 +27,6 @@ from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.host import HostSimulator
-
-#: By how much longer forecasts have to be to show something else.
-LONGER = 1.25
 
 
 @dataclasses.dataclass(frozen=True)
@@ -211,15 +208,16 @@ class Inquiry:
     def over_longer_forecasts(self, log: Log, known: Confirmed, tolerance: float) -> Confirmed:
         """The same, or what is found over longer forecasts, of which the records hold fewer.
 
-        They are tried where the usual ones had to be shortened and nothing could be named.
+        They are tried where nothing could be named.
         """
         search = known.answer.found.search
         if log.by_user or known.answer.key or search.beside:
             return known
         simulator = search.simulator
-        longer = log.at(usual_horizon(simulator, log.recorded, FEWER))
-        if longer.horizon < LONGER * log.horizon or time.process_time() > self.clock.search_until:
+        horizon = longer_horizon(simulator, log, known.answer)
+        if horizon is None or time.process_time() > self.clock.search_until:
             return known
+        longer = log.at(horizon)
         self.tell("once more over longer forecasts, of which the records hold fewer")
         ready, answer = self._asked_of(simulator, longer.runs, longer.horizon, tolerance)
         if not explains_the_rest(answer):
