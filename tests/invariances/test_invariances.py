@@ -24,7 +24,6 @@ QUICK = {
 }
 #: What fails today, and how.
 FAILS: dict[tuple[str, str], str] = {
-    ("heater", "copy"): "the lag goes from 17.3 s to 14.3 s, just outside each other's interval",
     (
         "heater",
         "half",
@@ -34,7 +33,6 @@ FAILS: dict[tuple[str, str], str] = {
         "horizon",
     ): "the lag, no longer certain: its share lies in two of five blocks",
     ("pendulum-pair", "horizon"): "saturation in place of the payload, neither certain",
-    ("pendulum-swingup", "half"): "torque gain in place of the payload, each named as one of both",
     ("pendulum-swingup", "horizon"): "a lag and more come up beside the payload, none certain",
     ("pendulum-swingup", "idle noise"): "Coulomb friction comes up beside the payload, not certain",
     ("dirty arm", "cut"): "inertia, not certain, is no longer there, nor a remainder",

@@ -24,9 +24,9 @@ PUBLIC = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "inver
     ],
 )
 def test_what_is_hidden_in_a_robot_is_named(robot, hidden):
-    answer = ask(Case(robot, hidden, 0), minutes=2.0)
-    assert answer.right, answer.named
-    assert not answer.confirmed_wrong
+    answer = ask(Case(robot, hidden, 0))
+    assert answer["right"], answer["named"]
+    assert not answer["confirmed_wrong"]
 
 
 @pytest.mark.long
