@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from residual.gap.answer.answer import Answer, confirm
 from residual.gap.answer.curves import over_the_log, takes_its_place, worth_a_curve
 from residual.gap.answer.free_parameters import better, worth_freeing
-from residual.gap.answer.lone import explains_the_rest, lone_stretch
+from residual.gap.answer.lone import explains_the_rest, left_stretch, lone_stretch
 from residual.gap.clock import Clock
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
@@ -166,9 +166,12 @@ class Inquiry:
         known = Confirmed(prepared, answer, ())
         if matters:
             known = self.without_lone_stretch(log, known, tolerance)
+            lone = bool(known.says)
             known = self.with_parameters_free(known, tolerance)
             known = self.with_curves(known, tolerance)
             known = self.over_longer_forecasts(log, known, tolerance)
+            if not lone and (rest := left_stretch(known.answer)):
+                known = known.and_says(rest.says(left_out=False))
         answer = known.answer
         claims = with_twins(answer.found.search, answer.key, answer.claims)
         return dataclasses.replace(known, answer=dataclasses.replace(answer, claims=claims))

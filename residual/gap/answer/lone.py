@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 MOST = 0.5
 #: Part of its error in that block up to which a set explains it.
 HARDLY = 0.7
+#: Part of the nominal simulator's squared error that is worth a word if it is left in one block.
+MUCH = 0.1
 #: Part of the motion over that of the error, from which on it may be the motion that is not known.
 MOVES = 0.5
 
@@ -37,8 +39,9 @@ class Stretch:
     Attributes:
         run: Name of the run.
         begin, end: Its first and last row, in s since the start of the log.
-        share: Its part of the nominal simulator's squared error.
+        share: Its part of the nominal simulator's squared error, or of what is left of it.
         motion: Its part of the squared way that is gone.
+        beside: Whether it is what is left beside something that was named.
     """
 
     run: str
@@ -46,11 +49,13 @@ class Stretch:
     end: float
     share: float
     motion: float
+    beside: bool = False
 
     def says(self, left_out: bool) -> str:
         """A sentence for the user."""
+        error = "squared error that is left" if self.beside else "squared error"
         told = (
-            f"{self.share:.0%} of the squared error lies in one stretch, {self.run} from "
+            f"{self.share:.0%} of the {error} lies in one stretch, {self.run} from "
             f"{self.begin:.4g} to {self.end:.4g} s, and nothing that was tried explains it: "
         )
         if self.motion > MOVES * self.share:
@@ -97,13 +102,37 @@ def lone_stretch(answer: Answer) -> Stretch | None:
     left = search.currency.by_block(search.validated[answer.key].squares).mean(axis=1)
     if left[block] < HARDLY * stakes[block]:
         return None
+    return _stretch(fitter, block, float(stakes[block] / stakes.sum()))
+
+
+def left_stretch(answer: Answer) -> Stretch | None:
+    """The block that holds most of what is left beside what was named, if that is much.
+
+    Args:
+        answer: What was found, and not for want of a stretch.
+    """
+    search = answer.found.search
+    fitter = search.fitter
+    if not answer.key or not isinstance(fitter, SmoothFitter) or len(fitter.blocks) < ENOUGH:
+        return None
+    before, left = (
+        search.currency.by_block(squares).mean(axis=1)
+        for squares in (search.before.squares, search.validated[answer.key].squares)
+    )
+    block = int(np.argmax(left))
+    if left[block] <= MOST * left.sum() or left[block] < MUCH * before.sum():
+        return None
+    share = float(left[block] / left.sum())
+    return dataclasses.replace(_stretch(fitter, block, share), beside=True)
+
+
+def _stretch(fitter: SmoothFitter, block: int, share: float) -> Stretch:
     windows, samples = fitter.blocks.windows, fitter.samples
     own = fitter.blocks.block == block
     rows = windows.index[own][windows.inside[own]]
     run = samples.names[int(windows.run[own][0])]
     begin, end = samples.times[rows.min()], samples.times[rows.max()]
-    share = stakes[block] / stakes.sum()
-    return Stretch(run, float(begin), float(end), float(share), float(_motion(fitter)[block]))
+    return Stretch(run, float(begin), float(end), share, float(_motion(fitter)[block]))
 
 
 def _motion(fitter: SmoothFitter) -> Array:

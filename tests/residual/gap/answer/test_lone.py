@@ -56,9 +56,10 @@ def test_what_the_rest_of_the_log_shows_is_named():
     assert said.endswith("It was left out of everything that is said")
 
 
-@pytest.mark.long
-def test_a_stretch_with_less_than_half_of_the_error_hides_nothing():
-    assert not with_a_stretch(by_hand)
+def test_what_is_left_in_one_stretch_beside_a_name_is_told():
+    (said,) = with_a_stretch(by_hand)
+    assert "of the squared error that is left lies in one stretch, run 2 from" in said
+    assert said.endswith("Look there, or leave it out")
 
 
 def test_no_stretch_is_told_of_a_log_without_one():
