@@ -74,10 +74,10 @@ def find_gap(
         The verdicts and everything behind them.
 
     Raises:
-        ValueError: There are no trajectories, nothing was measured, or in those set aside nothing
-            that was measured in the others, samples are too rare, the
-            simulator is unsound (``sims.contract``) or returns values that are not finite, or a
-            position of a system that strikes the ground was not measured.
+        ValueError: There are no trajectories, nothing was measured (in those set aside: nothing
+            that was measured in the others), samples are too rare, the simulator is unsound
+            (``sims.contract``) or returns values that are not finite, or a position of a system
+            that strikes the ground was not measured.
     """
     refuse_unsound(simulator)
     clock = Clock(minutes)

@@ -14,6 +14,7 @@ from residual.gap.preparation.horizon import held_by_records, usual_horizon
 from residual.gap.preparation.numerics import stride_for
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.preparation.suited import beyond_noise, horizon_of_windows, needs_closer_rows
+from residual.logs.checks import Finding
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
@@ -57,7 +58,7 @@ def look(
 ) -> Log:
     """Find faults of the data, and how far forecasts go if the user does not say."""
     examined = examine(simulator, trajectories)
-    findings = [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
+    findings = _in_words(examined.findings)
     apart, more = _set_aside(simulator, held, examined.trajectories)
     findings += [f"records set aside: {says}" for says in more if says not in findings]
     simulator = simulator.for_motion([run.states for run in [*examined.trajectories, *apart]])
@@ -100,7 +101,11 @@ def _set_aside(
             f"records set aside: none of them measures {' or '.join(names)}, which the others "
             "measure; give records with these channels"
         )
-    return apart, [f"{finding.where} {finding.says}".strip() for finding in examined.findings]
+    return apart, _in_words(examined.findings)
+
+
+def _in_words(findings: Sequence[Finding]) -> list[str]:
+    return [f"{finding.where} {finding.says}".strip() for finding in findings]
 
 
 def settle(simulator: HostSimulator, log: Log, tell: Callable[[str], None]) -> tuple[Log, Prepared]:

@@ -23,8 +23,6 @@ def longer_horizon(simulator: HostSimulator, log: Log, answer: Answer) -> float 
         answer: In which nothing is named.
     """
     longer = usual_horizon(simulator, log.recorded, FEWER)
-    search = answer.found.search
-    adequate = search.fitter.left(search.tried[()], answer.found.floor).adequate
-    if not adequate and not within_noise(summed_up(answer)):
+    if not answer.found.nominal_left.adequate and not within_noise(summed_up(answer)):
         longer = max(longer, min(log.horizon / PART, longest_horizon(log.recorded, FEWER)))
     return longer if longer >= LONGER * log.horizon else None

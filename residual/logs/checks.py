@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.logs.faults import noise
 from residual.logs.units import find_unit, units_of
 from sims.simulator import Channel, wrap
 
@@ -233,10 +234,7 @@ def _clear(position: Signal, rate: Signal, span: int, moved: Array, integral: Ar
 
 
 def _noise(signal: Signal) -> float:
-    """Standard deviation of the noise, from second differences; fast motion counts as noise."""
-    bends = np.concatenate([np.diff(values, 2) for _, values in signal.runs])
-    bends = np.abs(bends[np.isfinite(bends)])
-    return float(np.median(bends)) / (0.6745 * math.sqrt(6)) if bends.size else math.inf
+    return noise([values for _, values in signal.runs])
 
 
 def _misfit(moved: Array, integral: Array, turning: bool) -> float:

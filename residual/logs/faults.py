@@ -213,6 +213,16 @@ def rounding(runs: Sequence[Array]) -> float:
     return step if values.size and step > _COARSE * float(np.ptp(values)) else 0.0
 
 
+def noise(runs: Sequence[Array]) -> float:
+    """Standard deviation of the noise, from second differences; fast motion counts as noise.
+
+    Infinite if there are too few readings.
+    """
+    bends = np.concatenate([np.abs(np.diff(values, 2)) for values in runs] or [np.zeros(0)])
+    bends = bends[np.isfinite(bends)]
+    return float(np.median(bends)) / (0.6745 * np.sqrt(6)) if bends.size else np.inf
+
+
 def _usual_change(runs: Sequence[Array]) -> float:
     """What 99 % of the changes between samples stay below, accidents left out."""
     changes = np.concatenate([np.abs(np.diff(values)) for values in runs] or [np.zeros(0)])

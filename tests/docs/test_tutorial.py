@@ -1,16 +1,14 @@
 """The tutorial runs as it is written, and finds what it hides."""
 
-import contextlib
-import io
 import json
 import os
 import re
-import runpy
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from scripts import script
 
 TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial-equation-of-motion.md"
 
@@ -26,18 +24,6 @@ def run(command, folder):
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
-
-
-def script(name, folder):
-    """What a script prints that is started in a folder, without another process."""
-    with (
-        pytest.MonkeyPatch.context() as patch,
-        contextlib.redirect_stdout(io.StringIO()) as printed,
-    ):
-        patch.chdir(folder)
-        patch.syspath_prepend(folder)
-        runpy.run_path(name, run_name="__main__")
-    return printed.getvalue()
 
 
 @pytest.fixture(scope="module")

@@ -1,17 +1,15 @@
 """The tutorial on MuJoCo runs as it is written: it names what is hidden, and the policy holds."""
 
-import contextlib
-import io
 import json
 import os
 import re
-import runpy
 import subprocess
 import sys
 from pathlib import Path
 
 import mujoco
 import pytest
+from scripts import inside, script
 
 from studies import learn
 
@@ -31,25 +29,6 @@ def run(words, folder):
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
-
-
-@contextlib.contextmanager
-def inside(folder):
-    """In a folder, as for whoever starts Python there; gives what is printed."""
-    with (
-        pytest.MonkeyPatch.context() as patch,
-        contextlib.redirect_stdout(io.StringIO()) as printed,
-    ):
-        patch.chdir(folder)
-        patch.syspath_prepend(folder)
-        yield printed
-
-
-def script(name, folder):
-    """What a script prints, without another process that imports everything anew."""
-    with inside(folder) as printed:
-        runpy.run_path(name, run_name="__main__")
-    return printed.getvalue()
 
 
 @pytest.fixture(scope="module")

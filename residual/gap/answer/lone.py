@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from residual.gap.answer.answer import Answer
 from residual.gap.data.blocks import ENOUGH
+from residual.gap.fitting.contract import Fitter
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.fitting.validation import by_block
 from residual.gap.search.comparisons import takes_off
@@ -58,16 +59,16 @@ class Stretch:
             f"{self.share:.0%} of the {error} lies in one stretch, {self.run} from "
             f"{self.begin:.4g} to {self.end:.4g} s, and nothing that was tried explains it: "
         )
-        if self.motion > MOVES * self.share:
-            told += (
-                f"{self.motion:.0%} of the motion lies there, too, so that more of its kind, in "
-                "other records, may tell"
-            )
-            return f"{told}. It was left out of everything that is said" if left_out else told
-        told += "was it held, knocked or reset there?"
+        moves = self.motion > MOVES * self.share
+        told += (
+            f"{self.motion:.0%} of the motion lies there, too, so that more of its kind, in other "
+            "records, may tell"
+            if moves
+            else "was it held, knocked or reset there?"
+        )
         if left_out:
-            return f"{told} It was left out of everything that is said"
-        return f"{told} Look there, or leave it out"
+            return f"{told}{'.' * moves} It was left out of everything that is said"
+        return told if moves else f"{told} Look there, or leave it out"
 
     def cut_from(self, runs: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
         """The runs without it: what comes before and after are runs of their own."""
@@ -90,19 +91,13 @@ def lone_stretch(answer: Answer) -> Stretch | None:
     Args:
         answer: What was found with all of the log.
     """
-    search = answer.found.search
-    fitter = search.fitter
-    if not isinstance(fitter, SmoothFitter) or len(fitter.blocks) < ENOUGH:
+    if not _many_blocks(answer):
         return None
-    nominal = search.before.squares
-    stakes = search.currency.by_block(nominal).mean(axis=1)
+    stakes, left = _by_block(answer)
     block = int(np.argmax(stakes))
-    if stakes[block] <= MOST * stakes.sum():
+    if stakes[block] <= MOST * stakes.sum() or left[block] < HARDLY * stakes[block]:
         return None
-    left = search.currency.by_block(search.validated[answer.key].squares).mean(axis=1)
-    if left[block] < HARDLY * stakes[block]:
-        return None
-    return _stretch(fitter, block, float(stakes[block] / stakes.sum()))
+    return _stretch(answer, block, stakes)
 
 
 def left_stretch(answer: Answer) -> Stretch | None:
@@ -111,31 +106,42 @@ def left_stretch(answer: Answer) -> Stretch | None:
     Args:
         answer: What was found, and not for want of a stretch.
     """
-    search = answer.found.search
-    fitter = search.fitter
-    if not answer.key or not isinstance(fitter, SmoothFitter) or len(fitter.blocks) < ENOUGH:
+    if not answer.key or not _many_blocks(answer):
         return None
-    before, left = (
-        search.currency.by_block(squares).mean(axis=1)
-        for squares in (search.before.squares, search.validated[answer.key].squares)
-    )
+    stakes, left = _by_block(answer)
     block = int(np.argmax(left))
-    if left[block] <= MOST * left.sum() or left[block] < MUCH * before.sum():
+    if left[block] <= MOST * left.sum() or left[block] < MUCH * stakes.sum():
         return None
-    share = float(left[block] / left.sum())
-    return dataclasses.replace(_stretch(fitter, block, share), beside=True)
+    return _stretch(answer, block, left, beside=True)
 
 
-def _stretch(fitter: SmoothFitter, block: int, share: float) -> Stretch:
+def _many_blocks(answer: Answer) -> bool:
+    fitter = answer.found.search.fitter
+    return isinstance(fitter, SmoothFitter) and len(fitter.blocks) >= ENOUGH
+
+
+def _by_block(answer: Answer) -> tuple[Array, Array]:
+    """Squared error of the nominal simulator and of the answer by block, joints averaged, (B,)."""
+    search = answer.found.search
+    before, after = search.before.squares, search.validated[answer.key].squares
+    return (
+        search.currency.by_block(before).mean(axis=1),
+        search.currency.by_block(after).mean(axis=1),
+    )
+
+
+def _stretch(answer: Answer, block: int, errors: Array, beside: bool = False) -> Stretch:
+    fitter = answer.found.search.fitter
     windows, samples = fitter.blocks.windows, fitter.samples
     own = fitter.blocks.block == block
     rows = windows.index[own][windows.inside[own]]
     run = samples.names[int(windows.run[own][0])]
-    begin, end = samples.times[rows.min()], samples.times[rows.max()]
-    return Stretch(run, float(begin), float(end), share, float(_motion(fitter)[block]))
+    begin, end = float(samples.times[rows.min()]), float(samples.times[rows.max()])
+    share = float(errors[block] / errors.sum())
+    return Stretch(run, begin, end, share, float(_motion(fitter)[block]), beside)
 
 
-def _motion(fitter: SmoothFitter) -> Array:
+def _motion(fitter: Fitter) -> Array:
     """Every block's part of the squared way from the starts of windows, (B,), all channels
     averaged."""
     samples, windows = fitter.samples, fitter.blocks.windows

@@ -105,6 +105,6 @@ def _with_lags(search: Search, key: Key) -> tuple[Key, Array] | None:
     for kind in (ActuatorLag, Delay):
         for number, candidate in enumerate(search.candidates[: search.screened]):
             where = candidate.effect.where
-            if isinstance(candidate.effect, kind) and where not in remembers | set(more):
-                more[where] = number, candidate.trials[0].values[0]
+            if isinstance(candidate.effect, kind) and where not in remembers:
+                more.setdefault(where, (number, candidate.trials[0].values[0]))
     return search.merged(key, list(more.values())) if more or remembers else None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from residual.gap.data.at_rest import begins_on, largest
 from residual.gap.data.inspection import measured
 from residual.logs.checks import Finding
-from residual.logs.faults import rounding
+from residual.logs.faults import noise, rounding
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 #: Samples for which a record has to stand still, and a part of an input that is no change of it.
 STANDS, CHANGED = 5, 0.02
+#: Standard deviations of the noise within which a channel stands.
+NOISY = 6.0
 #: Times as far as noise or rounding go, from which on something clearly moved.
 CLEAR = 10.0
 #: Times as long as the usual time that motion takes to follow its input.
@@ -99,15 +101,11 @@ def _bands(simulator: HostSimulator, runs: Sequence[Trajectory]) -> Array:
     bands = np.full(len(simulator.physical_channels), np.inf)
     names = [channel.name for channel in simulator.physical_channels]
     for channel, values in measured(simulator, runs):
-        bends = [np.abs(np.diff(own[np.isfinite(own)], 2)) for own in values]
         # Of the first samples too: motion later on is no noise.
-        parts = [
-            min(np.median(own), np.median(own[: 4 * STANDS])) for own in bends if len(own) >= STANDS
-        ]
-        noise = float(np.median(parts)) if parts else np.inf
+        each = [min(noise([own]), noise([own[: 4 * STANDS + 2]])) for own in values]
         span = float(np.nanmax(np.concatenate(values)) - np.nanmin(np.concatenate(values)))
         least = max(1.01 * rounding(values), 1e-4 * span)
-        bands[names.index(channel.name)] = max(6 * noise / (0.6745 * np.sqrt(6)), least)
+        bands[names.index(channel.name)] = max(NOISY * float(np.median(each)), least)
     return bands
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.samples import Samples
+from residual.logs.faults import noise
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 
@@ -28,9 +29,7 @@ def stands_still(records: Sequence[Array]) -> bool:
     slow = []
     for speeds in records:
         usual = float(np.sqrt(np.mean(speeds**2)))
-        bends = np.diff(speeds, 2)
-        noise = float(np.median(np.abs(bends))) / (0.6745 * np.sqrt(6)) if len(bends) else np.inf
-        slow.append(np.abs(speeds) <= max(HARDLY * usual, NOISY * noise))
+        slow.append(np.abs(speeds) <= max(HARDLY * usual, NOISY * noise([speeds])))
     return bool(np.concatenate(slow).mean() > OFTEN)
 
 

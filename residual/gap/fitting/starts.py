@@ -68,5 +68,6 @@ def starts(
         # As far as is allowed, in its own direction: a part of it alone may lead uphill.
         beyond = np.maximum(np.abs(step / limit).max(axis=1), 1.0)
         states[:, free] += step / beyond[:, None]
+        # A step that did not help leads nowhere, however far it would go on.
         far = bool((better & (beyond > 1.0)).any())
     return best

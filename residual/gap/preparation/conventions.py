@@ -59,10 +59,8 @@ class Convention:
     @property
     def sign(self) -> bool:
         """Whether nothing but signs is another one."""
-        factors = np.concatenate([self.states[0], self.inputs[0]])
-        return bool((np.abs(factors) == 1).all()) and not (
-            self.states[1].any() or self.inputs[1].any()
-        )
+        factors, offsets = np.hstack([self.states, self.inputs])
+        return bool((np.abs(factors) == 1).all() and not offsets.any())
 
 
 def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
@@ -82,10 +80,9 @@ def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
     own = _error(simulator, fitter, _as_said(simulator))
     if own < HIDDEN:
         return None
-    asked = _conventions(simulator, fitter)
-    times = BETTER
-    if own < POOR:
-        asked, times = [one for one in asked if one.sign], CLEARLY
+    poor = own >= POOR
+    times = BETTER if poor else CLEARLY
+    asked = [one for one in _conventions(simulator, fitter) if poor or one.sign]
     errors = [(_error(simulator, fitter, one), one) for one in asked]
     least, best = min(errors, key=lambda pair: pair[0], default=(own, _as_said(simulator)))
     if times * least > own or least > GOOD:
