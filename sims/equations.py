@@ -11,8 +11,9 @@ import numpy as np
 
 from sims.effects.base import Effect
 from sims.effects.friction import DryFriction
+from sims.effects.limit import RateLimit
 from sims.host import HostSimulator, Joint
-from sims.motion import Motion, advance_smoothly
+from sims.motion import Acceleration, DriveForce, Motion, advance_smoothly
 from sims.rows import State
 from sims.simulator import Array, Channel, Parameter
 from sims.sliding import advance
@@ -26,6 +27,7 @@ class _Equations(HostSimulator):
 
     parameters: Mapping[str, Parameter] = {}
     advances_rows_at_once = True
+    limits_rates = True
 
     def __init__(
         self,
@@ -51,6 +53,25 @@ class _Equations(HostSimulator):
 
     def _arrange(self) -> None:
         """Where joints stand among the state channels."""
+
+    def _moved(
+        self, names: Sequence[str], acceleration: Acceleration, drive_force: DriveForce,
+        span: Array | None = None,
+    ) -> Motion:  # fmt: skip
+        """How it moves with its effects, on joints in the order of ``names``; see ``Motion``."""
+        forces = [(names.index(e.joint), e) for e in self.joint_effects()]
+        limits = [e for e in self.effects if isinstance(e, RateLimit) and not e.absent]
+        return Motion(
+            acceleration,
+            drive_force,
+            SimpleNamespace(**self.parameter_values()),
+            smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
+            dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
+            plays=tuple((names.index(e.joint), e) for e in self.plays()),
+            capped=tuple((names.index(e.joint), e) for e in limits),
+            by_force=span is None,
+            span=span,
+        )
 
 
 class EquationOfMotion(_Equations):
@@ -135,7 +156,8 @@ class EquationOfMotion(_Equations):
             return np.concatenate(
                 [self.take(b).integrate(states[b], inputs[b], durations[b]) for b in blocks]
             )
-        motion = self._motion()
+        h = np.asarray(durations, float) / inputs.shape[1]
+        motion = self._motion(h)
         state = State(
             np.ascontiguousarray(states[:, self._positions].T),
             np.ascontiguousarray(states[:, self._rates].T),
@@ -144,7 +166,6 @@ class EquationOfMotion(_Equations):
         for i, (_, play) in enumerate(motion.plays):
             edge = 0.5 * np.asarray(play.width)
             state.x[i] = np.clip(state.x[i], -edge, edge)
-        h = np.asarray(durations, float) / inputs.shape[1]
         state = _advance(motion, state, substep_ends(inputs), h)
         after = np.empty_like(states)
         after[:, self._positions] = state.q.T
@@ -152,10 +173,7 @@ class EquationOfMotion(_Equations):
         after[:, 2 * len(self.joints) :] = state.x.T
         return after
 
-    def _motion(self) -> Motion:
-        names = [joint.name for joint in self.joints]
-        forces = [(names.index(e.joint), e) for e in self.joint_effects()]
-
+    def _motion(self, span: Array) -> Motion:
         # The system's author sees rows first.
         def acceleration(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
             found = self.acceleration(q.T, v.T, u.T, f.T, p)
@@ -165,14 +183,7 @@ class EquationOfMotion(_Equations):
             found = self.drive_force(q.T, v.T, u.T, p)
             return _by_joint(found, q.shape, "drive_force")
 
-        return Motion(
-            acceleration,
-            drive_force,
-            SimpleNamespace(**self.parameter_values()),
-            smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
-            dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
-            plays=tuple((names.index(e.joint), e) for e in self.plays()),
-        )
+        return self._moved([joint.name for joint in self.joints], acceleration, drive_force, span)
 
 
 class FirstOrderSystem(_Equations):
@@ -209,20 +220,13 @@ class FirstOrderSystem(_Equations):
 
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
         """See ``HostSimulator.integrate``: the states are rates of positions that are not used."""
-        names = [channel.name for channel in self.physical_channels]
-        forces = [(names.index(e.joint), e) for e in self.joint_effects()]
 
         def rates(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
             return _by_joint(self.derivative(v.T, u.T, p), v.shape, "derivative", "x") + f
 
-        motion = Motion(
-            rates,
-            lambda q, v, u, p: np.zeros_like(v),  # nothing has play, so nobody asks
-            SimpleNamespace(**self.parameter_values()),
-            smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
-            dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
-            by_force=True,
-        )
+        # Nothing has play, so nobody asks for a drive force.
+        names = [channel.name for channel in self.physical_channels]
+        motion = self._moved(names, rates, lambda q, v, u, p: np.zeros_like(v))
         x = np.ascontiguousarray(np.asarray(states, float).T)
         inputs = np.asarray(inputs, float)
         state = State(np.zeros_like(x), x, np.empty((0, x.shape[1])))

@@ -32,18 +32,17 @@ class HostSimulator(Simulator):
     """A simulator that hosts effects. At strength zero each changes no bit of the output.
 
     Values of effects and parameters are scalars or arrays with one entry per row of a batch.
-    Effects with memory (delay, lag, backlash) append ``memory`` channels to the state;
-    without them the channels are the physical ones.
+    Effects with memory (delay, lag, backlash) append ``memory`` channels to the physical ones.
 
     Attributes:
         effects: The effects, in any order.
         joints: Where generalized forces can act.
         substeps: Sub-steps in one control period.
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
-        has_contacts: True if motion jumps at impacts, so that it can be compared with logs over
-            short windows only (``residual.gap.fitting.impacts``); see ``for_motion``.
-        advances_rows_at_once: True if ``integrate`` advances all rows together, each with its own
-            values of effects and parameters, so that a batch costs little more than a row.
+        limits_rates: True if ``integrate`` keeps rates within a ``RateLimit``.
+        has_contacts: True if motion jumps at impacts, so that only short windows compare with
+            logs; see ``for_motion``.
+        advances_rows_at_once: True if ``integrate`` advances rows together, each its own values.
         lagged: How an input with a lag acts in sub-steps, see ``sims.drive.lagged``.
     """
 
@@ -51,6 +50,7 @@ class HostSimulator(Simulator):
     joints: tuple[Joint, ...]
     substeps: int
     has_drive_force: bool = False
+    limits_rates: bool = False
     has_contacts: bool = False
     advances_rows_at_once: bool = False
     lagged = staticmethod(lagged)

@@ -14,8 +14,12 @@ import numpy as np
 from sims.effects.backlash import Backlash
 from sims.effects.friction import CoulombFriction, DryFriction
 from sims.effects.joint import JointEffect
+from sims.effects.limit import RateLimit
 from sims.rows import Mask, Rows, State
 from sims.simulator import Array
+
+Acceleration = Callable[[Array, Array, Array, Array, SimpleNamespace], Array]
+DriveForce = Callable[[Array, Array, Array, SimpleNamespace], Array]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,17 +31,21 @@ class Motion:
             u (n_a, n). Linear in the force.
         drive_force: (q, v, u, parameters) -> (n_joints, n).
         parameters: Each a scalar or (n,).
-        smooth, dry, plays: Effects with the number of the joint they act on.
+        smooth, dry, plays, capped: Effects with the number of the joint they act on.
         by_force: Whether a force on a joint is an acceleration of that joint, and of no other.
+        span: Time in s, by row, in which a rate comes back to its limit; None if the limit is of
+            what ``acceleration`` tells.
     """
 
-    acceleration: Callable[[Array, Array, Array, Array, SimpleNamespace], Array]
-    drive_force: Callable[[Array, Array, Array, SimpleNamespace], Array]
+    acceleration: Acceleration
+    drive_force: DriveForce
     parameters: SimpleNamespace
     smooth: tuple[tuple[int, JointEffect], ...] = ()
     dry: tuple[tuple[int, DryFriction], ...] = ()
     plays: tuple[tuple[int, Backlash], ...] = ()
+    capped: tuple[tuple[int, RateLimit], ...] = ()
     by_force: bool = False
+    span: Array | None = None
 
     def take(self, rows: Rows) -> Motion:
         """The same for some rows."""
@@ -48,7 +56,9 @@ class Motion:
             tuple((j, effect.take(rows)) for j, effect in self.smooth),
             tuple((j, effect.take(rows)) for j, effect in self.dry),
             tuple((j, effect.take(rows)) for j, effect in self.plays),
+            tuple((j, effect.take(rows)) for j, effect in self.capped),
             self.by_force,
+            None if self.span is None else self.span[rows],
         )
 
     @property
@@ -66,6 +76,15 @@ class Motion:
     def accelerate(self, q: Array, v: Array, u: Array, load: Array) -> Array:
         """Accelerations under a force on every joint."""
         return self.acceleration(q, v, u, load, self.parameters)
+
+    def cap(self, v: Array, acceleration: Array) -> Array:
+        """The accelerations, which are changed, with rates kept within their limits."""
+        for j, effect in self.capped:
+            if self.span is None:
+                acceleration[j] = effect.cut_change(acceleration[j])
+            else:
+                acceleration[j] = effect.cut(v[j], acceleration[j], self.span)
+        return acceleration
 
     def mobility(
         self,
@@ -134,7 +153,7 @@ def advance_smoothly(motion: Motion, state: State, u: Array, h: Array) -> State:
     """
 
     def accelerations(q: Array, v: Array, u: Array) -> Array:
-        return motion.accelerate(q, v, u, motion.load(q, v))
+        return motion.cap(v, motion.accelerate(q, v, u, motion.load(q, v)))
 
     q, v, x = state
     middle, half = 0.5 * (u[0] + u[1]), 0.5 * h

@@ -118,7 +118,7 @@ def _begin(motion: Motion, limits: Limits, state: State, u: Array) -> tuple[Mode
     if resting.size:
         mobility = motion.mobility(q, v, u, load, acceleration, mode.stuck, resting)
         settle(acceleration, mobility, resting, limits, mode)
-    return mode, acceleration, running
+    return mode, motion.cap(v, acceleration), running
 
 
 class _Stages(NamedTuple):
@@ -139,7 +139,7 @@ class _Stages(NamedTuple):
             keep(acceleration, mobility, held, stuck)
         elif held.size:
             acceleration[stuck] = 0.0
-        return acceleration, running
+        return motion.cap(v, acceleration), running
 
 
 def _loads(

@@ -37,6 +37,7 @@ from sims.effects.joint import QuadraticDrag as QuadraticDrag
 from sims.effects.joint import ViscousFriction as ViscousFriction
 from sims.effects.library import library as library
 from sims.effects.library import typical as typical
+from sims.effects.limit import RateLimit as RateLimit
 from sims.effects.parameter import ParameterChange as ParameterChange
 from sims.effects.sensor import SensorEffect as SensorEffect
 from sims.effects.sensor import SensorOffset as SensorOffset

@@ -35,6 +35,7 @@ from sims.effects.joint import (
     QuadraticDrag,
     ViscousFriction,
 )
+from sims.effects.limit import RateLimit, follows_command
 from sims.effects.parameter import ParameterChange
 from sims.effects.sensor import SensorOffset, SensorScale
 
@@ -78,6 +79,8 @@ def library(simulator: HostSimulator) -> tuple[Effect, ...]:
     places: list[tuple[type[Effect], str]] = []
     for joint in simulator.joints:
         places += [(effect, joint.name) for effect in JOINT_EFFECTS]
+        if follows_command(simulator, joint.name):
+            places.append((RateLimit, joint.name))
     for channel in simulator.action_channels:
         places += [(effect, channel.name) for effect in ACTUATOR_EFFECTS]
     for names in like_inputs(simulator):

@@ -40,7 +40,9 @@ CURVES = [
     for kind in effects.CURVES
     if kind is not effects.StateCurve
 ]
-HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, effects.StateCurve("level"))
+# Asked for where a command is followed, which a voltage is not.
+OTHERS = [effects.StateCurve("level"), effects.RateLimit("pivot")]
+HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if e.enters != "parameter"}
 
 

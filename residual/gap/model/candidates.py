@@ -15,6 +15,7 @@ from sims.effects.base import Effect, Quantity
 from sims.effects.curve import Curve
 from sims.effects.joint import JointEffect
 from sims.effects.library import typical
+from sims.effects.limit import RateLimit
 from sims.effects.sensor import SensorEffect
 from sims.host import HostSimulator
 from sims.simulator import Channel
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 
 #: Part of an input's bound that a log has to reach to tell of full commands.
 NEAR_FULL = 0.5
+#: A limit of a rate is looked for up to so many times the fastest motion over so many rows.
+BEYOND, SPAN = 1.2, 5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -142,6 +145,8 @@ def candidates(
             full = _full(simulator.action_channels[acting[0]], reach)
             # A curve comes with its points where the log moves.
             effect = effect if isinstance(effect, Curve) else effect.suited_to(-full, full)
+        if isinstance(effect, RateLimit):
+            reach = BEYOND * _fastest(effect, simulator, samples)
         if _follows_unseen(effect, simulator, measured):
             continue
         known = _within_reach(effect, effect.quantities(simulator), simulator, samples)
@@ -184,6 +189,24 @@ def _range(samples: Samples, column: int) -> tuple[float, float]:
     """Least and greatest measured value of a channel."""
     seen = samples.seen[:, column]
     return float(np.nanmin(seen)), float(np.nanmax(seen))
+
+
+def _fastest(effect: RateLimit, simulator: HostSimulator, samples: Samples) -> float:
+    """Greatest measured rate where a limit acts; zero if nothing of it was measured."""
+    joint = next(j for j in simulator.joints if j.name == effect.joint)
+    names = [channel.name for channel in simulator.physical_channels]
+    if joint.rate not in (None, joint.position):
+        rate = samples.seen[:, names.index(str(joint.rate))]
+        if np.isfinite(rate).any():
+            return float(np.nanmax(np.abs(rate)))
+    place = samples.seen[:, names.index(joint.position)]
+    fastest = 0.0
+    for a, b in samples.runs:
+        span = min(SPAN, b - a - 1)
+        way = np.abs(place[a + span : b] - place[a : b - span])
+        rates = way / (samples.times[a + span : b] - samples.times[a : b - span])
+        fastest = max(fastest, float(np.nanmax(rates, initial=0.0)))
+    return fastest
 
 
 def _within_reach(
@@ -253,7 +276,7 @@ def _candidate(effect: Effect, known: dict[str, Quantity], reach: float) -> Cand
     quantities = list(free.values())
     starts = [quantities[i].starts or (quantities[i].scale,) for i in shapes]
     if not strengths and reach > 0:
-        # The level of a saturation is searched where the recorded input reaches; beyond, it does
+        # A level is searched where the recorded input, or the motion, reaches; beyond, it does
         # nothing, and no slope leads back.
         starts = [tuple(s / quantities[i].scale * reach for s in starts[0]) for i in shapes]
         knobs = tuple(dataclasses.replace(knob, high=min(knob.high, reach)) for knob in knobs)

@@ -1,0 +1,85 @@
+"""Limits of how fast a joint or a state moves, whatever is commanded."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from sims.effects.base import Effect, number, place
+from sims.effects.joint import Value
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
+
+
+#: Units of one kind.
+ANGLES = (("rad", "deg", "rev"), ("rad/s", "deg/s", "rpm"))
+
+
+@dataclasses.dataclass(frozen=True)
+class RateLimit(Effect):
+    """The rate stays within ``+-level``; an infinite level is no limit.
+
+    A servo that turns at a set speed at most, a drive with a ramp. On the state x of a first-order
+    system x' is cut. Of a joint the acceleration is, so that its rate ends at the level within a
+    sub-step; what pushes beyond is taken up by whatever holds the speed.
+
+    Hosted by systems that are written out as equations.
+    """
+
+    joint: str
+    level: Value = number(
+        math.inf, low=1e-9, nominal=math.inf, rate=1, starts=(0.95, 0.85, 0.7, 0.5, 0.3)
+    )
+
+    name: ClassVar[str] = "rate_limit"
+    sentence: ClassVar[str] = "It moves no faster than a limit, whatever is commanded."
+    enters: ClassVar = "joint"
+    needs: ClassVar[str] = "large and small changes of what is commanded"
+
+    def cut(self, rate: Value, acceleration: Value, span: Value) -> Value:
+        """The acceleration that brings the rate no farther than the level.
+
+        Args:
+            rate: Of the joint, by row.
+            acceleration: What it would be.
+            span: Time in s in which a rate beyond the level comes back to it.
+        """
+        low, high = (-self.level - rate) / span, (self.level - rate) / span
+        return np.minimum(np.maximum(acceleration, low), high)
+
+    def cut_change(self, change: Value) -> Value:
+        """The rate of change of a first-order system's state, cut."""
+        return np.clip(change, -self.level, self.level)
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """Unit and typical size of the rate."""
+        joint = place("joint", self.joint, {joint.name: joint for joint in simulator.joints})
+        if not simulator.limits_rates:
+            raise ValueError(
+                f"{simulator.name} cannot host {self.name}: it is no EquationOfMotion and no "
+                "FirstOrderSystem"
+            )
+        if joint.rate is None or joint.rate == joint.position:
+            return {"rate": (joint.unit, simulator.force_scale(joint))}
+        channel = next(c for c in simulator.state_channels if c.name == joint.rate)
+        return {"rate": (channel.unit, channel.scale)}
+
+
+def follows_command(simulator: HostSimulator, joint: str) -> bool:
+    """Whether an input is of the kind of what the joint's state tells, so that this follows it.
+
+    So do the angle of a servo and its command. A force or a voltage sets nothing that is reached.
+    """
+    where = next(j.position for j in simulator.joints if j.name == joint)
+    kind = _kind(next(c.unit for c in simulator.state_channels if c.name == where))
+    return any(_kind(channel.unit) == kind for channel in simulator.action_channels)
+
+
+def _kind(unit: str) -> str:
+    """A unit, or that of all that measure angles or turning speeds."""
+    return next((kinds[0] for kinds in ANGLES if unit in kinds), unit)
