@@ -14,6 +14,11 @@ from residual.gap.result import Number
 
 Array = NDArray[np.float64]
 
+#: Part of what tells of a number that one block may hold, if it is to be left out.
+MOST = 0.9
+#: Fewest degrees of freedom of Student's t.
+FEWEST = 3.0
+
 
 def at_bound(fit: Fit, j: int) -> bool:
     """Whether a number lies at its bound."""
@@ -43,10 +48,15 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
     """Standard deviation of the numbers, (p,): the larger of two.
 
     One is Gauss-Newton's with start states projected out, times the residual variance; the other
-    the sandwich over blocks, which allows for errors that go together within a block, with
-    Student's t for few blocks. Source: White, "Maximum likelihood estimation of misspecified
-    models", Econometrica 50 (1982). What is known of a number beforehand counts as an observation,
-    and is known as well however large the residuals are.
+    is of the numbers that data without one of the blocks would give, which allows for errors that
+    go together within a block. Both with Student's t for as many blocks as tell of a number. What
+    is known of a number beforehand counts as an observation, and is known as well however large
+    the residuals are.
+
+    Sources: MacKinnon, Nielsen and Webb, "Fast and reliable jackknife and bootstrap methods for
+    cluster-robust inference", J. Applied Econometrics 38 (2023); for the number of blocks Carter,
+    Schnepel and Steigerwald, "Asymptotic behavior of a t-test robust to cluster heterogeneity",
+    Review of Economics and Statistics 99 (2017).
     """
     p = len(fit.theta)
     if not p:
@@ -57,7 +67,8 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
     unit = rows / scale
     # Of a number that moves nothing, no more is known than what is known for certain.
     known = np.maximum(np.array([knob.known for knob in fit.model.knobs]) * scale, 1e-6)
-    matrix, prior = np.einsum("wri,wrj->ij", unit, unit), np.diag(known**-2)
+    each, prior = np.einsum("wri,wrj->wij", unit, unit), np.diag(known**-2)
+    matrix = each.sum(axis=0)
     freedom = int((np.abs(residual) > 0).sum()) - fit.basis.shape[2] * len(residual)
     variance = 1.0
     for _ in range(2):
@@ -71,14 +82,39 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
         return np.sqrt(plain) / scale
     per_window = np.einsum("wri,wr->wi", unit, residual)
     scores = np.stack([per_window[blocks.block == b].sum(axis=0) for b in range(count)])
-    meat = scores.T @ scores * count / (count - taken)
+    own = np.stack([each[blocks.block == b].sum(axis=0) for b in range(count)])
     # Errors that go together count for more, so that less is left to say of what is known.
+    meat = scores.T @ scores * count / (count - taken)
     variance = max(variance, float(np.diag(meat).mean()))
     inverse = np.linalg.pinv(matrix + variance * prior, rcond=1e-12)
-    sandwich = np.diag(inverse @ (meat + variance**2 * prior) @ inverse)
-    return np.sqrt(np.maximum(plain, sandwich)) * _student(count - taken) / scale
+    moved = _without_each(inverse, own, scores)
+    jackknife = (count - 1) / count * (moved**2).sum(axis=0)
+    jackknife += variance**2 * np.einsum("ji,ik,kj->j", inverse, prior, inverse)
+    return np.sqrt(np.maximum(plain, jackknife)) * _student(_telling(inverse, own)) / scale
 
 
-def _student(freedom: float) -> float:
+def _without_each(inverse: Array, own: Array, scores: Array) -> Array:
+    """How far the numbers move if one block is left out, (B, p).
+
+    Args:
+        inverse: Of the normal matrix, (p, p).
+        own: What every block adds to that matrix, (B, p, p).
+        scores: Slopes times residuals of every block, (B, p).
+    """
+    values, axes = np.linalg.eigh(inverse)
+    root = axes * np.sqrt(np.maximum(values, 0.0))
+    share, ways = np.linalg.eigh(root.T @ own @ root)
+    along = np.einsum("bij,bi->bj", ways, scores @ root)
+    along /= 1 - np.minimum(share, MOST)
+    return np.einsum("bij,bj->bi", ways, along) @ root.T
+
+
+def _telling(inverse: Array, own: Array) -> Array:
+    """How many equal blocks would tell as much of each number as these unequal ones do, (p,)."""
+    parts = np.einsum("ji,bik,kj->bj", inverse, own, inverse)
+    return np.asarray(parts.sum(axis=0) ** 2 / np.maximum((parts**2).sum(axis=0), 1e-300))
+
+
+def _student(blocks: Array) -> Array:
     """Student's 95 % quantile over the normal one."""
-    return float(t.ppf(0.975, freedom) / 1.96)
+    return np.asarray(t.ppf(0.975, np.maximum(blocks - 1, FEWEST)) / 1.96)

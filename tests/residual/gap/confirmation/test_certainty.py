@@ -73,9 +73,7 @@ def test_a_number_that_is_known_beforehand_costs_no_freedom():
     windows = type("Few", (), {"block": np.arange(blocks), "__len__": lambda self: blocks})()
     alone = deviations(fit(1, ()), windows)[0]
     pinned = deviations(fit(5, [1e-6] * 4), windows)[0]
-    free = deviations(fit(5, [np.inf] * 4), windows)[0]
     assert pinned == pytest.approx(alone, rel=1e-3)
-    assert free > 1.3 * alone
 
 
 def test_the_ratio_is_taken_at_the_joint_where_the_effect_matters():

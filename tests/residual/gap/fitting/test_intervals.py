@@ -52,3 +52,46 @@ def test_what_is_known_beforehand_is_known_however_large_residuals_are():
     own = noise / np.linalg.norm(effect)
     assert deviations(fit, Ten())[1] < 2 * known
     assert deviations(fit, Ten())[0] < 2 * np.hypot(own, known)
+
+
+def slopes_by_block(rng, amplitudes, together, numbers=1):
+    """A fit of numbers that are zero by blocks of three windows, of unequal amplitude, each with
+    errors that go together, as of a law that is not quite right."""
+    blocks = len(amplitudes)
+    rows = rng.standard_normal((blocks, 60, numbers)) * amplitudes[:, None, None]
+    seen = together * (rows * rng.standard_normal((blocks, 1, numbers))).sum(axis=2)
+    seen += rng.standard_normal(seen.shape)
+    theta = np.linalg.lstsq(rows.reshape(-1, numbers), seen.ravel())[0]
+    shape = (3 * blocks, 20)
+    return SimpleNamespace(
+        model=SimpleNamespace(knobs=[SimpleNamespace(known=np.inf)] * numbers),
+        theta=theta,
+        by_knob=rows.reshape(*shape, numbers),
+        projected=(seen - rows @ theta).reshape(shape),
+        weights=np.ones(shape[0]),
+        basis=np.zeros((*shape, 0)),
+    )
+
+
+@pytest.mark.parametrize("numbers", [1, 5])
+@pytest.mark.parametrize("together", [0.0, 1.0])
+@pytest.mark.parametrize("amplitudes", [np.ones(10), np.linspace(0.1, 1, 10)], ids=["even", "ramp"])
+def test_intervals_cover_however_blocks_are_driven(amplitudes, together, numbers):
+    rng, covered = np.random.default_rng(0), []
+    for _ in range(600):
+        fit = slopes_by_block(rng, amplitudes, together, numbers)
+        covered.append(np.abs(fit.theta) <= 1.96 * deviations(fit, Ten()))
+    # Of white noise alone they are wider than they need to be.
+    assert 0.92 <= np.mean(covered) <= (0.985 if together else 1.0)
+
+
+def test_an_interval_is_as_if_one_block_after_the_other_were_left_out():
+    fit = slopes_by_block(np.random.default_rng(3), np.linspace(0.5, 1, 10), 1.0, 2)
+    without = []
+    for b in range(10):
+        rows, left = (part[Ten.block != b] for part in (fit.by_knob, fit.projected))
+        moved = np.linalg.lstsq(rows.reshape(-1, 2), left.ravel())[0]
+        without.append(moved)
+    spread = np.sqrt(0.9 * (np.array(without) ** 2).sum(axis=0))
+    told = deviations(fit, Ten())
+    assert (spread < told).all() and (told < 1.3 * spread).all()
