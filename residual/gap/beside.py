@@ -29,11 +29,12 @@ class Conventions:
     Attributes:
         changes: Lines of the column map, any of which makes the nominal simulator forecast far
             better: a sign, a zero or a unit.
-        times: How much smaller its error is then.
+        times: How much smaller its error is then; None if what was found holds an input that acts
+            the other way, beside other effects.
     """
 
     changes: tuple[str, ...]
-    times: float
+    times: float | None
 
 
 @dataclasses.dataclass(frozen=True)

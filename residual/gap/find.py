@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from residual.gap.answer.answer import matters, summed_up, told
+from residual.gap.answer.answer import summed_up, told
 from residual.gap.answer.apart import judged_apart
+from residual.gap.answer.confirmed import matters
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.records import unlike
 from residual.gap.clock import Clock
@@ -15,7 +16,7 @@ from residual.gap.inquiry import Inquiry
 from residual.gap.log import look, settle
 from residual.gap.model.workers import workers
 from residual.gap.offered import Offered
-from residual.gap.preparation.conventions import otherwise
+from residual.gap.preparation.conventions import other_sign, otherwise
 from residual.gap.preparation.horizon import other_length
 from residual.gap.preparation.numerics import held_as
 from residual.gap.result import GapResult
@@ -134,4 +135,5 @@ def find_gap(
     quality += inquiry.untried(answer)
     result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)
+    conventions = conventions or other_sign(simulator, result.effects)
     return replace(result, conventions=conventions, unlike=differ, nearly_late=late)

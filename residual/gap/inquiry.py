@@ -6,7 +6,7 @@ import dataclasses
 import time
 from collections.abc import Callable, Sequence
 
-from residual.gap.answer.answer import Answer, confirm
+from residual.gap.answer.confirmed import Answer, confirm
 from residual.gap.answer.curves import over_the_log, takes_its_place, worth_a_curve
 from residual.gap.answer.free_parameters import better, worth_freeing
 from residual.gap.answer.lone import explains_the_rest, left_stretch, lone_stretch

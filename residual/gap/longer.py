@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from residual.gap.answer.answer import Answer, summed_up, within_noise
+from residual.gap.answer.answer import summed_up, within_noise
+from residual.gap.answer.confirmed import Answer
 from residual.gap.log import Log
 from residual.gap.preparation.horizon import FEWER, PART, longest_horizon, usual_horizon
 from sims.host import HostSimulator

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from sims.effects.base import Effect, number, place
+from sims.effects.base import Effect, Quantity, number, place
 from sims.effects.joint import Value
 from sims.simulator import Array
 
@@ -164,6 +164,19 @@ class ActuatorGain(StaticActuatorEffect):
     def shape(self, u: Value) -> Value:
         """Scaled command."""
         return (1.0 + self.gain) * u
+
+    @property
+    def turns_round(self) -> bool:
+        """Whether the input acts the other way."""
+        return bool(np.any(self.gain < -1.0))
+
+    def quantities(self, simulator: HostSimulator) -> dict[str, Quantity]:
+        """See ``Effect.quantities``; an input of both signs may act the other way."""
+        known = super().quantities(simulator)
+        channels = [c for c in simulator.action_channels if c.name in self.actuators]
+        if all(channel.low < 0 < channel.high for channel in channels):
+            known["gain"] = dataclasses.replace(known["gain"], low=-math.inf)
+        return known
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from sims.host import HostSimulator
 
 
-#: Units of one kind.
-ANGLES = (("rad", "deg", "rev"), ("rad/s", "deg/s", "rpm"))
+ANGLES = ("rad", "deg", "rev")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,13 +72,15 @@ class RateLimit(Effect):
 def follows_command(simulator: HostSimulator, joint: str) -> bool:
     """Whether an input is of the kind of what the joint's state tells, so that this follows it.
 
-    So do the angle of a servo and its command. A force or a voltage sets nothing that is reached.
+    So do the angle of a servo and its command. A force or a voltage sets nothing that is reached;
+    and a speed that is slow to follow is easily taken for one whose change is limited.
     """
     where = next(j.position for j in simulator.joints if j.name == joint)
     kind = _kind(next(c.unit for c in simulator.state_channels if c.name == where))
-    return any(_kind(channel.unit) == kind for channel in simulator.action_channels)
+    speed = kind == "rpm" or kind.endswith("/s")
+    return not speed and any(_kind(channel.unit) == kind for channel in simulator.action_channels)
 
 
 def _kind(unit: str) -> str:
-    """A unit, or that of all that measure angles or turning speeds."""
-    return next((kinds[0] for kinds in ANGLES if unit in kinds), unit)
+    """A unit, or one for all that measure angles."""
+    return "rad" if unit in ANGLES else unit

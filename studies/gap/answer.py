@@ -118,7 +118,7 @@ SHARES = {"gain": "the command", "scale": "what is there"}
 def _times(verdict: Verdict) -> str:
     """``, so 1.62 times the command`` of a gain, which is a share more."""
     found = [(f, n) for f, n in verdict.parameters.items() if f in SHARES and n.unit == "1"]
-    return "".join(f", so {1 + n.value:.3g} times {SHARES[f]}" for f, n in found)
+    return minus("".join(f", so {1 + n.value:.3g} times {SHARES[f]}" for f, n in found))
 
 
 def _spelt(field: str) -> str:

@@ -48,10 +48,14 @@ def _conventions(result: GapResult) -> str:
     other = result.conventions
     if other is None:
         return ""
+    changes = f"{' or '.join(other.changes)} in the column map"
+    better = (
+        f"what fits acts the other way, as with {changes}"
+        if other.times is None
+        else f"with {changes} the nominal simulator errs {other.times:.2g} times less"
+    )
     return (
-        f"First see whether the log counts as the simulator does: with "
-        f"{' or '.join(other.changes)} in the column map the nominal simulator errs "
-        f"{other.times:.2g} times less. If that is not it: "
+        f"First see whether the log counts as the simulator does: {better}. If that is not it: "
     )
 
 

@@ -7,8 +7,11 @@ from servos import DAMPING, DT, FREQUENCY, SLOW, Servo, SlowServo
 
 from sims.checks import check_simulator
 from sims.effects import CoulombFriction, RateLimit, library
+from sims.equations import FirstOrderSystem
+from sims.loading import chosen_effects
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel
 
 TIMES = DT * np.arange(51)
 
@@ -79,9 +82,23 @@ def test_rows_have_limits_of_their_own_and_an_infinite_one_changes_no_bit(kind):
     assert all(finding.ok for finding in findings), "\n".join(map(str, findings))
 
 
-def test_it_is_looked_for_where_a_command_is_followed():
+class Drive(FirstOrderSystem):
+    """A speed that follows its command."""
+
+    name = "drive"
+    state_channels = (Channel("speed", "m/s", "other"),)
+    action_channels = (Channel("command", "m/s", "input"),)
+
+    def derivative(self, x, u, p):
+        return u - x
+
+
+def test_it_is_looked_for_where_a_place_is_commanded():
     for kind in (SlowServo, Servo):
         assert "rate_limit@angle" in {str(effect) for effect in library(kind())}
+    assert not any(effect.name == "rate_limit" for effect in library(Drive()))
+    (asked,) = chosen_effects(Drive(), ["sims.effects.RateLimit@speed"])
+    assert asked == RateLimit("speed")
     assert not any(effect.name == "rate_limit" for effect in library(PendulumEquation()))
     PendulumEquation(effects=[RateLimit("pivot", 3.0)])  # who wants it may have it
     with pytest.raises(ValueError, match="EquationOfMotion"):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from residual.gap.answer.answer import Answer
+from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.table import held_out
 from residual.gap.confirmation.rest import beginning_as, each_as_it_fits
 from residual.gap.data.excerpt import excerpt

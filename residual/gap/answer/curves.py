@@ -11,7 +11,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from residual.gap.answer.answer import Answer
+from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.free_parameters import better
 from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.smooth import SmoothFitter

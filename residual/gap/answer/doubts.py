@@ -13,8 +13,8 @@ DOUBTS: dict[Doubt, str] = {
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
     "conventions": "it has to be seen first whether the log counts as the simulator does",
-    "extreme": "a parameter or an input would be more than ten times off, so see first whether the "
-    "simulator has it right",
+    "extreme": "a parameter or an input would be more than ten times off, or act the other way, so "
+    "see first whether the simulator has it right",
     "records": "one effect with its own size in each record does better than all that is named",
     "set_aside": "the corrected simulator is worse on the records that were set aside",
     "no_help": "the corrected simulator is no better on the records that were set aside",

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from residual.gap.answer.answer import Answer, summed_up, within_noise
+from residual.gap.answer.answer import summed_up, within_noise
+from residual.gap.answer.confirmed import Answer
 from residual.gap.confirmation.tolerance import allowed, calibrated
 from residual.gap.fitting.intervals import at_bound
 from residual.gap.model.candidates import Candidate

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.answer.answer import Answer
+from residual.gap.answer.confirmed import Answer
 from residual.gap.data.blocks import ENOUGH
 from residual.gap.fitting.contract import Fitter
 from residual.gap.fitting.smooth import SmoothFitter

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.answer.answer import Answer
+from residual.gap.answer.confirmed import Answer
 from residual.gap.beside import Unlike
 from residual.gap.fitting.bounded import bounded_step
 from residual.gap.fitting.contract import Fit

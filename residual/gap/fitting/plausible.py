@@ -19,7 +19,7 @@ from residual.gap.fitting.screening import flatten
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.model import Model
 from sims.drive import shaped
-from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
+from sims.effects.actuator import ActuatorEffect, ActuatorGain, StaticActuatorEffect
 from sims.effects.aliases import probes, shortly_after
 from sims.effects.base import Effect
 from sims.effects.parameter import ParameterChange
@@ -68,11 +68,19 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
     for j, channel in enumerate(host.action_channels):
         usual = float(before[..., j, 0].std())
         left = float(after[..., j, 0].std())
+        acting = [_acts_on(one.effect, channel.name) for one in model.chosen]
+        number = acting.index(True) if any(acting) else len(acting)
         if usual > 0 and not THROUGH <= left / usual <= 1 / THROUGH:
-            acting = [_acts_on(one.effect, channel.name) for one in model.chosen]
-            number = acting.index(True) if any(acting) else len(acting)
             return number, f"{channel.name} would have {left / usual:.2g} of its strength"
+        if turned_round(host.effects, channel.name):
+            return number, f"{channel.name} would act the other way"
     return len(model.chosen), ""
+
+
+def turned_round(effects: Sequence[Effect], actuator: str) -> bool:
+    """Whether effects make an input act the other way."""
+    gains = [one for one in effects if isinstance(one, ActuatorGain) and actuator in one.actuators]
+    return sum(gain.turns_round for gain in gains) % 2 == 1
 
 
 def _ratios(host: HostSimulator, model: Model) -> dict[int, float]:

@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from residual.gap.beside import Conventions
 from residual.gap.fitting.contract import Fitter
+from residual.gap.fitting.plausible import turned_round
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model import paths
 from residual.gap.model.model import Model
 from residual.logs.units import Unit, find_unit, units_of
+from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.simulator import Channel
 
@@ -94,12 +96,27 @@ def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
     return Conventions(alike, own / least)
 
 
+def other_sign(simulator: HostSimulator, found: Sequence[Effect]) -> Conventions | None:
+    """Inputs that act the other way in what was found; None where none does.
+
+    Where an input is weaker or stronger, too, or measured start states are poor, no sign alone
+    makes the nominal simulator much better.
+    """
+    names = [c.name for c in simulator.action_channels if turned_round(found, c.name)]
+    changes = tuple(_reversed(name) for name in names)
+    return Conventions(changes, None) if changes else None
+
+
+def _reversed(name: str) -> str:
+    return f"`scale: -1` for {name}"
+
+
 def _conventions(simulator: HostSimulator, fitter: SmoothFitter) -> list[Convention]:
     """What a column map may have to say: signs, zeros of angles, units."""
     found = []
     for place, action in enumerate(simulator.action_channels):
         if action.low < 0 < action.high:
-            found.append(_of_input(simulator, f"`scale: -1` for {action.name}", place, -1.0))
+            found.append(_of_input(simulator, _reversed(action.name), place, -1.0))
         for name, unit in _other_units(action):
             says = f"`unit: {name}` for {action.name} ({_beside_a_unit(unit)})"
             found.append(_of_input(simulator, says, place, unit.factor, unit.offset))

@@ -283,7 +283,9 @@ class Search:
         return f"{family}@{self.place(number)}" if family else ""
 
     def same_motion(self, rest: Key, one: int, other: int) -> bool:
-        """Whether two effects make the same motion in these data beside some others."""
+        """Whether two effects make the same motion in these data beside some others, if known."""
+        if rest not in self.tried:  # as of what would hold an effect twice
+            return False
         around = self.signatures(rest)
         columns = {v.candidate: v.columns for v in around.variants}
         pair = [columns.get(self.stands_for(number), ()) for number in (one, other)]

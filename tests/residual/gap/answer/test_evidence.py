@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 from toy import Toy
 
-from residual.gap.answer import answer
+from residual.gap.answer import answer, confirmed
 from residual.gap.answer.evidence import evidence
 
 
@@ -15,13 +15,13 @@ def test_what_cannot_be_right_without_the_others_goes_too(monkeypatch):
     def claims(search, key, *_):
         return [SimpleNamespace(number=number, needed=True) for number in key]
 
-    monkeypatch.setattr(answer, "claims", claims)
-    monkeypatch.setattr(answer, "nameable", lambda search, claim, *_: claim.number != 2)
-    monkeypatch.setattr(answer, "allow_for_parameters", lambda search, key, made, *_: made)
-    monkeypatch.setattr(answer, "other_numerics", lambda *_: [])
-    monkeypatch.setattr(answer, "in_plain_form", lambda *_: None)
-    monkeypatch.setattr(answer, "may_vanish", lambda *_: False)
-    monkeypatch.setattr(answer, "add_exchanged", lambda *_: None)
+    monkeypatch.setattr(confirmed, "claims", claims)
+    monkeypatch.setattr(confirmed, "nameable", lambda search, claim, *_: claim.number != 2)
+    monkeypatch.setattr(confirmed, "allow_for_parameters", lambda search, key, made, *_: made)
+    monkeypatch.setattr(confirmed, "other_numerics", lambda *_: [])
+    monkeypatch.setattr(confirmed, "in_plain_form", lambda *_: None)
+    monkeypatch.setattr(confirmed, "may_vanish", lambda *_: False)
+    monkeypatch.setattr(confirmed, "add_exchanged", lambda *_: None)
     fit = SimpleNamespace(merit=1.0)
     search = SimpleNamespace(
         tried=dict.fromkeys([(), (0,), (0, 1), (0, 1, 2)], fit),
@@ -34,7 +34,7 @@ def test_what_cannot_be_right_without_the_others_goes_too(monkeypatch):
         labels=lambda key: (),
     )
     found = SimpleNamespace(search=search, key=(0, 1, 2), adequate=False)
-    left = answer.confirm(found, {})
+    left = confirmed.confirm(found, {})
     assert left.key == (0,)
     assert left.leads == ("gain", "loss")
 
@@ -55,13 +55,13 @@ THREE = {(): 1.0, (0,): 0.6, (1,): 0.5, (2,): 0.45, (0, 1, 2): 0.10}
 )
 def test_the_best_set_of_its_size_is_asked_next(errors, asked, then):
     toy = Toy({**THREE, **errors})
-    assert answer.likelier(toy, (1, 2), {(0, 1, 2), *asked}) == then
+    assert confirmed.likelier(toy, (1, 2), {(0, 1, 2), *asked}) == then
 
 
 def test_what_cannot_be_right_is_not_asked():
     toy = Toy({**THREE, (1, 2): 0.16, (2, 3): 0.12})
     toy.refused[(2, 3)] = "a mass of minus one"
-    assert answer.likelier(toy, (1, 2), set()) == (1, 2)
+    assert confirmed.likelier(toy, (1, 2), set()) == (1, 2)
 
 
 def test_what_takes_most_of_the_gap_is_not_minor():
@@ -101,13 +101,13 @@ def test_what_fits_down_to_the_noise_and_forecasts_worse_than_nothing_is_not_nam
         "add_exchanged": lambda *_: None,
         "imitated": lambda *_: (),
     }.items():
-        monkeypatch.setattr(answer, name, found)
+        monkeypatch.setattr(confirmed, name, found)
 
     def named(error):
         toy = Toy({(1,): error, (0, 1): error})
         toy.merged = lambda key, _, drop: (tuple(k for k in key if k not in drop), None)
         toy.add = lambda fits: None
-        return answer.confirm(SimpleNamespace(search=toy, key=(1,), adequate=True), {}).key
+        return confirmed.confirm(SimpleNamespace(search=toy, key=(1,), adequate=True), {}).key
 
     assert named(0.3) == (1,)
     assert named(1.1) == (1,)  # by chance

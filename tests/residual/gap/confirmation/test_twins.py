@@ -110,3 +110,4 @@ def test_a_twin_that_no_screen_knows_moves_as_what_it_is_a_twin_of():
     twin = search.candidates.index(rotor)
     assert search.same_motion((), 0, twin)
     assert not search.same_motion((), 1, twin)
+    assert not search.same_motion((1,), 0, twin)  # beside a set that was never fitted
