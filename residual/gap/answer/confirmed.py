@@ -17,7 +17,7 @@ from residual.gap.confirmation.tolerance import allow_for_parameters
 from residual.gap.fitting.forecasts import main_channel, noise_floor
 from residual.gap.search.choice import better_fit
 from residual.gap.search.comparisons import material
-from residual.gap.search.exchange import add_exchanged
+from residual.gap.search.exchange import add_exchanged, add_without_each
 from residual.gap.search.explain import Explanation
 from residual.gap.search.imitation import imitated
 from residual.gap.search.known import KNOWN
@@ -126,7 +126,7 @@ def confirm(
         exchange(key)
         if not found.adequate:
             key = likelier(search, key, asked_before)
-            exchange(key)
+            add_without_each(search, key)
         asked_before.add(key)
 
 
