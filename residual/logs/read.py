@@ -11,6 +11,7 @@ import numpy as np
 
 from residual.logs.checks import Finding, Signal, check_plausible, check_rate
 from residual.logs.layout import LogFormat, check_layout, named_column
+from residual.logs.overflow import continued
 from residual.logs.runs import runs_of
 from residual.logs.sources import open_log
 from residual.logs.table import LogError
@@ -41,8 +42,8 @@ def read_logs(
     """Read log files into trajectories whose columns are the simulator's channels, in SI.
 
     Repeated times are dropped, trajectories are cut at gaps and where an action is missing,
-    angles are unwrapped, and each such repair is reported as a finding. Nothing is resampled or
-    smoothed.
+    angles are unwrapped, counters that overflowed go on, and each such repair is reported as a
+    finding. Nothing is resampled or smoothed.
 
     Args:
         paths: Files (``.csv .txt .tsv .dat .log``, ``.parquet .pq``, ``.npz``, ``.mcap``,
@@ -80,6 +81,7 @@ def read_logs(
         runs = tidy(
             runs, columns.gap, columns.minimum_samples, findings, [c.name for c in channels]
         )
+        runs = continued(runs, channels, columns, findings)
         _check_actions(runs, action_channels, columns)
         for path in dict.fromkeys(run.path for run in runs):
             of_file = [run for run in runs if run.path == path]

@@ -26,6 +26,8 @@ HDF5, MCAP = (".h5", ".hdf5"), (".mcap",)
 
 #: Where Minari keeps the episodes of a data set.
 MINARI = Path("data", "main_data.hdf5")
+#: How much a period may differ from the steps of the times in a file, as a share.
+SAME_STEP = 0.05
 
 
 def open_log(
@@ -78,7 +80,7 @@ def open_log(
             columns = _episodes(columns, hdf5.EPISODE)
         return _with_time(table, columns)
     text = (columns.delimiter, columns.header, columns.comment, columns.skip)
-    return read_table(path, *text), columns
+    return _with_time(read_table(path, *text), columns)
 
 
 def signals_of(source: str | Path) -> tuple[dict[str, Signal], dict[str, str]]:
@@ -117,8 +119,21 @@ def _episodes(columns: LogFormat, column: str) -> LogFormat:
 
 
 def _with_time(table: Table, columns: LogFormat) -> tuple[Table, LogFormat]:
-    """A table without times gets them from the layout's period, from zero in every trajectory."""
+    """A table without times gets them from the layout's period, from zero in every trajectory.
+
+    Raises:
+        LogError: It has times, and they say otherwise.
+    """
     if columns.period is None:
+        return table, columns
+    step = _own_step(table, columns)
+    if step is not None and abs(step - columns.period) > SAME_STEP * columns.period:
+        raise LogError(
+            f"period is {columns.period:g} s, but the times in the file are {step:.4g} s apart: "
+            "leave out period, or that column from the file",
+            table.path,
+        )
+    if step is not None:
         return table, columns
     times = np.empty(len(table))
     labels = [np.asarray(table.values(name)) for name in columns.trajectory]
@@ -131,3 +146,13 @@ def _with_time(table: Table, columns: LogFormat) -> tuple[Table, LogFormat]:
         table, columns={**table.columns, "time": times}, names=(*table.names, "time")
     )
     return full, dataclasses.replace(columns, time="time")
+
+
+def _own_step(table: Table, columns: LogFormat) -> float | None:
+    """Seconds between the times that a table holds, in the median; None if it holds none."""
+    with contextlib.suppress(LogError):
+        own = time_column(table, columns.time, [])
+        times = table.numbers(own.column, columns.decimal)
+        step = float(np.nanmedian(np.diff(times)))
+        return step * find_unit(own.unit, TIME.unit).factor * own.scale
+    return None

@@ -1,0 +1,112 @@
+"""Positions that jump by a whole turn, or by all that a counter holds, and go on from there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.logs.checks import Finding
+from residual.logs.layout import LogFormat, named_column
+from residual.logs.timing import Run
+from residual.logs.units import find_unit
+from sims.simulator import Channel
+
+Array = NDArray[np.float64]
+
+#: Bits of common counters.
+BITS = (8, 10, 12, 14, 16, 24, 32)
+#: Steps beside a jump over which what is left of it may reach, as a multiple of the larger one.
+ALIKE = 2.0
+#: Samples that a comparison needs.
+FEW = 10
+
+
+class Jump(NamedTuple):
+    """What a position jumps by.
+
+    Attributes:
+        period: In the unit of the values.
+        of: What that is.
+    """
+
+    period: float
+    of: str
+
+
+def continued(
+    runs: Sequence[Run], channels: Sequence[Channel], columns: LogFormat, findings: list[Finding]
+) -> list[Run]:
+    """The runs with positions that go on where a counter overflowed, each told as a finding.
+
+    Channels that are declared as angles are not looked at: they are unwrapped anyway.
+    """
+    continuous = [run.take(slice(None)) for run in runs]
+    for index, channel in enumerate(channels):
+        if channel.kind != "position" or channel.angle:
+            continue
+        column = named_column(columns.states.get(channel.name, channel.name), channel.name)
+        try:
+            factor = column.scale * find_unit(column.unit, channel.unit).factor
+        except ValueError:
+            continue  # told with the column that has it
+        for place, run in enumerate(continuous):
+            raw = (run.states[:, index] - column.offset) / factor
+            known = np.isfinite(raw)
+            jump = jumps_by(raw[known], channel.unit, factor)
+            if jump is None:
+                continue
+            states = run.states.copy()
+            states[known, index] += factor * (
+                np.unwrap(raw[known], period=jump.period) - raw[known]
+            )
+            times = int((np.abs(np.diff(raw[known])) > 0.5 * jump.period).sum())
+            often = "once" if times == 1 else f"{times} times"
+            continuous[place] = Run(run.path, run.name, run.rows, run.times, states, run.actions)
+            findings.append(
+                Finding(
+                    "unwrapped",
+                    run.name,
+                    f"{channel.name} jumped by {jump.of} {often}, and was continued there.",
+                    {"jumps": times},
+                    "warning",
+                )
+            )
+    return continuous
+
+
+def jumps_by(values: Array, unit: str, factor: float) -> Jump | None:
+    """What a position jumps by, if it moves on across every jump as it moved beside it.
+
+    Args:
+        values: As in the file, (n,), none missing.
+        unit: Of the channel.
+        factor: From a value to that unit.
+    """
+    steps = np.diff(values)
+    if steps.size < FEW:
+        return None
+    found = []
+    if np.array_equal(values, np.round(values)):
+        found += [
+            Jump(float(2**bits), f"{2**bits}, as a counter of {bits} bits does,") for bits in BITS
+        ]
+    if unit == "rad":
+        found.append(Jump(2 * np.pi / abs(factor), "a whole turn"))
+    found = [jump for jump in found if np.ptp(values) < jump.period * (1 + 1e-6)]
+    return next((jump for jump in found if _goes_on(steps, jump.period)), None)
+
+
+def _goes_on(steps: Array, period: float) -> bool:
+    """Whether some steps are jumps by a period, and all of these what is left of them like the
+    steps beside them."""
+    jumps = np.abs(steps) > 0.5 * period
+    if not jumps.any() or jumps.mean() > 0.5 or (np.abs(steps) > 1.5 * period).any():
+        return False
+    left = steps - period * np.round(steps / period)
+    beside = np.abs(np.where(jumps, 0.0, steps))
+    beside = np.maximum(np.append(beside[1:], 0.0), np.insert(beside[:-1], 0, 0.0))
+    usual = np.maximum(ALIKE * beside, np.median(np.abs(steps)))
+    return bool((np.abs(left) <= np.minimum(usual, 0.25 * period))[jumps].all())
