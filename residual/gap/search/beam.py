@@ -18,6 +18,10 @@ Array = NDArray[np.float64]
 
 #: Part of a law's gain from which on its special case is tried in its place.
 HARDLY = 0.9
+#: Error over that of the nominal simulator below which a drive is not asked for all its numbers.
+FOUND = 0.5
+#: Parameters that are tried as the third of them.
+THIRDS = 4
 
 
 def run(
@@ -60,6 +64,7 @@ def run(
         reached = min(reached, now)
     if not (seeds or search.late or search.simulator.has_contacts or _alone(search, quiet)):
         three_at_once(search)
+        guessed_drives(search)
     return search.best()
 
 
@@ -170,6 +175,29 @@ def three_at_once(search: Search) -> None:
     found = min(several(search, ranked), key=search.error, default=())
     if improves(search, found, reached):
         extend(search, found)
+
+
+def guessed_drives(search: Search) -> None:
+    """Try what holds still with the gain of its drive and a parameter, if little is explained.
+
+    Of a motor whose friction nobody measured, gain and time constant are guesses, too. Until all
+    three are about right its starts and stops are missed, so that no two of them take anything off.
+    """
+    reached = search.error(search.best())
+    if reached < FOUND:
+        return
+    screened = search.candidates[: search.screened]
+    others = [n for n, one in enumerate(screened) if one.effect.enters == "parameter"][:THIRDS]
+    found: list[Key] = []
+    for two in [key for key in driven(search) if len(key) == 2 and search.numbers(key) == 2]:
+        for third in others:
+            start = 0.01 * screened[third].trials[0].values[0]
+            fresh, theta = search.merged(two, [(third, start)])
+            if third not in two and search.fits_in(fresh) and not search.late:
+                found += sound(search, fresh, theta)
+    best = min(found, key=search.error, default=())
+    if improves(search, best, reached):
+        extend(search, best)
 
 
 def sound(search: Search, key: Key, theta: Array) -> list[Key]:
