@@ -24,6 +24,10 @@ Array = NDArray[np.float64]
 BEYOND = 3.0
 #: Part of the loss of the chosen set from which on a larger one fits much better.
 HALF = 0.5
+#: Times as wide that intervals are while a remainder is left. No model is quite right then, and
+#: without it 441 of 491 (90 %) held the truth where 95 % are told (docs/dirty-world.md, seeds 0
+#: to 3 and 11).
+MISFIT = 1.2
 
 
 def widened(
@@ -60,8 +64,22 @@ def widened(
         search.add({smaller: theta})
         best = forecast_best(smaller) if search.sound(smaller) else None
         claim = _widened(search, key, claim, freed, smaller, best)
-        told.append(_beside_rivals(search, key, claim, claims))
+        claim = _beside_rivals(search, key, claim, claims)
+        told.append(claim if adequate else _of_a_misfit(search, key, claim))
     return told
+
+
+def _of_a_misfit(search: Search, key: Key, claim: Claim) -> Claim:
+    """A claim with intervals ``MISFIT`` times as wide, within the bounds of its numbers."""
+    model, numbers = search.tried[key].model, {}
+    for j in np.flatnonzero(model.owner == key.index(claim.number)):
+        knob = model.knobs[j]
+        n = claim.numbers[knob.field]
+        low, high = (n.value + MISFIT * (end - n.value) for end in (n.low, n.high))
+        numbers[knob.field] = dataclasses.replace(
+            n, low=max(low, knob.low), high=min(high, knob.high)
+        )
+    return dataclasses.replace(claim, numbers=numbers)
 
 
 def _beside_rivals(search: Search, key: Key, claim: Claim, claims: Sequence[Claim]) -> Claim:

@@ -41,3 +41,18 @@ def test_bounds_of_the_larger_set_take_nothing_off(monkeypatch):
     """Beside a gain a saturation may lie beyond all commands."""
     low, high = told(monkeypatch, merit=40.0, error=0.12, most=1.5)
     assert low == pytest.approx(1.0 - 1.96 * 0.05) and high == 2.1
+
+
+def test_a_remainder_widens_within_the_bounds():
+    """No model that leaves one is quite right."""
+    search = Toy({(0,): 0.1})
+    knob = SimpleNamespace(field="change", low=0.0, high=2.15)
+    search.tried[(0,)].model.knobs, search.tried[(0,)].model.owner = (knob,), np.zeros(1, int)
+    number = Number(2.0, 1.5, 2.1, "kg")
+    claim = Claim(0, {"change": number}, (), (), (), (), True, True, True, False, (0.9, 0.8, 0.95))
+    found = widening._of_a_misfit(search, (0,), claim).numbers["change"]
+    assert (found.low, found.high) == pytest.approx((1.4, 2.12))
+    wide = Claim(0, {"change": Number(2.0, 0.1, 2.14, "kg")}, *([()] * 4), True, True, True, False,
+                 (0.9, 0.8, 0.95))  # fmt: skip
+    found = widening._of_a_misfit(search, (0,), wide).numbers["change"]
+    assert (found.low, found.high) == (0.0, 2.15)
