@@ -53,9 +53,10 @@ class Forecasts:
     def errors(self, simulator: HostSimulator) -> Array:
         """Forecast less measurement after the lead-in, shape (n, steps, n_physical)."""
         try:
-            motion = _Motion(self, simulator)
-            states = self._settled(motion) if self.lead else self.states
-            path = motion.roll(states, self.lead + self.steps)
+            with np.errstate(all="ignore"):  # what runs away is lost
+                motion = _Motion(self, simulator)
+                states = self._settled(motion) if self.lead else self.states
+                path = motion.roll(states, self.lead + self.steps)
         except (ArithmeticError, np.linalg.LinAlgError):
             path = np.full_like(self.seen, np.inf)
         return self._off(path)[:, self.lead + 1 :]
