@@ -78,8 +78,20 @@ def _named_share(result: GapResult, tolerance: float | None) -> str:
         )
     if "unexplained" in kinds:
         return f"The gap has no name: the {ahead(gap)} is {before}."
-    none = f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
-    return none + _but_off_apart(result)
+    return _no_gap(gap) + _but_off_apart(result)
+
+
+def _no_gap(gap: Gap) -> str:
+    """No gap, and, where the error looks like one, how badly it is known."""
+    known, floor = gap.before, quantity_text(gap.noise_floor.value, gap.unit)
+    if known.value <= OFF * gap.noise_floor.value:
+        before = quantity_text(known.value, gap.unit)
+        return f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
+    low, value, high = (quantity_text(v, gap.unit) for v in (known.low, known.value, known.high))
+    return (
+        f"No gap that these data tell from noise: the {ahead(gap)} is {value} ({low} to {high}), "
+        f"noise alone makes {floor}."
+    )
 
 
 def own_errors(result: GapResult, apart: Gap | None = None) -> dict[str, ChannelGap]:

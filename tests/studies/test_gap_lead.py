@@ -126,7 +126,7 @@ def test_the_first_sentence_says_where_only_records_set_aside_have_a_gap(error, 
     before = Span(error, 0.9 * error, 1.1 * error)
     apart = dataclasses.replace(found.gap, before=before, noise_floor=noise)
     says = lead(dataclasses.replace(found, held_out=apart))
-    assert says.startswith("No gap above the noise: ")
+    assert says.startswith("No gap ")
     assert (
         "But the records set aside have one: there the 1 s error of angle is 2 rad" in says
     ) is said
@@ -163,7 +163,12 @@ def test_what_is_certain_and_next_to_nothing_is_told_last():
 
 def test_no_gap_and_nothing_that_matters_are_different_answers():
     nothing = result(NO_GAP, effects=[])
-    assert lead(nothing).startswith("No gap above the noise: ")
+    near = dataclasses.replace(nothing.gap, noise_floor=Span(0.9, 0.8, 1.0))
+    assert lead(dataclasses.replace(nothing, gap=near)).startswith("No gap above the noise: ")
+    assert lead(nothing) == (
+        "No gap that these data tell from noise: the 1 s error of angle is 1 rad (0.9 rad to "
+        "1.1 rad), noise alone makes 0.09 rad."
+    )
     assert lead(nothing, tolerance=2.0).startswith("Nothing that matters: ")
     assert lead(result(MASS), tolerance=0.5) == lead(result(MASS))
 
