@@ -22,6 +22,8 @@ BITS = (8, 10, 12, 14, 16, 24, 32)
 ALIKE = 2.0
 #: Samples that a comparison needs.
 FEW = 10
+#: Distance from whole numbers that scaling to a unit and back makes, at most.
+WHOLE = 1e-4
 
 
 class Jump(NamedTuple):
@@ -43,7 +45,7 @@ def continued(
 
     Channels that are declared as angles are not looked at: they are unwrapped anyway.
     """
-    continuous = [run.take(slice(None)) for run in runs]
+    continuous = list(runs)
     for index, channel in enumerate(channels):
         if channel.kind != "position" or channel.angle:
             continue
@@ -89,7 +91,7 @@ def jumps_by(values: Array, unit: str, factor: float) -> Jump | None:
     if steps.size < FEW:
         return None
     found = []
-    if np.array_equal(values, np.round(values)):
+    if np.allclose(values, np.round(values), rtol=0.0, atol=WHOLE):
         found += [
             Jump(float(2**bits), f"{2**bits}, as a counter of {bits} bits does,") for bits in BITS
         ]

@@ -63,6 +63,17 @@ def test_it_is_told_and_read_on(tmp_path):
     )
 
 
+def test_counts_of_an_encoder_are_scaled_as_the_map_says(tmp_path):
+    true = 3900 + moved(count=150)
+    path = text(tmp_path / "log.csv", "time,angle", true % 65536 - 32768)
+    columns = LogFormat(states={"angle": Column("angle", scale=-2 * np.pi / 4096)})
+    states = read_logs([path], TURNS, (), columns).trajectories[0].states[:, 0]
+    assert np.diff(states) == pytest.approx(-2 * np.pi / 4096 * np.diff(true))
+    again = read_logs([text(path, "time,angle", (60000 + true) % 65536)], TURNS, (), columns)
+    assert np.diff(again.trajectories[0].states[:, 0]) == pytest.approx(np.diff(states))
+    assert "a counter of 16 bits" in again.findings[0].says
+
+
 def test_an_angle_that_is_not_declared_as_one_goes_on_after_a_turn(tmp_path):
     true = 170 + 3.0 * np.arange(200)
     path = text(tmp_path / "log.csv", "time,angle", (true + 180) % 360 - 180)
