@@ -47,7 +47,8 @@ MOST = 5
 SMALLEST, LARGEST = 0.03, 100.0
 #: How many times as large as another number one is that does nothing below it, at most.
 ABOVE = 30.0
-#: Reach of what has a sign, in scales: of what cannot fall below some value, and of other numbers.
+#: Reach of what has a sign, in scales: of what cannot fall below some value and of gains, which
+#: seldom do, and of other numbers.
 LESS, MORE, EITHER = 0.7, 2.5, 10.0
 
 
@@ -161,7 +162,8 @@ class _Space:
         }
         self.ratios, self.bases = list(above), list(above.values())
         scale, low, high = 10 * model.step[:free], model.low[:free], model.high[:free]
-        begin, one_sided = theta[:free], np.isfinite(low)
+        drives = [model.chosen[i].effect.drives for i in model.owner[:free]]
+        begin, one_sided = theta[:free], np.isfinite(low) | np.array(drives, bool)
         self.log = low >= 0
         least = np.maximum(np.maximum(low, SMALLEST * scale), 1e-300)
         most = np.maximum(np.minimum(high, LARGEST * scale), least * (1 + 1e-6))
