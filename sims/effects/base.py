@@ -184,7 +184,7 @@ class Effect(abc.ABC):
             there = there | (np.asarray(getattr(self, name)) != known[name].get("nominal"))
         return there
 
-    @property
+    @functools.cached_property
     def absent(self) -> bool:
         """True at zero strength (in every row)."""
         return not np.any(self.present())

@@ -155,8 +155,9 @@ class Drives(EquationOfMotion):
 
     def acceleration(self, q: Array, v: Array, u: Array, force: Array, p: Any) -> Array:
         """Torque over inertia."""
-        inertias = [np.broadcast_to(getattr(p, n), len(u)) for n in self.parameters]
-        return (u + force) / np.stack(inertias, axis=1)
+        torques = (u + force).T
+        moved = zip(torques, self.parameters, strict=True)
+        return np.stack([torque / getattr(p, name) for torque, name in moved], axis=1)
 
 
 class Car(FirstOrderSystem):

@@ -75,6 +75,8 @@ def integrate_rows(host: HostSimulator, states: Array, inputs: Array, durations:
         if not re.search("math domain|finite", str(error)):
             raise
         after = _survivors(host, states, inputs, durations)
+    if np.isfinite(after).all():
+        return after
     return np.nan_to_num(after, nan=AWAY, posinf=AWAY, neginf=-AWAY)
 
 
