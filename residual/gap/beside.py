@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from typing import Literal
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,12 +30,14 @@ class Conventions:
     Attributes:
         changes: Lines of the column map, any of which makes the nominal simulator forecast far
             better: a sign, a zero or a unit.
-        times: How much smaller its error is then; None if what was found holds an input that acts
-            the other way, beside other effects.
+        times: How much smaller its error is then, or how many times its scale an input is.
+        reason: ``"forecasts"`` are far better so; an input would be turned round by what was found
+            (``"sign"``); or an input is far beyond the ``"scale"`` that its channel declares.
     """
 
     changes: tuple[str, ...]
-    times: float | None
+    times: float
+    reason: Literal["forecasts", "sign", "scale"] = "forecasts"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 
 #: Part of the time budget after which nothing new is tried.
-SEARCHING = 0.7
+SEARCHING = 0.6
 
 
 class Clock:

@@ -16,7 +16,7 @@ from residual.gap.inquiry import Inquiry
 from residual.gap.log import look, settle
 from residual.gap.model.workers import workers
 from residual.gap.offered import Offered
-from residual.gap.preparation.conventions import other_sign, otherwise
+from residual.gap.preparation.conventions import beyond_scale, other_sign, otherwise
 from residual.gap.preparation.horizon import other_length
 from residual.gap.preparation.numerics import held_as
 from residual.gap.result import GapResult
@@ -93,6 +93,7 @@ def find_gap(
 
         log, prepared = settle(simulator, log, tell)
         conventions = otherwise(simulator, prepared.fitter)
+        conventions = conventions or beyond_scale(simulator, prepared.fitter.samples)
         if conventions is not None:
             tell(f"does the log count otherwise, by {' or '.join(conventions.changes)}?")
 

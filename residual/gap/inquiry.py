@@ -226,8 +226,8 @@ class Inquiry:
         if not explains_the_rest(answer):
             return known
         says = (
-            f"forecasts go over {longer.horizon:.3g} s: over {log.horizon:.3g} s, of which these "
-            "records hold more, nothing can be named"
+            f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s, "
+            "of which these records hold more, nothing can be named"
         )
         return Confirmed(ready, answer, (says,))
 

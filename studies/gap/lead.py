@@ -49,14 +49,13 @@ def _conventions(result: GapResult) -> str:
     if other is None:
         return ""
     changes = f"{' or '.join(other.changes)} in the column map"
-    better = (
-        f"what fits acts the other way, as with {changes}"
-        if other.times is None
-        else f"with {changes} the nominal simulator errs {other.times:.2g} times less"
-    )
-    return (
-        f"First see whether the log counts as the simulator does: {better}. If that is not it: "
-    )
+    why = {
+        "forecasts": f"with {changes} the nominal simulator errs {other.times:.2g} times less",
+        "sign": f"what fits acts the other way, as with {changes}",
+        "scale": f"an input is {other.times:.0f} times the scale that its channel declares, as "
+        f"without {changes}",
+    }[other.reason]
+    return f"First see whether the log counts as the simulator does: {why}. If that is not it: "
 
 
 def _named_share(result: GapResult, tolerance: float | None) -> str:

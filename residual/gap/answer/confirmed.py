@@ -18,14 +18,14 @@ from residual.gap.fitting.forecasts import main_channel, noise_floor
 from residual.gap.search.choice import better_fit
 from residual.gap.search.comparisons import material
 from residual.gap.search.exchange import add_exchanged, add_without_each
-from residual.gap.search.explain import Explanation
+from residual.gap.search.explain import LEAST, Explanation
 from residual.gap.search.imitation import imitated
 from residual.gap.search.known import KNOWN
 from residual.gap.search.sets import Key, Search
 from sims.host import HostSimulator
 
-#: Effects tried in place of each that is left when one cannot be named.
-RIVALS = 3
+#: Effects tried in place of each that is left when one cannot be named: of few, and of more.
+RIVALS, FEW = 3, 3
 #: Part by which another set errs less that is asked in place of what is left of one.
 LIKELIER = 0.1
 #: Rise of the loss with inputs held the other way, as a share of it, that rules that out.
@@ -87,7 +87,8 @@ def confirm(
     asked_before = {key}
 
     def exchange(key: Key) -> None:
-        add_exchanged(search, key, 0 if time.process_time() > until else RIVALS)
+        most = RIVALS if len(key) <= FEW else LEAST
+        add_exchanged(search, key, 0 if time.process_time() > until else most)
 
     while True:
         fit = search.tried[key]

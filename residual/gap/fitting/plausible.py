@@ -19,7 +19,7 @@ from residual.gap.fitting.screening import flatten
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.model import Model
 from sims.drive import shaped
-from sims.effects.actuator import ActuatorEffect, ActuatorGain, StaticActuatorEffect
+from sims.effects.actuator import ActuatorEffect, ActuatorGain, Delay, StaticActuatorEffect
 from sims.effects.aliases import probes, shortly_after
 from sims.effects.base import Effect
 from sims.effects.parameter import ParameterChange
@@ -39,6 +39,8 @@ THROUGH = 0.1
 FAR, CLOSE, UNMOVED = 3.0, 1.5, 0.2
 #: Part of the largest command by which an input is negative by chance, and of the time.
 SLIGHTLY, SELDOM = 0.02, 0.05
+#: Part of the changes of an input up to which too few come in time.
+ARRIVING = 0.5
 #: Part of two effects that is left of both together, below which they undo each other.
 UNDONE = 0.25
 
@@ -63,6 +65,9 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
     once = _shows_once(host, samples, len(model.simulator.effects))
     if once is not None:
         return once, "the input reaches where it acts only once, so that nothing confirms it"
+    late = _never_arrives(host, samples, len(model.simulator.effects))
+    if late is not None:
+        return late, "most of what is commanded would come after its record has ended"
     before = Model(given).inputs(samples, np.zeros((1, 0)))[0]
     after = model.inputs(samples, theta[None])[0]
     for j, channel in enumerate(host.action_channels):
@@ -229,6 +234,27 @@ def _shows_once(host: HostSimulator, samples: Samples, own: int) -> int | None:
         ]
         stretches = sum(int(s[0]) + int((s[1:] & ~s[:-1]).sum()) for s in shown)
         if stretches == 1 and not all(s.all() for s in shown):
+            return number
+    return None
+
+
+def _never_arrives(host: HostSimulator, samples: Samples, own: int) -> int | None:
+    """Which effect delays most changes of its input to beyond the end of their records, if any.
+
+    So what records that begin with their only step would have without that step is a delay.
+    """
+    inputs = [channel.name for channel in host.action_channels]
+    for number, effect in enumerate(host.effects[own:]):
+        if not isinstance(effect, Delay):
+            continue
+        columns = [inputs.index(name) for name in effect.actuators]
+        arrive = []
+        for run in samples.recorded:
+            held = np.vstack([run.first, run.actions])[:, columns]
+            changes = np.flatnonzero((np.diff(held, axis=0) != 0).any(axis=1))
+            left = np.cumsum(run.durations[::-1])[::-1][changes]
+            arrive.append(left > effect.time)
+        if np.mean(np.concatenate(arrive) if arrive else True) <= ARRIVING:
             return number
     return None
 

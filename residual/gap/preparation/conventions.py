@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.beside import Conventions
+from residual.gap.data.samples import Samples
 from residual.gap.fitting.contract import Fitter
 from residual.gap.fitting.plausible import turned_round
 from residual.gap.fitting.smooth import SmoothFitter
@@ -36,6 +37,9 @@ BETTER, ALIKE = 2.0, 1.2
 #: Error from which on a sign is asked after that makes it so many times smaller: what swings by
 #: itself hides a reversed input.
 HIDDEN, CLEARLY = 0.1, 4.0
+#: Times the declared scale of an input from which on it is asked whether it is in another unit, and
+#: how near to that scale it has to be then; what is declared if nothing is.
+BEYOND, NEAR, UNDECLARED = 100.0, 10.0, 1.0
 #: Zeros from which angles are counted.
 QUARTERS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
 #: Windows that are looked at: all rows at once, and row by row.
@@ -104,7 +108,22 @@ def other_sign(simulator: HostSimulator, found: Sequence[Effect]) -> Conventions
     """
     names = [c.name for c in simulator.action_channels if turned_round(found, c.name)]
     changes = tuple(_reversed(name) for name in names)
-    return Conventions(changes, None) if changes else None
+    return Conventions(changes, 1.0, "sign") if changes else None
+
+
+def beyond_scale(simulator: HostSimulator, samples: Samples) -> Conventions | None:
+    """Units of an input that is far beyond the scale that its channel declares, and would be near
+    it in another unit; None if there is none."""
+    for channel, values in zip(simulator.action_channels, samples.actions.T, strict=True):
+        times = float(np.abs(values).max()) / channel.scale
+        if channel.scale == UNDECLARED or times < BEYOND:
+            continue
+        units = [(name, times * unit.factor) for name, unit in _other_units(channel)]
+        near = [name for name, then in units if 1 / NEAR <= then <= NEAR]
+        if near:
+            changes = tuple(f"`unit: {name}` for {channel.name}" for name in near)
+            return Conventions(changes, times, "scale")
+    return None
 
 
 def _reversed(name: str) -> str:

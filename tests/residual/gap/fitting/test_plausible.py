@@ -47,6 +47,8 @@ def said(effect, **values):
     [
         (ActuatorGain("voltage"), {"gain": -0.99}, "voltage would have 0.01 of its strength"),
         (ActuatorGain("voltage"), {"gain": 30.0}, "voltage would have 31 of its strength"),
+        (ActuatorGain("voltage"), {"gain": -2.0}, "voltage would act the other way"),
+        (Delay("voltage"), {"time": 7.0}, "would come after its record has ended"),
         (DeadZone("voltage"), {"width": 1.95}, "of its strength"),
         (Saturation("voltage"), {"level": 0.05}, "of its strength"),
         (ParameterChange("mass"), {"change": 0.6}, "mass would be 11.9 times its nominal value"),
@@ -61,6 +63,7 @@ def test_what_switches_the_system_off_is_refused(effect, values, words):
     ("effect", "values"),
     [
         (ActuatorGain("voltage"), {"gain": -0.7}),
+        (Delay("voltage"), {"time": 3.0}),
         (DeadZone("voltage"), {"width": 0.8}),
         (ParameterChange("mass"), {"change": 0.1}),
         (ViscousFriction("pivot"), {"coefficient": 1.0}),

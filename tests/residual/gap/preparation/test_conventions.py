@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from residual.gap import find_gap
-from residual.gap.preparation.conventions import otherwise
+from residual.gap.data.samples import Samples
+from residual.gap.preparation.conventions import beyond_scale, otherwise
 from residual.gap.preparation.prepare import prepare
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorGain, CoulombFriction, LinearSpring
@@ -183,3 +184,37 @@ def test_a_unit_that_only_makes_an_input_vanish_is_none():
     states += np.array([0.5, np.nan]) * rng.standard_normal(states.shape)
     run = Trajectory("lift", 0.1 * np.arange(len(states)), states, felt[0] + 1.5)
     assert not otherwise(simulator, prepare(simulator, [run], 10.0).fitter)
+
+
+class Hoist(EquationOfMotion):
+    """A motor that lifts a load, which is logged as an input."""
+
+    dt = 0.01
+    state_channels = (
+        Channel("angle", "rad", "position"),
+        Channel("rate", "rad/s", "rate", rate_of="angle", scale=5.0),
+    )
+    action_channels = (
+        Channel("current", "A", "input"),
+        Channel("load", "kg", "input", scale=0.5, low=0.0),
+    )
+
+    def acceleration(self, q, v, u, force, p):
+        pull = 0.3 * u[:, 0] - 0.3 * u[:, 1]
+        return ((pull + force[:, 0]) / 0.01)[:, None]
+
+
+@pytest.mark.parametrize(
+    ("loads", "changes"), [((200.0, 500.0), ("`unit: g` for load",)), ((0.2, 30.0), None)]
+)
+def test_an_input_far_beyond_its_scale_may_be_in_another_unit(loads, changes):
+    """The current is far beyond one, but nothing says that it should not be."""
+    currents = np.linspace(0, 900, 50)
+    runs = [
+        Trajectory(f"{load}", 0.01 * np.arange(51), np.cumsum(np.ones((51, 2)), axis=0),
+                   np.column_stack([currents, np.full(50, load)]))
+        for load in loads
+    ]  # fmt: skip
+    found = beyond_scale(Hoist(), Samples.join(runs, 1))
+    assert (found and found.changes) == changes
+    assert found is None or (found.reason, found.times) == ("scale", pytest.approx(1000.0))
