@@ -60,7 +60,8 @@ def test_play_moves_as_in_the_simulator():
 
 
 def test_play_is_named_with_its_width():
-    logs = make_logs(Truth(backlash=0.35), 8, "strong", "A", 4)
+    # Of four runs it hangs on a processor's rounding whether a delay does as well.
+    logs = make_logs(Truth(backlash=0.35), 8, "strong", "A", 6)
     (verdict,) = find_gap(PendulumEquation(), logs, effects=ALIKE).verdicts
     assert (verdict.kind, verdict.effect) == ("confirmed", "backlash")
     assert verdict.parameters["width"].low <= 0.35 <= verdict.parameters["width"].high
