@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 
 #: Bits of common counters.
 BITS = (8, 10, 12, 14, 16, 24, 32)
-#: Steps beside a jump over which what is left of it may reach, as a multiple of the larger one.
+#: How far what is left of a jump may reach, as a multiple of the larger step beside it, or of the
+#: usual one.
 ALIKE = 2.0
 #: Samples that a comparison needs.
 FEW = 10
@@ -110,5 +111,5 @@ def _goes_on(steps: Array, period: float) -> bool:
     left = steps - period * np.round(steps / period)
     beside = np.abs(np.where(jumps, 0.0, steps))
     beside = np.maximum(np.append(beside[1:], 0.0), np.insert(beside[:-1], 0, 0.0))
-    usual = np.maximum(ALIKE * beside, np.median(np.abs(steps)))
+    usual = ALIKE * np.maximum(beside, np.median(np.abs(steps)))
     return bool((np.abs(left) <= np.minimum(usual, 0.25 * period))[jumps].all())
