@@ -14,6 +14,7 @@ import pytest
 import torch
 from sklearn.linear_model import Ridge
 
+from sims.effects import CoulombFriction
 from sims.pendulum import Pendulum
 from sims.system import System
 from sims.tasks import SwingUp
@@ -167,6 +168,12 @@ class Remembering(SwingUp):
         for row in next_states:
             KNOWN[tuple(row)] = super().reward(row[None], row[None], row[None])[0]
         return np.array([KNOWN[tuple(row)] for row in next_states])
+
+
+def test_what_a_simulator_did_is_no_part_of_it():
+    used, fresh = (Pendulum(effects=[CoulombFriction("pivot", 1e-3)]) for _ in range(2))
+    used.step([[0.0, 0.0]], [[0.0]])
+    assert settings_of(used) == settings_of(fresh)
 
 
 def test_what_a_task_remembers_is_no_part_of_it():
