@@ -15,7 +15,7 @@ from sims.effects.limit import RateLimit
 from sims.host import HostSimulator, Joint
 from sims.motion import Acceleration, DriveForce, Motion, advance_smoothly
 from sims.rows import State
-from sims.simulator import Array, Channel, Parameter
+from sims.simulator import ANGLES, Array, Channel, Parameter
 from sims.sliding import advance
 
 # Rows advanced together: many enough to hide Python, few enough to stay in the cache.
@@ -69,7 +69,6 @@ class _Equations(HostSimulator):
             dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
             plays=tuple((names.index(e.joint), e) for e in self.plays()),
             capped=tuple((names.index(e.joint), e) for e in limits),
-            by_force=span is None,
             span=span,
         )
 
@@ -278,5 +277,5 @@ def _joint(rate: Channel, channels: Sequence[Channel]) -> Joint:
             f"channel {rate.name!r} has rate_of={rate.rate_of!r}, expected the name of its "
             f"position, one of {names or 'none that is declared'}"
         )
-    turns = position.angle or position.unit in ("rad", "deg", "rev")
+    turns = position.angle or position.unit in ANGLES
     return Joint(position.name, position.name, rate.name, "N m" if turns else "N")

@@ -32,9 +32,8 @@ class Motion:
         drive_force: (q, v, u, parameters) -> (n_joints, n).
         parameters: Each a scalar or (n,).
         smooth, dry, plays, capped: Effects with the number of the joint they act on.
-        by_force: Whether a force on a joint is an acceleration of that joint, and of no other.
-        span: Time in s, by row, in which a rate comes back to its limit; None if the limit is of
-            what ``acceleration`` tells.
+        span: Time in s, by row, in which a rate comes back to its limit; None of a first-order
+            system, whose limit is of what ``acceleration`` tells.
     """
 
     acceleration: Acceleration
@@ -44,7 +43,6 @@ class Motion:
     dry: tuple[tuple[int, DryFriction], ...] = ()
     plays: tuple[tuple[int, Backlash], ...] = ()
     capped: tuple[tuple[int, RateLimit], ...] = ()
-    by_force: bool = False
     span: Array | None = None
 
     def take(self, rows: Rows) -> Motion:
@@ -57,9 +55,13 @@ class Motion:
             tuple((j, effect.take(rows)) for j, effect in self.dry),
             tuple((j, effect.take(rows)) for j, effect in self.plays),
             tuple((j, effect.take(rows)) for j, effect in self.capped),
-            self.by_force,
             None if self.span is None else self.span[rows],
         )
+
+    @property
+    def by_force(self) -> bool:
+        """Whether a force on a joint is an acceleration of that joint, and of no other."""
+        return self.span is None
 
     @property
     def even(self) -> bool:

@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 Hold = Literal["zero", "linear"]
 
+#: Units of angles.
+ANGLES = ("rad", "deg", "rev")
+
 
 @dataclasses.dataclass(frozen=True)
 class Channel:

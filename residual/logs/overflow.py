@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -67,7 +68,7 @@ def continued(
             )
             times = int((np.abs(np.diff(raw[known])) > 0.5 * jump.period).sum())
             often = "once" if times == 1 else f"{times} times"
-            continuous[place] = Run(run.path, run.name, run.rows, run.times, states, run.actions)
+            continuous[place] = dataclasses.replace(run, states=states)
             findings.append(
                 Finding(
                     "unwrapped",

@@ -11,12 +11,10 @@ import numpy as np
 
 from sims.effects.base import Effect, number, place
 from sims.effects.joint import Value
+from sims.simulator import ANGLES
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
-
-
-ANGLES = ("rad", "deg", "rev")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,8 +46,7 @@ class RateLimit(Effect):
             acceleration: What it would be.
             span: Time in s in which a rate beyond the level comes back to it.
         """
-        low, high = (-self.level - rate) / span, (self.level - rate) / span
-        return np.minimum(np.maximum(acceleration, low), high)
+        return np.clip(acceleration, (-self.level - rate) / span, (self.level - rate) / span)
 
     def cut_change(self, change: Value) -> Value:
         """The rate of change of a first-order system's state, cut."""

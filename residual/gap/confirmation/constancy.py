@@ -68,8 +68,8 @@ def _courses(search: Search) -> Iterator[Array]:
 def _changes(fit: Fit, block: NDArray[np.int64], j: int, course: Array, chance: float) -> bool:
     """Whether a number clearly follows a course over the windows, by more than a part of itself.
 
-    By one Gauss-Newton step with the course as one more unknown, and the sandwich over blocks, as
-    ``residual.gap.fitting.intervals`` has it.
+    By one Gauss-Newton step with the course as one more unknown, and the sandwich over blocks
+    (White, "Maximum likelihood estimation of misspecified models", Econometrica 50, 1982).
     """
     root = np.sqrt(fit.weights)[:, None]
     rows = np.concatenate([fit.by_knob, (fit.by_knob[..., j] * course[:, None])[..., None]], axis=2)
