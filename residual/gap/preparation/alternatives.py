@@ -1,0 +1,185 @@
+"""What a column map may have to say: signs, zeros, units, and columns in each other's place."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.data.samples import Samples
+from residual.logs.units import Unit, find_unit, units_of
+from sims.host import HostSimulator
+from sims.simulator import Channel
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+#: Zeros from which angles are counted.
+QUARTERS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
+
+
+@dataclasses.dataclass(frozen=True)
+class Convention:
+    """How columns may count in place of how they are said to.
+
+    Attributes:
+        says: What to change in the column map.
+        states: Factor and offset of every state, (2, n_s).
+        inputs: The same of every input, (2, n_a).
+        states_from: Which column every state is read from, (n_s,).
+        inputs_from: The same of every input, (n_a,).
+    """
+
+    says: str
+    states: Array
+    inputs: Array
+    states_from: Places
+    inputs_from: Places
+
+    @property
+    def sign(self) -> bool:
+        """Whether nothing but signs is another one."""
+        factors, offsets = np.hstack([self.states, self.inputs])
+        return bool((factors == -1).any() and (np.abs(factors) == 1).all() and not offsets.any())
+
+    @property
+    def exchanged(self) -> bool:
+        """Whether two columns are in each other's place."""
+        return any((np.diff(places) < 0).any() for places in (self.states_from, self.inputs_from))
+
+
+def reversed_sign(name: str) -> str:
+    """The line of a column map that reverses a column."""
+    return f"`scale: -1` for {name}"
+
+
+def conventions(simulator: HostSimulator, samples: Samples) -> list[Convention]:
+    """What a column map may have to say: signs, zeros of angles, units, other columns."""
+    found = []
+    for place, action in enumerate(simulator.action_channels):
+        if action.low < 0 < action.high:
+            found.append(_of_input(simulator, reversed_sign(action.name), place, -1.0))
+        for name, unit in other_units(action):
+            says = f"`unit: {name}` for {action.name} ({_beside_a_unit(unit)})"
+            found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
+    joints = _measured_joints(simulator, samples)
+    for seen in joints:
+        found += _turned(simulator, seen) + _in_other_units(simulator, seen)
+    return found + _exchanged(simulator, joints)
+
+
+def _measured_joints(simulator: HostSimulator, samples: Samples) -> list[list[int]]:
+    """Every position with its rates, as far as they were measured."""
+    channels = simulator.physical_channels
+    measured = set(samples.measured.tolist())
+    joints = []
+    for place, channel in enumerate(channels):
+        if channel.rate_of in {other.name for other in channels}:
+            continue
+        joint = [place, *(i for i, other in enumerate(channels) if other.rate_of == channel.name)]
+        joints.append([i for i in joint if i in measured])
+    return [joint for joint in joints if joint]
+
+
+def _exchanged(simulator: HostSimulator, joints: Sequence[Sequence[int]]) -> list[Convention]:
+    """Two columns of the same unit in each other's place: inputs, or joints with their rates."""
+    found = []
+    for channels, groups, field in (
+        (simulator.physical_channels, joints, "states_from"),
+        (
+            simulator.action_channels,
+            [[i] for i, _ in enumerate(simulator.action_channels)],
+            "inputs_from",
+        ),
+    ):
+        for one, other in itertools.combinations(groups, 2):
+            kinds = [[(channels[i].unit, channels[i].kind) for i in each] for each in (one, other)]
+            if kinds[0] != kinds[1]:
+                continue
+            names = [" and ".join(channels[i].name for i in each) for each in (one, other)]
+            plain = as_said(simulator)
+            getattr(plain, field)[[*one, *other]] = [*other, *one]
+            says = f"the columns of {names[0]} and of {names[1]} exchanged (`column:` for each)"
+            found.append(dataclasses.replace(plain, says=says))
+    return found
+
+
+def _turned(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
+    """Counted the other way round, or from a quarter or half turn away."""
+    channels = [simulator.physical_channels[i] for i in joint]
+    first = channels[0]
+    turns = (first.angle or first.unit == "rad") and first.kind == "position"
+    found = []
+    for sign, zero in itertools.product((1.0, -1.0), QUARTERS if turns else QUARTERS[:1]):
+        changes = [f"`offset: {zero:.6g}`"] if zero else []
+        changes += ["`scale: -1`"] if sign < 0 else []
+        names = [channel.name for channel in (channels if sign < 0 else channels[:1])]
+        if changes:
+            says = f"{' and '.join(changes)} for {' and '.join(names)}"
+            found.append(_of_states(simulator, says, joint, sign, zero))
+    return found
+
+
+def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
+    """A position and its rate in units that go together."""
+    channels = [simulator.physical_channels[i] for i in joint]
+    found = []
+    for name, unit in other_units(channels[0]):
+        said = [f"`unit: {name}` for {channels[0].name}"]
+        for rate in channels[1:]:
+            alike = [n for n, u in other_units(rate) if np.isclose(u.factor, unit.factor)]
+            said += [f"`unit: {one}` for {rate.name}" for one in alike]
+        if len(said) == len(channels):
+            says = f"{' and '.join(said)} ({_beside_a_unit(unit)})"
+            found.append(_of_states(simulator, says, joint, unit.factor, unit.offset))
+    return found
+
+
+def _beside_a_unit(unit: Unit) -> str:
+    """The same change of a column whose unit is stated already, and is not what it should be."""
+    lines = [f"`scale: {unit.factor:.6g}`"] if unit.factor != 1.0 else []
+    lines += [f"`offset: {unit.offset:.6g}`"] if unit.offset else []
+    return f"{' and '.join(lines)} if a unit is stated"
+
+
+def other_units(channel: Channel) -> list[tuple[str, Unit]]:
+    """Units that a channel may be in but is not, with what they are in its own."""
+    units = [(name, find_unit(name, channel.unit)) for name in units_of(channel.unit)]
+    return [(name, unit) for name, unit in units if unit != (1.0, 0.0)]
+
+
+def _of_input(
+    simulator: HostSimulator, says: str, place: int, factor: float, offset: float = 0.0
+) -> Convention:
+    plain = as_said(simulator)
+    plain.inputs[:, place] = factor, offset
+    return dataclasses.replace(plain, says=says)
+
+
+def _of_states(
+    simulator: HostSimulator, says: str, joint: Sequence[int], factor: float, offset: float
+) -> Convention:
+    """A position and its rate count alike, but for its zero."""
+    plain = as_said(simulator)
+    plain.states[0, joint] = factor
+    plain.states[1, joint[0]] = offset
+    return dataclasses.replace(plain, says=says)
+
+
+def beyond(convention: Convention) -> Convention | None:
+    """With thrice its factors: as good only where they make a force too small to matter."""
+    states, inputs = convention.states.copy(), convention.inputs.copy()
+    for factors in (states[0], inputs[0]):
+        factors[np.abs(factors) != 1.0] *= 3.0
+    same = np.array_equal(states, convention.states) and np.array_equal(inputs, convention.inputs)
+    return None if same else dataclasses.replace(convention, states=states, inputs=inputs)
+
+
+def as_said(simulator: HostSimulator) -> Convention:
+    """As the log is said to count."""
+    sizes = len(simulator.physical_channels), len(simulator.action_channels)
+    states, inputs = (np.vstack([np.ones(n), np.zeros(n)]) for n in sizes)
+    return Convention("", states, inputs, *(np.arange(n) for n in sizes))
