@@ -26,7 +26,7 @@ Kind = Literal[
 #: without a name, or an effect of another kind does as well.
 Doubt = Literal[
     "not_needed", "unsteady", "creeps", "numerics", "at_bound", "calibration", "slight",
-    "no_time", "clock", "gross", "conventions", "extreme", "records", "set_aside", "no_help",
+    "no_time", "clock", "sensor", "conventions", "extreme", "records", "set_aside", "no_help",
     "may_be_zero", "share_may_be_zero", "few_blocks", "rivals",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.

@@ -18,8 +18,8 @@ DOUBTS: dict[Doubt, str] = {
     "records": "one effect with its own size in each record does better than all that is named",
     "set_aside": "the corrected simulator is worse on the records that were set aside",
     "no_help": "the corrected simulator is no better on the records that were set aside",
-    "gross": "a sensor is seldom wrong by a fifth of all that it showed, and something that the "
-    "library lacks may look so",
+    "sensor": "sensors are seldom wrong in their scale, or by a fifth of all that they showed, and "
+    "what has no name yet may look so",
     "no_time": "there was no time to ask whether parameters that are a few percent off would do as "
     "well, give more --minutes",
     "may_be_zero": "its interval holds zero, or nearly",
@@ -51,7 +51,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "slight": claim.slight,
         "no_time": claim.unasked,
         "clock": claim.brief,
-        "gross": claim.gross,
+        "sensor": claim.sensor,
         "conventions": claim.counted,
         "extreme": claim.extreme,
         "records": claim.unlike,

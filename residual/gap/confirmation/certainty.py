@@ -11,7 +11,7 @@ from residual.gap.confirmation.claim import Claim, other_than
 from residual.gap.confirmation.constancy import creeps
 from residual.gap.confirmation.numerics import at_half_step
 from residual.gap.fitting.intervals import bounded, deviations, ended
-from residual.gap.fitting.plausible import gross
+from residual.gap.fitting.plausible import doubtful_sensor
 from residual.gap.search.comparisons import AT_ONE, no_match
 from residual.gap.search.exchange import exchanged, split
 from residual.gap.search.sets import Key, Search, all_but
@@ -85,7 +85,7 @@ def claims(
                 any(ended(fit, j) for j in strengths),
                 taken,
                 brief=brief(search, number, fit.theta[own]),
-                gross=not adequate and not twins and gross_fault(search, key, place),
+                sensor=not adequate and not twins and of_doubtful_sensor(search, key, place),
                 by_fit=by_fit(search, key, number),
                 creeps=creeps(search, key, number),
                 extreme=key in search.extreme,
@@ -276,11 +276,11 @@ def brief(search: Search, number: int, values: Array) -> bool:
     )
 
 
-def gross_fault(search: Search, key: Key, place: int) -> bool:
-    """Whether a member of a set is a sensor that would be further off than sensors are."""
+def of_doubtful_sensor(search: Search, key: Key, place: int) -> bool:
+    """Whether a member of a set is a sensor that would be wrong as sensors seldom are."""
     fit = search.tried[key]
     effects = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
-    return gross(effects[place], search.simulator, search.fitter.samples)
+    return doubtful_sensor(effects[place], search.simulator, search.fitter.samples)
 
 
 def share(search: Search, key: Key, number: int) -> tuple[float, float, float]:

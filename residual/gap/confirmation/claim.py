@@ -46,7 +46,7 @@ class Claim:
         unlike: Whether one effect, in a size of its own in each record, does better than all named.
         refuted: Whether the corrected simulator forecasts records that were set aside worse.
         helpless: Whether it forecasts them no better, though they show more than noise.
-        gross: Whether it is a sensor further off than sensors are, beside a remainder.
+        sensor: Whether it is a sensor wrong as sensors seldom are, beside a remainder.
         by_fit: Whether a fit to all data leaves three times as much without it: forecasts of single
             blocks may go astray all the same, where motion hangs on a hair.
         there: Whether nothing comes near without it, parameters free, so that it has a size.
@@ -69,7 +69,7 @@ class Claim:
     slight: bool = False
     unasked: bool = False
     brief: bool = False
-    gross: bool = False
+    sensor: bool = False
     counted: bool = False
     extreme: bool = False
     unlike: bool = False
@@ -98,7 +98,7 @@ class Claim:
             self.bounded,
             self.calibration,
             self.brief,
-            self.gross,
+            self.sensor,
             self.counted,
             self.extreme,
             self.unlike,

@@ -150,12 +150,14 @@ def _motion(fitter: SmoothFitter) -> Array:
     return np.sqrt((bends**2).sum(axis=(0, 1)) / np.maximum(valid.sum(axis=(0, 1)), 1))
 
 
-def gross(effect: Effect, simulator: HostSimulator, samples: Samples) -> bool:
-    """Whether a sensor would be wrong by more than calibration ever is: a fifth of all it showed.
+def doubtful_sensor(effect: Effect, simulator: HostSimulator, samples: Samples) -> bool:
+    """Whether a sensor would be wrong as sensors seldom are: in its scale, or its zero by a fifth.
 
-    Where an encoder's zero lies is a matter of mounting, and its scale one of gears, so that of
-    positions any size is likely. Of what else is measured, an equilibrium or a loss that the
-    simulator lacks looks like a zero far off much more often than it is one.
+    Scales are calibrated, and what the simulator lacks elsewhere looks like one much more often
+    than one is wrong.
+    Where an encoder's zero lies is a matter of mounting, so that of positions any size is likely.
+    Of what else is measured, an equilibrium or a loss that the simulator lacks looks like a zero
+    far off, by a fifth of all that the sensor showed.
 
     Args:
         effect: With its numbers.
@@ -166,10 +168,10 @@ def gross(effect: Effect, simulator: HostSimulator, samples: Samples) -> bool:
         return False
     names = [channel.name for channel in simulator.physical_channels]
     place = names.index(effect.channel)
+    if not isinstance(effect, SensorOffset):
+        return True
     if simulator.physical_channels[place].kind == "position":
         return False
-    if not isinstance(effect, SensorOffset):
-        return effect.surprising
     shown = samples.seen[:, place]
     span = float(np.ptp(shown[np.isfinite(shown)])) if np.isfinite(shown).any() else 0.0
     return bool(np.max(np.abs(effect.offset)) > USUAL * span)
