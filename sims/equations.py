@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from sims.effects.base import Effect
+from sims.effects.exchange import Exchange
 from sims.effects.friction import DryFriction
 from sims.effects.limit import RateLimit
 from sims.host import HostSimulator, Joint
@@ -27,7 +28,7 @@ class _Equations(HostSimulator):
 
     parameters: Mapping[str, Parameter] = {}
     advances_rows_at_once = True
-    limits_rates = True
+    written_out = True
 
     def __init__(
         self,
@@ -60,7 +61,9 @@ class _Equations(HostSimulator):
     ) -> Motion:  # fmt: skip
         """How it moves with its effects, on joints in the order of ``names``; see ``Motion``."""
         forces = [(names.index(e.joint), e) for e in self.joint_effects()]
-        limits = [e for e in self.effects if isinstance(e, RateLimit) and not e.absent]
+        there = [e for e in self.effects if not e.absent]
+        limits = [e for e in there if isinstance(e, RateLimit)]
+        exchanges = [e for e in there if isinstance(e, Exchange)]
         return Motion(
             acceleration,
             drive_force,
@@ -69,6 +72,7 @@ class _Equations(HostSimulator):
             dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
             plays=tuple((names.index(e.joint), e) for e in self.plays()),
             capped=tuple((names.index(e.joint), e) for e in limits),
+            exchanges=tuple((names.index(e.pair[0]), names.index(e.pair[1]), e) for e in exchanges),
             span=span,
         )
 

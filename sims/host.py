@@ -39,7 +39,7 @@ class HostSimulator(Simulator):
         joints: Where generalized forces can act.
         substeps: Sub-steps in one control period.
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
-        limits_rates: True if ``integrate`` keeps rates within a ``RateLimit``.
+        written_out: True if it is given by equations, and hosts ``RateLimit`` and ``Exchange``.
         has_contacts: True if motion jumps at impacts, so that only short windows compare with
             logs; see ``for_motion``.
         advances_rows_at_once: True if ``integrate`` advances rows together, each its own values.
@@ -50,7 +50,7 @@ class HostSimulator(Simulator):
     joints: tuple[Joint, ...]
     substeps: int
     has_drive_force: bool = False
-    limits_rates: bool = False
+    written_out: bool = False
     has_contacts: bool = False
     advances_rows_at_once: bool = False
     lagged = staticmethod(lagged)

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from sims.effects.backlash import Backlash
+from sims.effects.exchange import Exchange
 from sims.effects.friction import CoulombFriction, DryFriction
 from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
@@ -32,6 +33,7 @@ class Motion:
         drive_force: (q, v, u, parameters) -> (n_joints, n).
         parameters: Each a scalar or (n,).
         smooth, dry, plays, capped: Effects with the number of the joint they act on.
+        exchanges: The same with the numbers of both states of a first-order system.
         span: Time in s, by row, in which a rate comes back to its limit; None of a first-order
             system, whose limit is of what ``acceleration`` tells.
     """
@@ -43,6 +45,7 @@ class Motion:
     dry: tuple[tuple[int, DryFriction], ...] = ()
     plays: tuple[tuple[int, Backlash], ...] = ()
     capped: tuple[tuple[int, RateLimit], ...] = ()
+    exchanges: tuple[tuple[int, int, Exchange], ...] = ()
     span: Array | None = None
 
     def take(self, rows: Rows) -> Motion:
@@ -55,6 +58,7 @@ class Motion:
             tuple((j, effect.take(rows)) for j, effect in self.dry),
             tuple((j, effect.take(rows)) for j, effect in self.plays),
             tuple((j, effect.take(rows)) for j, effect in self.capped),
+            tuple((i, j, effect.take(rows)) for i, j, effect in self.exchanges),
             None if self.span is None else self.span[rows],
         )
 
@@ -69,10 +73,14 @@ class Motion:
         return all(type(effect) is CoulombFriction for _, effect in self.dry)
 
     def load(self, q: Array, v: Array, force: Array | None = None) -> Array:
-        """Force of the smooth effects on every joint, and a further force."""
+        """Force of the smooth effects on every joint, what flows between them, a further force."""
         total = np.zeros(q.shape) if force is None else force
         for j, effect in self.smooth:
             total[j] += effect.force(q[j], v[j])
+        for i, j, exchange in self.exchanges:
+            inward, outward = exchange.flows(v[i], v[j])
+            total[i] += inward
+            total[j] += outward
         return total
 
     def accelerate(self, q: Array, v: Array, u: Array, load: Array) -> Array:

@@ -50,8 +50,8 @@ class JointEffect(Effect):
         if joint.rate is None and self.mechanical:
             raise ValueError(
                 f"{self.name} needs a joint with a rate; {joint.name!r} is the state of a "
-                "first-order system, which hosts constant_load and proportional_loss only; a speed "
-                'is a channel of kind="rate"'
+                "first-order system, which hosts constant_load, proportional_loss and exchange; "
+                'a speed is a channel of kind="rate"'
             )
         speed = joint.position == joint.rate
         if speed and self.mechanical and not self.follows_rate:

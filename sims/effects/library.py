@@ -20,6 +20,7 @@ from sims.effects.backlash import Backlash
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.curves import CURVES
+from sims.effects.exchange import Exchange, like_states
 from sims.effects.friction import (
     CoulombFriction,
     DirectionalFriction,
@@ -81,6 +82,7 @@ def library(simulator: HostSimulator) -> tuple[Effect, ...]:
         places += [(effect, joint.name) for effect in JOINT_EFFECTS]
         if follows_command(simulator, joint.name):
             places.append((RateLimit, joint.name))
+    places += [(Exchange, AND.join(names)) for names in like_states(simulator)]
     for channel in simulator.action_channels:
         places += [(effect, channel.name) for effect in ACTUATOR_EFFECTS]
     for names in like_inputs(simulator):

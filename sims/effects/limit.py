@@ -55,7 +55,7 @@ class RateLimit(Effect):
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of the rate."""
         joint = place("joint", self.joint, {joint.name: joint for joint in simulator.joints})
-        if not simulator.limits_rates:
+        if not simulator.written_out:
             raise ValueError(
                 f"{simulator.name} cannot host {self.name}: it is no EquationOfMotion and no "
                 "FirstOrderSystem"

@@ -16,19 +16,20 @@ PLACES = {"joint": "joint", "actuator": "input", "channel": "measured channel"}
 
 
 class Tank(FirstOrderSystem):
-    state_channels = (Channel("level", "m", "other"),)
+    state_channels = (Channel("level", "m", "other"), Channel("next level", "m", "other"))
     action_channels = (Channel("pump", "V", "input"),)
 
     def derivative(self, x, u, p):
-        return u
+        return u + 0.0 * x
 
 
 def row(effect: Effect) -> str:
     """The effect's row of the table; units are those of a joint that turns, driven by a voltage."""
-    first_order = effect.name in ("proportional_loss", "state_curve")
+    first_order = effect.name in ("proportional_loss", "state_curve", "exchange")
     known = effect.quantities(Tank() if first_order else PendulumEquation())
     numbers = ", ".join(f"`{name}` {quantity.unit}" for name, quantity in known.items())
     place = PLACES[next(iter(inspect.signature(type(effect)).parameters))]
+    place = "two states" if " and " in effect.where else place
     family = effect.family + (f", {effect.subfamily}" if effect.subfamily else "")
     cells = (f"`{effect.name}`", place, numbers, family, effect.sentence, effect.needs)
     return f"| {' | '.join(cells)} |"

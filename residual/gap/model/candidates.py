@@ -10,22 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.samples import Samples
+from residual.gap.model.reach import (
+    BEYOND,
+    full_command,
+    greatest_rate,
+    measured_range,
+    within_reach,
+)
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect, Quantity
 from sims.effects.curve import Curve
+from sims.effects.exchange import Exchange
 from sims.effects.joint import JointEffect
 from sims.effects.library import typical
 from sims.effects.limit import RateLimit
 from sims.effects.sensor import SensorEffect
 from sims.host import HostSimulator
-from sims.simulator import Channel
 
 Array = NDArray[np.float64]
-
-#: Part of an input's bound that a log has to reach to tell of full commands.
-NEAR_FULL = 0.5
-#: A limit of a rate is looked for up to so many times the fastest motion over so many rows.
-BEYOND, SPAN = 1.2, 5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -137,19 +139,19 @@ def candidates(
         if isinstance(effect, SensorEffect):
             if effect.where not in measured:
                 continue
-            effect = effect.suited_to(*_range(samples, columns[effect.where]))
+            effect = effect.suited_to(*measured_range(samples, columns[effect.where]))
         reach = 0.0
         if isinstance(effect, ActuatorEffect):
             acting = [inputs.index(name) for name in effect.actuators]
             reach = float(np.abs(samples.actions[:, acting]).max())
-            full = _full(simulator.action_channels[acting[0]], reach)
+            full = full_command(simulator.action_channels[acting[0]], reach)
             # A curve comes with its points where the log moves.
             effect = effect if isinstance(effect, Curve) else effect.suited_to(-full, full)
         if isinstance(effect, RateLimit):
-            reach = BEYOND * _fastest(effect, simulator, samples)
+            reach = BEYOND * greatest_rate(effect, simulator, samples)
         if _follows_unseen(effect, simulator, measured):
             continue
-        known = _within_reach(effect, effect.quantities(simulator), simulator, samples)
+        known = within_reach(effect, effect.quantities(simulator), simulator, samples)
         whole = {n: q for n, q in known.items() if q.integer and q.role == "shape"}
         for values in itertools.product(*(q.starts for q in whole.values())):
             fixed = effect.with_values(**dict(zip(whole, values, strict=True)))
@@ -163,6 +165,8 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     The start state of every window is free, so that such a force has a free size in each of them,
     and would explain anything.
     """
+    if isinstance(effect, Exchange):
+        return not set(effect.pair) <= measured
     joint = next((j for j in simulator.joints if j.name == effect.where), None)
     if not isinstance(effect, JointEffect) or joint is None or joint.position in measured:
         return False
@@ -177,89 +181,6 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     # The state of a first-order system counts as a rate.
     rates = np.zeros(4) if joint.rate else places
     return bool(np.ptp(there.force(places, rates)) > 0)
-
-
-def _full(channel: Channel, reach: float) -> float:
-    """Full command of an input, where its strength is known: its bound, if the log comes near."""
-    bound = max(abs(channel.low), abs(channel.high))
-    return bound if reach >= NEAR_FULL * bound else reach
-
-
-def _range(samples: Samples, column: int) -> tuple[float, float]:
-    """Least and greatest measured value of a channel."""
-    seen = samples.seen[:, column]
-    return float(np.nanmin(seen)), float(np.nanmax(seen))
-
-
-def _fastest(effect: RateLimit, simulator: HostSimulator, samples: Samples) -> float:
-    """Greatest measured rate where a limit acts; zero if nothing of it was measured."""
-    joint = next(j for j in simulator.joints if j.name == effect.joint)
-    names = [channel.name for channel in simulator.physical_channels]
-    if joint.rate not in (None, joint.position):
-        rate = samples.seen[:, names.index(str(joint.rate))]
-        if np.isfinite(rate).any():
-            return float(np.nanmax(np.abs(rate)))
-    place = samples.seen[:, names.index(joint.position)]
-    fastest = 0.0
-    for a, b in samples.runs:
-        span = min(SPAN, b - a - 1)
-        way = np.abs(place[a + span : b] - place[a : b - span])
-        rates = way / (samples.times[a + span : b] - samples.times[a : b - span])
-        fastest = max(fastest, float(np.nanmax(rates, initial=0.0)))
-    return fastest
-
-
-def _within_reach(
-    effect: Effect, known: dict[str, Quantity], simulator: HostSimulator, samples: Samples
-) -> dict[str, Quantity]:
-    """Numbers of an effect for the positions that were measured, and for how long.
-
-    No command is later than the longest record lasts.
-
-    An angle that counts turns goes far beyond its channel's scale, where a cubic spring of usual
-    size would be a wall, and trial steps of that size would tell nothing. A place, such as where a
-    spring rests, is looked for near the channel's zero and no farther beyond what was measured
-    than that is wide: a spring that rests farther away is a constant load with another name.
-    """
-    if effect.enters == "actuator":
-        longest = max(float(run.durations.sum()) for run in samples.recorded)
-        return {
-            name: dataclasses.replace(q, high=min(q.high, longest)) if q.unit == "s" else q
-            for name, q in known.items()
-        }
-    joint = next((j for j in simulator.joints if j.name == effect.where), None)
-    if effect.enters != "joint" or joint is None:
-        return known
-    names = [channel.name for channel in simulator.physical_channels]
-    column = names.index(joint.position)
-    if column not in samples.measured:
-        return known
-    low, high = _range(samples, column)
-    scale = simulator.physical_channels[column].scale
-    reach = max(1.0, max(abs(low), abs(high)) / scale)
-    beyond = max(high - low, scale)
-    found = {}
-    for field in dataclasses.fields(effect):
-        quantity = known.get(field.name)
-        if quantity is None:
-            continue
-        if quantity.integer and field.metadata["dimension"] == {"turn": 1}:
-            # Of less than a whole period no law is to be seen: it could pass for any force.
-            whole = tuple(times for times in quantity.starts if times * (high - low) >= 2 * np.pi)
-            quantity = dataclasses.replace(quantity, starts=whole)
-        if quantity.role == "shape" and field.metadata["dimension"] == {"position": 1}:
-            quantity = dataclasses.replace(
-                quantity,
-                low=max(quantity.low, min(low, 0.0) - beyond),
-                high=min(quantity.high, max(high, 0.0) + beyond),
-            )
-        power = field.metadata["dimension"].get("position", 0)
-        factor = reach**power if power < 0 else 1.0
-        starts = tuple(factor * start for start in quantity.starts)
-        found[field.name] = dataclasses.replace(
-            quantity, scale=factor * quantity.scale, starts=starts
-        )
-    return found
 
 
 def _candidate(effect: Effect, known: dict[str, Quantity], reach: float) -> Candidate:
