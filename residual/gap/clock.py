@@ -1,13 +1,15 @@
-"""The budget of processor time of a question, and where it went."""
+"""The budget of processor time of a question, where it went, and how often it is told."""
 
 from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 #: Part of the time budget after which nothing new is tried.
 SEARCHING = 0.6
+#: Seconds in which not more than one line tells how a search goes.
+OFTEN = 2.0
 
 
 class Clock:
@@ -38,3 +40,16 @@ class Clock:
         now = time.perf_counter()
         self.laps[step] = now - self._last
         self._last = now
+
+
+def seldom(tell: Callable[[str], None], seconds: float = OFTEN) -> Callable[[str], None]:
+    """The same without lines that come within so many seconds of the last one."""
+    last = time.perf_counter()
+
+    def now_and_then(text: str) -> None:
+        nonlocal last
+        if time.perf_counter() - last >= seconds:
+            last = time.perf_counter()
+            tell(text)
+
+    return now_and_then

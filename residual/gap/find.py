@@ -111,7 +111,7 @@ def find_gap(
         known = inquiry.confirmed(log, prepared, found, asked, parameter_tolerance)
         answer = known.answer
         tell("do the records differ?")
-        differ = unlike(answer) if asked and not clock.late else ()
+        differ = unlike(answer) if asked and conventions is None and not clock.late else ()
         clock.lap("confirm")
 
         table, apart = summed_up(answer), None

@@ -10,7 +10,7 @@ from residual.gap.answer.confirmed import Answer, confirm
 from residual.gap.answer.curves import over_the_log, takes_its_place, worth_a_curve
 from residual.gap.answer.free_parameters import better, worth_freeing
 from residual.gap.answer.lone import explains_the_rest, left_stretch, lone_stretch
-from residual.gap.clock import Clock
+from residual.gap.clock import Clock, seldom
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
 from residual.gap.confirmation.rest import fits_better_from_rest
@@ -89,8 +89,8 @@ class Inquiry:
         self.tell(f"{blocks} blocks of data, {ahead}, {len(pool)} candidate effects")
         self.tell("screening them")
         return explain(
-            simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort, self.tell,
-            self.clock.search_until, beside, earlier, twins,
+            simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort,
+            seldom(self.tell), self.clock.search_until, beside, earlier, twins,
         )  # fmt: skip
 
     def other_hold(

@@ -143,10 +143,10 @@ def _but_worse_apart(result: GapResult) -> str:
     before, after = (quantity_text(s.value, apart.unit) for s in (apart.before, apart.after))
     if not apart.tells:
         alone = quantity_text(apart.noise_floor.value, apart.unit)
-        return (
-            f" The records set aside cannot tell: there noise alone makes {alone}, and the "
-            f"{ahead(apart)} is {after} with it and {before} without."
-        )
+        errors = f"the {ahead(apart)} is {after} with it and {before} without"
+        if max(apart.before.value, apart.after.value) > OFF * apart.noise_floor.value:
+            return f" The records set aside are too few to tell: there {errors}."
+        return f" The records set aside cannot tell: there noise alone makes {alone}, and {errors}."
     if not apart.refutes:
         return (
             f" But it does not help on the records set aside, where the {ahead(apart)} is {after} "

@@ -105,7 +105,7 @@ def rollouts(search: Search, before: Validated, after: Validated) -> tuple[Rollo
 
 
 def held_out(gap: Gap, fitter: Fitter, before: Fit, after: Fit, floor: Array) -> Gap:
-    """The same table for records that were set aside.
+    """The same table for records that were set aside, about the channel that is furthest off there.
 
     Args:
         gap: Of the records that were used.
@@ -125,11 +125,14 @@ def held_out(gap: Gap, fitter: Fitter, before: Fit, after: Fit, floor: Array) ->
         )
         for i, c in enumerate(fitter.samples.measured)
     }
-    name = gap.channel if gap.channel in by_channel else next(iter(by_channel))
-    main, place = by_channel[name], list(by_channel).index(name)
+    worst = np.fmax(*squares)
+    place = main_channel(before.model.simulator, fitter.samples.measured, worst, floor)
+    name = list(by_channel)[place]
+    main = by_channel[name]
     steps = (Step("", main.before), Step("all that was found", main.after))
     return dataclasses.replace(
-        gap, before=main.before, after=main.after, noise_floor=main.noise_floor, steps=steps,
-        by_channel=by_channel, blocks=len(fitter.blocks), folds=1,
+        gap, channel=name, unit=main.unit, before=main.before, after=main.after,
+        noise_floor=main.noise_floor, steps=steps, by_channel=by_channel,
+        blocks=len(fitter.blocks), folds=1,
         no_better=no_better(squares[0][:, place], squares[1][:, place], floor[:, place]),
     )  # fmt: skip

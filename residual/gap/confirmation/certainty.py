@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t
 
 from residual.gap.confirmation.claim import Claim, other_than
 from residual.gap.confirmation.constancy import creeps
@@ -23,8 +24,8 @@ Array = NDArray[np.float64]
 #: Forecast error of a rival, over that of the chosen set, that excludes it while a remainder is
 #: left: model imperfection of that size may favour either.
 CLEARLY = 1.5
-#: Of a rival of the same family, which differs in form alone.
-FORM = 1.2
+#: Of a rival of the same family, which differs in form alone, and how sure that has to be.
+FORM, CHANCE = 1.2, 0.975
 #: The same from which on it is, whatever part of the data forecasts start from.
 HOPELESS = 3.0
 #: How far a strength may lie off in a fold, or with other numerics, as a share of it.
@@ -132,8 +133,8 @@ def excluded(
     worse as well, since fits hang on luck in finding start states there. While a remainder is
     left, a rival has to be clearly worse, also from starts that are better known: errors of the
     start fade in a sluggish model otherwise than in a late one. One that differs in form alone
-    has to lose at the horizon and at half of it. What leaves three times as much of all data is
-    out.
+    has to lose at the horizon, beyond chance, and at half of it. What leaves three times as much
+    of all data is out.
     """
     if adequate:
         if search.simulator.has_contacts and search.error(key) >= BETTER * search.error(rival):
@@ -147,13 +148,15 @@ def excluded(
     worse = _ratio(search, its.squares, own.squares, group)
     if worse > HOPELESS:
         return True
-    if worse > CLEARLY:
-        longer = [search.from_longer_leads(k) for k in (rival, key)]
-        return _ratio(search, longer[0], longer[1], group) > CLEARLY
-    if not alike or len(search.fitter.blocks) < FEW:
+    if worse <= (FORM if alike else CLEARLY):
         return False
-    behind, error = search.currency.difference(its.squares, own.squares, group)
-    return behind > error and _ratio(search, its.half, own.half, group) > 1.0 and worse > FORM
+    if alike:
+        blocks = len(search.fitter.blocks)
+        behind, error = search.currency.difference(its.squares, own.squares, group)
+        by_chance = behind <= t.ppf(CHANCE, max(blocks - 1, 1)) * error
+        return blocks >= FEW and not by_chance and _ratio(search, its.half, own.half, group) > 1.0
+    longer = [search.from_longer_leads(k) for k in (rival, key)]
+    return _ratio(search, longer[0], longer[1], group) > CLEARLY
 
 
 def in_plain_form(search: Search, key: Key, claims: Sequence[Claim]) -> Key | None:

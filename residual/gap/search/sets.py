@@ -193,10 +193,10 @@ class Search:
         for key, theta in proposals.items():
             if key in self.tried or doubles(self, key):
                 continue
-            name = " + ".join(self.labels(key))
-            self.tell(f"  trying {name}")
             self.fit(key, theta)
-            self.tell(f"  {name}: {100 * self.error(key):.3g} % of the error")
+            best = self.best()
+            name, left = " + ".join(self.labels(best)) or "nominal", 100 * self.error(best)
+            self.tell(f"  {len(self.tried)} sets tried; best: {name}, {left:.3g} % of the error")
         return list(self.tried)[before:]
 
     def fit(self, key: Key, theta: Array) -> None:
