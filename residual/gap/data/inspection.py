@@ -31,11 +31,22 @@ _MISREAD = {"rad": "deg", "rad/s": "deg/s", "m": "mm", "m/s": "km/h", "A": "mA",
 _FAR_BEYOND = 3.0
 # No more than this share of them are accidents.
 _FEW_WILD = 0.01
+# Units of time that are taken for seconds if samples come so many times as often, or nearly so.
+_LONGER, _ALMOST = {"min": 60.0, "h": 3600.0}, 0.02
 
 
 def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
-    """Samples much rarer than the control period."""
+    """Samples much rarer than the control period, or as often as if minutes were seconds."""
     period = float(np.median(np.concatenate([run.durations for run in trajectories])))
+    numbers = {"period_s": period, "control_period_s": simulator.dt}
+    for unit, seconds in _LONGER.items():
+        if abs(seconds * period / simulator.dt - 1) < _ALMOST:
+            says = (
+                f"a sample every {period:.4g} s, {seconds:.0f} in a control period of "
+                f"{simulator.name} ({simulator.dt:g} s): if the times are in {unit}, set "
+                f"columns.time to {{column: time, unit: {unit}}}"
+            )
+            return [Finding("sampling", "", says, numbers, "warning")]
     if period <= _SLOW * simulator.dt:
         return []
     driven = any(np.ptp(run.actions, axis=0).any() for run in trajectories if run.actions.size)
@@ -45,7 +56,6 @@ def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
         f"{simulator.name} ({simulator.dt:g} s): {unknown}fast effects cannot show; log at the "
         "control period if you can"
     )
-    numbers = {"period_s": period, "control_period_s": simulator.dt}
     return [Finding("sampling", "", says, numbers, "warning")]
 
 

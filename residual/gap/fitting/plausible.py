@@ -19,7 +19,13 @@ from residual.gap.fitting.screening import flatten
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.model import Model
 from sims.drive import shaped
-from sims.effects.actuator import ActuatorEffect, ActuatorGain, Delay, StaticActuatorEffect
+from sims.effects.actuator import (
+    ActuatorEffect,
+    ActuatorGain,
+    Delay,
+    Saturation,
+    StaticActuatorEffect,
+)
 from sims.effects.aliases import probes, shortly_after
 from sims.effects.base import Effect
 from sims.effects.parameter import ParameterChange
@@ -62,9 +68,9 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
         small = ratio > FACTOR and _minor(given, name, ratio)
         if not 1 / FACTOR <= ratio <= FACTOR and not small:
             return number, f"{name} would be {ratio:.3g} times its nominal value"
-    once = _shows_once(host, samples, len(model.simulator.effects))
-    if once is not None:
-        return once, "the input reaches where it acts only once, so that nothing confirms it"
+    untold = _untold(host, samples, len(model.simulator.effects))
+    if untold is not None:
+        return untold
     late = _never_arrives(host, samples, len(model.simulator.effects))
     if late is not None:
         return late, "most of what is commanded would come after its record has ended"
@@ -219,10 +225,12 @@ def _acts_on(effect: Effect, actuator: str) -> bool:
     return isinstance(effect, ActuatorEffect) and actuator in effect.actuators
 
 
-def _shows_once(host: HostSimulator, samples: Samples, own: int) -> int | None:
-    """Which effect of an actuator shows in a single stretch of the data, if any.
+def _untold(host: HostSimulator, samples: Samples, own: int) -> tuple[int, str] | None:
+    """Which effect of an actuator shows in a single stretch of the data, or always, and why that
+    tells nothing of it; None if there is none.
 
-    What happens beyond the end of all other data can be fitted, but not forecast.
+    What happens beyond the end of all other data can be fitted, but not forecast; and a saturation
+    that cuts all that was commanded is a weaker actuator.
     """
     inputs = [channel.name for channel in host.action_channels]
     for number, effect in enumerate(host.effects[own:]):
@@ -235,8 +243,11 @@ def _shows_once(host: HostSimulator, samples: Samples, own: int) -> int | None:
             if name in effect.actuators
         ]
         stretches = sum(int(s[0]) + int((s[1:] & ~s[:-1]).sum()) for s in shown)
-        if stretches == 1 and not all(s.all() for s in shown):
-            return number
+        always = all(s.all() for s in shown)
+        if stretches == 1 and not always:
+            return number, "the input reaches where it acts only once, so that nothing confirms it"
+        if always and isinstance(effect, Saturation):
+            return number, "the input is always beyond it, so that it would be a weaker actuator"
     return None
 
 

@@ -143,6 +143,14 @@ def test_a_log_in_which_nothing_moves_is_refused():
         examine(PendulumEquation(), [bad])
 
 
+def test_minutes_that_are_taken_for_seconds_are_told():
+    period = PendulumEquation().dt
+    for part, unit in ((1 / 60, "unit: min"), (1 / 3600, "unit: h"), (1 / 50, None), (1, None)):
+        run = dataclasses.replace(noisy(), times=part * period * np.arange(400))
+        found = [f for f in findings(PendulumEquation(), [run]) if f.kind == "sampling"]
+        assert [unit in one.says for one in found] == [True] * (unit is not None)
+
+
 def test_a_second_between_samples_is_told():
     slow = dataclasses.replace(noisy(), times=1.0 * np.arange(400))
     (found,) = [one for one in findings(PendulumEquation(), [slow]) if one.kind == "sampling"]

@@ -50,7 +50,7 @@ def said(effect, **values):
         (ActuatorGain("voltage"), {"gain": -2.0}, "voltage would act the other way"),
         (Delay("voltage"), {"time": 7.0}, "would come after its record has ended"),
         (DeadZone("voltage"), {"width": 1.95}, "of its strength"),
-        (Saturation("voltage"), {"level": 0.05}, "of its strength"),
+        (Saturation("voltage"), {"level": 0.05}, "a weaker actuator"),
         (ParameterChange("mass"), {"change": 0.6}, "mass would be 11.9 times its nominal value"),
         (ParameterChange("inertia"), {"change": -1.8e-4}, "inertia would be 0.0576 times"),
     ],
@@ -71,6 +71,15 @@ def test_what_switches_the_system_off_is_refused(effect, values, words):
 )
 def test_what_may_be_is_left_to_the_data(effect, values):
     assert said(effect, **values) == ""
+
+
+def test_a_limit_that_the_input_is_always_beyond_is_a_gain():
+    times, states = 0.05 * np.arange(201.0), np.zeros((201, 2))
+    for size, refused in ((3.0, True), (np.linspace(0.0, 3.0, 200)[:, None] % 2.5, False)):
+        samples = Samples.join([Trajectory("run", times, states, size * np.ones((200, 1)))], 4)
+        found = candidates(PendulumEquation(), [Saturation("voltage")], samples)
+        _, why = absurd(Model(PendulumEquation(), found), np.array([2.0]), samples)
+        assert ("weaker actuator" in why) is refused
 
 
 @pytest.mark.parametrize(("deviation", "may_be"), [(0.1, True), (0.01, False)])
