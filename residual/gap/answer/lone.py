@@ -64,11 +64,11 @@ class Stretch:
             f"{self.motion:.0%} of the motion lies there, too, so that more of its kind, in other "
             "records, may tell"
             if moves
-            else "was it held, knocked or reset there?"
+            else "was it held, knocked or reset there, or did it move so only there?"
         )
         if left_out:
             return f"{told}{'.' * moves} It was left out of everything that is said"
-        return told if moves else f"{told} Look there, or leave it out"
+        return told if moves else f"{told} Look there, then leave it out or log more of its kind"
 
     def cut_from(self, runs: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
         """The runs without it: what comes before and after are runs of their own."""

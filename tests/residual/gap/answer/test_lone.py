@@ -59,7 +59,7 @@ def test_what_the_rest_of_the_log_shows_is_named():
 def test_what_is_left_in_one_stretch_beside_a_name_is_told():
     (said,) = with_a_stretch(by_hand)
     assert "of the squared error that is left lies in one stretch, run 2 from" in said
-    assert said.endswith("Look there, or leave it out")
+    assert said.endswith("leave it out or log more of its kind")
 
 
 def test_no_stretch_is_told_of_a_log_without_one():
