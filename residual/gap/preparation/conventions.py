@@ -40,9 +40,9 @@ POOR, GOOD = 0.3, 0.5
 #: Times that forecasts have to be better with another convention, and other conventions that do
 #: as well.
 BETTER, ALIKE = 2.0, 1.2
-#: The same with two columns in each other's place, which no physics comes near: in honest logs it
-#: makes forecasts worse.
-EXCHANGED = 1.5
+#: The same with two columns in each other's place, and how good they have to be then: no physics
+#: comes near, so that in honest logs it makes forecasts worse.
+EXCHANGED, FAIR = 1.5, 1.0
 #: Error from which on a sign or an exchange is asked after that makes it so many times smaller:
 #: what swings by itself hides a reversed input.
 HIDDEN, CLEARLY = 0.1, 4.0
@@ -78,8 +78,8 @@ def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
     ]
     errors = [(_error(simulator, fitter, one), one) for one in asked]
     least, best = min(errors, key=lambda pair: pair[0], default=(own, as_said(simulator)))
-    times = CLEARLY if not poor else EXCHANGED if best.exchanged else BETTER
-    if times * least > own or least > GOOD:
+    times, good = (EXCHANGED, FAIR) if best.exchanged else (BETTER, GOOD)
+    if (times if poor else CLEARLY) * least > own or least > good:
         return None
     further = beyond(best)
     if further is not None and BETTER * least > _error(simulator, fitter, further):
