@@ -34,6 +34,8 @@ RAISED = str.maketrans(
 DIVIDED = re.compile(r"(rad|[mVKNA])(?![\w^])")
 #: Names of people, in the names of effects.
 PEOPLE = ("Coulomb", "Stribeck")
+#: Effects that act between two places.
+BETWEEN = ("exchange",)
 
 
 def effect_name(label: str) -> str:
@@ -44,7 +46,8 @@ def effect_name(label: str) -> str:
     words = name.replace("_", " ")
     for person in PEOPLE:
         words = words.replace(person.lower(), person)
-    return words + (f" at {where.replace('_', ' ')}" if where else "")
+    at = "between" if name in BETWEEN else "at"
+    return words + (f" {at} {where.replace('_', ' ')}" if where else "")
 
 
 def set_name(labels: Sequence[str]) -> str:

@@ -8,7 +8,9 @@ import pytest
 from residual.gap.result import Number
 from studies.gap.progress import Heartbeat
 from studies.gap.words import (
+    by_place,
     duration_text,
+    effect_name,
     number_text,
     percent,
     quantity_text,
@@ -93,3 +95,12 @@ def test_long_times_are_told_in_hours_and_days(seconds, text):
 )
 def test_a_nominal_value_is_written_like_what_replaces_it(value, text):
     assert six_digits(value) == text
+
+
+@pytest.mark.parametrize(("labels", "text"), [
+    (["viscous_friction@arm_1", "viscous_friction@arm_2"], "viscous friction at arm 1 and arm 2"),
+    (["exchange@T1 and T2"], "exchange between T1 and T2"),
+    (["mass"], "mass"),
+])  # fmt: skip
+def test_effects_are_said_with_their_places(labels, text):
+    assert by_place([effect_name(label) for label in labels]) == [text]
