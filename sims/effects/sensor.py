@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 #: Ranges of the readings by which zero lies outside them where a scale about zero means nothing.
 FAR = 5.0
-#: Share by which the scale of a sensor is seldom wrong: a wrong unit or gear is, but more often
-#: what moves is larger or smaller.
-USUAL = 0.2
 
 
 @dataclasses.dataclass(frozen=True)

@@ -29,7 +29,7 @@ from sims.effects.actuator import (
 from sims.effects.aliases import probes, shortly_after
 from sims.effects.base import Effect
 from sims.effects.parameter import ParameterChange
-from sims.effects.sensor import USUAL, SensorEffect, SensorOffset
+from sims.effects.sensor import SensorEffect, SensorOffset
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -49,6 +49,8 @@ SLIGHTLY, SELDOM = 0.02, 0.05
 ARRIVING = 0.5
 #: Part of two effects that is left of both together, below which they undo each other.
 UNDONE = 0.25
+#: Part of all that a sensor showed by which its zero is seldom wrong.
+FAR_OFF = 0.2
 
 
 def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
@@ -180,7 +182,7 @@ def doubtful_sensor(effect: Effect, simulator: HostSimulator, samples: Samples) 
         return False
     shown = samples.seen[:, place]
     span = float(np.ptp(shown[np.isfinite(shown)])) if np.isfinite(shown).any() else 0.0
-    return bool(np.max(np.abs(effect.offset)) > USUAL * span)
+    return bool(np.max(np.abs(effect.offset)) > FAR_OFF * span)
 
 
 def surprises(fit: Fit, samples: Samples) -> int:
