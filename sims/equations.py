@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -18,14 +18,21 @@ from sims.motion import Acceleration, DriveForce, Motion, advance_smoothly
 from sims.rows import State
 from sims.simulator import ANGLES, Array, Channel, Parameter
 from sims.sliding import advance
+from sims.unsound import cannot_call
 
 # Rows advanced together: many enough to hide Python, few enough to stay in the cache.
 BLOCK = 4096
 
 
 class _Equations(HostSimulator):
-    """What systems that are written out as equations have in common."""
+    """What systems that are written out as equations have in common.
 
+    Attributes:
+        written: Name of the method that a subclass writes, and ``takes`` what it is given.
+    """
+
+    written: ClassVar[str]
+    takes: ClassVar[tuple[str, ...]]
     parameters: Mapping[str, Parameter] = {}
     advances_rows_at_once = True
     written_out = True
@@ -40,6 +47,9 @@ class _Equations(HostSimulator):
         self.name = getattr(cls, "name", cls.__name__)
         self.dt = cls.dt if dt is None else dt
         self.substeps = cls.substeps if substeps is None else substeps
+        if problem := cannot_call(getattr(self, cls.written), *cls.takes):
+            wanted = f"{cls.written}(self, {', '.join(cls.takes)})"
+            raise ValueError(f"{cls.__name__}.{cls.written}: {problem}; expected {wanted}")
         if not hasattr(cls, "joints"):
             self.joints = self._own_joints()
         self._arrange()
@@ -95,6 +105,8 @@ class EquationOfMotion(_Equations):
 
     dt = 0.02
     substeps = 10
+    written = "acceleration"
+    takes = ("q", "v", "u", "force", "p")
 
     def _own_joints(self) -> tuple[Joint, ...]:
         rates = [channel for channel in self.state_channels if channel.kind == "rate"]
@@ -204,6 +216,8 @@ class FirstOrderSystem(_Equations):
 
     dt = 1.0
     substeps = 5
+    written = "derivative"
+    takes = ("x", "u", "p")
 
     def _own_joints(self) -> tuple[Joint, ...]:
         return tuple(

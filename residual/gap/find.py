@@ -10,7 +10,7 @@ from residual.gap.answer.answer import summed_up, told
 from residual.gap.answer.apart import judged_apart
 from residual.gap.answer.confirmed import matters
 from residual.gap.answer.late import nearly_in_sensors
-from residual.gap.answer.records import unlike
+from residual.gap.answer.records import stands_for, unlike
 from residual.gap.clock import Clock
 from residual.gap.inquiry import Inquiry
 from residual.gap.log import look, settle
@@ -123,7 +123,7 @@ def find_gap(
                 replace(
                     claim,
                     counted=conventions is not None,
-                    unlike=any(one.instead for one in differ),
+                    unlike=stands_for(answer, claim, differ),
                     refuted=apart is not None and apart.refutes,
                     helpless=apart is not None and apart.denies,
                 )

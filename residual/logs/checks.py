@@ -133,8 +133,10 @@ def check_plausible(signal: Signal, rate_scale: float | None) -> None:
     unit = signal.channel.unit
     if signal.unit or unit not in ("rad", "rad/s") or not signal.runs:
         return
-    degrees = "deg" if unit == "rad" else "deg/s"
-    advice = f"looks like degrees: set unit: {degrees} (or unit: {unit} if that is right)"
+    others, units = ("degrees", "unit: deg") if unit == "rad" else (
+        "degrees per second or revolutions per minute", "unit: deg/s or unit: rpm"
+    )  # fmt: skip
+    advice = f"looks like {others}: set {units} (or unit: {unit} if that is right)"
     name = f"column {signal.column!r}: the channel {signal.channel.name!r}"
     if unit == "rad" and _jumps_by_360(signal):
         raise ValueError(f"{name} jumps by about 360, as a compass does; {advice}")

@@ -15,7 +15,7 @@ from sims.effects import (
     exact_aliases,
     library,
 )
-from sims.equations import BLOCK, EquationOfMotion
+from sims.equations import BLOCK, EquationOfMotion, FirstOrderSystem
 from sims.host import Joint
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
@@ -245,3 +245,15 @@ def test_an_acceleration_of_the_wrong_shape_is_explained():
 
     with pytest.raises(ValueError, match=r"returned shape \(3,\), expected \(3, 2\)"):
         Careless().step(*rows(3))
+
+
+def test_a_method_of_other_arguments_is_explained():
+    class Heater(FirstOrderSystem):
+        state_channels = (Channel("heat", "K", "other"),)
+        action_channels = (Channel("power", "W", "input"),)
+
+        def derivative(self, x, u, force, p):
+            return u + force
+
+    with pytest.raises(ValueError, match=r"'p'; expected derivative\(self, x, u, p\)"):
+        Heater()

@@ -15,7 +15,8 @@ DOUBTS: dict[Doubt, str] = {
     "conventions": "it has to be seen first whether the log counts as the simulator does",
     "extreme": "a parameter or an input would be more than ten times off, or act the other way, so "
     "see first whether the simulator has it right",
-    "records": "one effect with its own size in each record does better than all that is named",
+    "records": "an effect with its own size in each record does better, or may be what this one "
+    "stands for",
     "set_aside": "the corrected simulator is worse on the records that were set aside",
     "no_help": "the corrected simulator is no better on the records that were set aside",
     "sensor": "sensors are seldom wrong in their scale, or by a fifth of all that they showed, and "

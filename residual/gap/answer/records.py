@@ -8,11 +8,14 @@ fit that size say so; which effect it is they seldom tell.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.answer.confirmed import Answer
 from residual.gap.beside import Unlike
+from residual.gap.confirmation.claim import Claim
 from residual.gap.fitting.bounded import bounded_step
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.forecasts import noise_floor
@@ -20,6 +23,7 @@ from residual.gap.fitting.screening import beside_starts, constrained, flatten, 
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.fitting.validation import by_block, validate
 from residual.gap.search.sets import Key, Search
+from sims.effects.curve import Curve
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -66,6 +70,21 @@ def unlike(answer: Answer) -> tuple[Unlike, ...]:
         if error <= NEARLY * helping[0][0]:
             told.setdefault(one.label, one)
     return tuple(told.values())[:TOLD]
+
+
+def stands_for(answer: Answer, claim: Claim, differ: Sequence[Unlike]) -> bool:
+    """Whether what was named may stand for an effect that differs between records.
+
+    Where one does better alone, all that was named may. A curve may anyway: records that reach
+    differently far have points of it to themselves.
+
+    Args:
+        answer: What was found with one size for all.
+        claim: On one of its effects.
+        differ: See ``unlike``.
+    """
+    curve = isinstance(answer.found.search.candidates[claim.number].effect, Curve)
+    return any(one.instead or curve for one in differ)
 
 
 def _records(fitter: SmoothFitter) -> tuple[tuple[str, ...], Integers]:

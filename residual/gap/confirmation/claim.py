@@ -43,7 +43,7 @@ class Claim:
         brief: Whether it is a time too short for the log's own clock.
         counted: Whether the log may count otherwise than the simulator does.
         extreme: Whether a number of its set is out of all proportion to the simulator's.
-        unlike: Whether one effect, in a size of its own in each record, does better than all named.
+        unlike: Whether it may stand for one effect in a size of its own in each record.
         refuted: Whether the corrected simulator forecasts records that were set aside worse.
         helpless: Whether it forecasts them no better, though they show more than noise.
         sensor: Whether it is a sensor wrong as sensors seldom are, beside a remainder.

@@ -13,19 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.samples import Samples
+from residual.gap.fitting.commands import by_commands
 from residual.gap.fitting.contract import Fit, Fitter
 from residual.gap.fitting.intervals import at_bound, deviations
 from residual.gap.fitting.screening import flatten
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.model import Model
-from sims.drive import shaped
-from sims.effects.actuator import (
-    ActuatorEffect,
-    ActuatorGain,
-    Delay,
-    Saturation,
-    StaticActuatorEffect,
-)
+from sims.effects.actuator import ActuatorEffect, ActuatorGain
 from sims.effects.aliases import probes, shortly_after
 from sims.effects.base import Effect
 from sims.effects.parameter import ParameterChange
@@ -45,8 +39,6 @@ THROUGH = 0.1
 FAR, CLOSE, UNMOVED = 3.0, 1.5, 0.2
 #: Part of the largest command by which an input is negative by chance, and of the time.
 SLIGHTLY, SELDOM = 0.02, 0.05
-#: Part of the changes of an input up to which too few come in time.
-ARRIVING = 0.5
 #: Part of two effects that is left of both together, below which they undo each other.
 UNDONE = 0.25
 #: Part of all that a sensor showed by which its zero is seldom wrong.
@@ -70,12 +62,9 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
         small = ratio > FACTOR and _minor(given, name, ratio)
         if not 1 / FACTOR <= ratio <= FACTOR and not small:
             return number, f"{name} would be {ratio:.3g} times its nominal value"
-    untold = _untold(host, samples, len(model.simulator.effects))
-    if untold is not None:
-        return untold
-    late = _never_arrives(host, samples, len(model.simulator.effects))
-    if late is not None:
-        return late, "most of what is commanded would come after its record has ended"
+    unsupported = by_commands(host, samples, len(model.simulator.effects))
+    if unsupported is not None:
+        return unsupported
     before = Model(given).inputs(samples, np.zeros((1, 0)))[0]
     after = model.inputs(samples, theta[None])[0]
     for j, channel in enumerate(host.action_channels):
@@ -225,58 +214,6 @@ def undone(fit: Fit) -> int:
 
 def _acts_on(effect: Effect, actuator: str) -> bool:
     return isinstance(effect, ActuatorEffect) and actuator in effect.actuators
-
-
-def _untold(host: HostSimulator, samples: Samples, own: int) -> tuple[int, str] | None:
-    """Which effect of an actuator shows in a single stretch of the data, or always, and why that
-    tells nothing of it; None if there is none.
-
-    What happens beyond the end of all other data can be fitted, but not forecast; and a saturation
-    that cuts all that was commanded is a weaker actuator.
-    """
-    inputs = [channel.name for channel in host.action_channels]
-    for number, effect in enumerate(host.effects[own:]):
-        if not isinstance(effect, StaticActuatorEffect):
-            continue
-        shown = [
-            effect.shows(_coming_in(effect, host.actuator_effects(name), commands))
-            for run in samples.recorded
-            for name, commands in zip(inputs, run.actions.T, strict=True)
-            if name in effect.actuators
-        ]
-        stretches = sum(int(s[0]) + int((s[1:] & ~s[:-1]).sum()) for s in shown)
-        always = all(s.all() for s in shown)
-        if stretches == 1 and not always:
-            return number, "the input reaches where it acts only once, so that nothing confirms it"
-        if always and isinstance(effect, Saturation):
-            return number, "the input is always beyond it, so that it would be a weaker actuator"
-    return None
-
-
-def _never_arrives(host: HostSimulator, samples: Samples, own: int) -> int | None:
-    """Which effect delays most changes of its input to beyond the end of their records, if any.
-
-    So what records that begin with their only step would have without that step is a delay.
-    """
-    inputs = [channel.name for channel in host.action_channels]
-    for number, effect in enumerate(host.effects[own:]):
-        if not isinstance(effect, Delay):
-            continue
-        columns = [inputs.index(name) for name in effect.actuators]
-        arrive = []
-        for run in samples.recorded:
-            held = np.vstack([run.first, run.actions])[:, columns]
-            changes = np.flatnonzero((np.diff(held, axis=0) != 0).any(axis=1))
-            left = np.cumsum(run.durations[::-1])[::-1][changes]
-            arrive.append(left > effect.time)
-        if np.mean(np.concatenate(arrive) if arrive else True) <= ARRIVING:
-            return number
-    return None
-
-
-def _coming_in(effect: ActuatorEffect, others: Sequence[ActuatorEffect], commands: Array) -> Array:
-    """What an effect gets of the commands (T,): what those before it leave."""
-    return shaped(commands[None], [one for one in others if one.stage < effect.stage])[0]
 
 
 def _minor(simulator: HostSimulator, parameter: str, ratio: float) -> bool:

@@ -1,6 +1,7 @@
 """What differs between records: told with its size in each, and only where records do differ."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,9 @@ from lift import LOADS, TRIPS, Lift
 from lift import OFFERED as OFFERED_LIFT
 
 from residual.gap import find_gap
+from residual.gap.answer.records import stands_for
+from residual.gap.beside import Unlike
+from sims.effects import CoulombFriction, FrictionCurve
 from sims.pendulum_equation import PendulumEquation
 from studies.gap.lead import lead
 from studies.gap.summary import summary
@@ -84,3 +88,16 @@ def test_loads_of_a_lift_are_told_in_place_of_what_makes_the_best_of_them():
 def test_nothing_is_said_of_a_single_record():
     (run,) = make_logs(Truth(wind=4e-3), 5, "strong", "A", runs=1, steps=300)
     assert ask([run]).unlike == ()
+
+
+@pytest.mark.parametrize(("effect", "instead", "wanted"), [
+    (FrictionCurve("pivot"), False, True), (CoulombFriction("pivot"), False, False),
+    (CoulombFriction("pivot"), True, True),
+])  # fmt: skip
+def test_a_curve_may_stand_for_what_differs_between_records(effect, instead, wanted):
+    """Records that reach differently far have points of a curve to themselves."""
+    search = SimpleNamespace(candidates=[SimpleNamespace(effect=effect)])
+    answer = SimpleNamespace(found=SimpleNamespace(search=search))
+    one = Unlike("constant_load", "pivot", "load", "N m", {}, 0.5, instead=instead)
+    assert stands_for(answer, SimpleNamespace(number=0), [one]) is wanted
+    assert not stands_for(answer, SimpleNamespace(number=0), [])
