@@ -11,7 +11,6 @@ from residual.gap.data.samples import Samples
 from sims.drive import shaped
 from sims.effects.actuator import (
     ActuatorEffect,
-    DeadZone,
     Delay,
     Saturation,
     StaticActuatorEffect,
@@ -20,8 +19,6 @@ from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
-#: Part of the commands that has to get through a dead zone unless it does so repeatedly.
-PASSING = 0.1
 #: Part of the changes of an input up to which too few come in time.
 ARRIVING = 0.5
 
@@ -48,29 +45,19 @@ def _static(host: HostSimulator, samples: Samples, own: int) -> tuple[int, str] 
     for number, effect in enumerate(host.effects[own:]):
         if not isinstance(effect, StaticActuatorEffect):
             continue
-        coming = [
-            _coming_in(effect, host.actuator_effects(name), commands)
+        shown = [
+            effect.shows(_coming_in(effect, host.actuator_effects(name), commands))
             for run in samples.recorded
             for name, commands in zip(inputs, run.actions.T, strict=True)
             if name in effect.actuators
         ]
-        shown = [effect.shows(commands) for commands in coming]
         always = all(s.all() for s in shown)
-        if _stretches(shown) == 1 and not always:
+        stretches = sum(int(s[0]) + int((s[1:] & ~s[:-1]).sum()) for s in shown)
+        if stretches == 1 and not always:
             return number, "the input reaches where it acts only once, so that nothing confirms it"
-        if isinstance(effect, DeadZone):
-            through = [effect.shape(commands) != 0 for commands in coming]
-            part = sum(map(np.sum, through)) / max(sum(map(np.count_nonzero, coming)), 1)
-            if part < PASSING and _stretches(through) <= 1:
-                return number, "the input would get through only once, so that nothing confirms it"
         if always and isinstance(effect, Saturation):
             return number, "the input is always beyond it, so that it would be a weaker actuator"
     return None
-
-
-def _stretches(there: Sequence[NDArray[np.bool_]]) -> int:
-    """In how many stretches of all records something is there."""
-    return sum(int(s[0]) + int((s[1:] & ~s[:-1]).sum()) for s in there)
 
 
 def _late(host: HostSimulator, samples: Samples, own: int) -> tuple[int, str] | None:

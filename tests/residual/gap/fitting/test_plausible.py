@@ -82,17 +82,6 @@ def test_a_limit_that_the_input_is_always_beyond_is_a_gain():
         assert ("weaker actuator" in why) is refused
 
 
-@pytest.mark.parametrize(("bumps", "refused"), [(1, True), (3, False)])
-def test_a_dead_zone_that_commands_leave_once_is_refused(bumps, refused):
-    times, volts = 0.05 * np.arange(201.0), np.random.default_rng(0).uniform(-1, 1, (200, 1))
-    for k in range(bumps):
-        volts[30 * k : 30 * k + 3] = -40.0
-    samples = Samples.join([Trajectory("run", times, np.zeros((201, 2)), volts)], 4)
-    found = candidates(PendulumEquation(), [DeadZone("voltage")], samples)
-    _, why = absurd(Model(PendulumEquation(), found), np.array([5.0]), samples)
-    assert ("get through only once" in why) is refused
-
-
 @pytest.mark.parametrize(("deviation", "may_be"), [(0.1, True), (0.01, False)])
 def test_an_absurd_number_that_is_badly_known_may_be_a_believable_one(
     monkeypatch, deviation, may_be
