@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from sims import drive as path
 from sims.effects.actuator import ActuatorEffect
+from sims.effects.store import stores
 from sims.simulator import Array, Channel, Hold
 
 if TYPE_CHECKING:
@@ -22,13 +23,21 @@ def history(simulator: HostSimulator, actuator: str) -> int:
     return int(np.ceil(np.max(late) / simulator.dt - 1e-9))
 
 
+def moving_memory(simulator: HostSimulator) -> int:
+    """Memory channels that move with the physical ones: plays, then stores."""
+    return len(simulator.plays()) + len(stores(simulator))
+
+
 def memory_channels(simulator: HostSimulator) -> Iterator[Channel]:
-    """Channels of the places in plays, past commands and lagged inputs, in this order."""
+    """Channels of places in plays, stores, past commands and lagged inputs, in this order."""
     channels = {channel.name: channel for channel in simulator.state_channels}
     joints = {joint.name: joint for joint in simulator.joints}
     for play in simulator.plays():
         position = channels[joints[play.joint].position]
         yield Channel(f"{play.joint} play", position.unit, "memory", scale=position.scale)
+    for store in stores(simulator):
+        filled = channels[joints[store.joint].position]
+        yield Channel(f"{store.joint} store", filled.unit, "memory", scale=filled.scale)
     for channel in simulator.action_channels:
         for k in range(history(simulator, channel.name), 0, -1):
             past = f"{channel.name} {k} ago"
@@ -95,6 +104,9 @@ def with_memory(simulator: HostSimulator, states: Array, actions: Array) -> Arra
     full[:, :physical] = states
     received = np.empty_like(actions)
     at = physical + len(simulator.plays())
+    for store in stores(simulator):
+        full[:, at] = states[:, [joint.name for joint in simulator.joints].index(store.joint)]
+        at += 1
     for j, channel in enumerate(simulator.action_channels):
         effects = simulator.actuator_effects(channel.name)
         received[:, j] = path.shaped(actions[:, j : j + 1], effects)[:, 0]

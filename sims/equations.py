@@ -9,14 +9,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from sims.authored import by_joint, joint_of
 from sims.effects.base import Effect
 from sims.effects.exchange import Exchange
 from sims.effects.friction import DryFriction
 from sims.effects.limit import RateLimit
+from sims.effects.store import SecondStore, stores
 from sims.host import HostSimulator, Joint
 from sims.motion import Acceleration, DriveForce, Motion, advance_smoothly
 from sims.rows import State
-from sims.simulator import ANGLES, Array, Channel, Parameter
+from sims.simulator import Array, Parameter
 from sims.sliding import advance
 from sims.unsound import cannot_call
 
@@ -73,7 +75,12 @@ class _Equations(HostSimulator):
         forces = [(names.index(e.joint), e) for e in self.joint_effects()]
         there = [e for e in self.effects if not e.absent]
         limits = [e for e in there if isinstance(e, RateLimit)]
-        exchanges = [e for e in there if isinstance(e, Exchange)]
+        flows: list[tuple[int, int, Exchange | SecondStore]] = [
+            (names.index(e.pair[0]), names.index(e.pair[1]), e)
+            for e in there
+            if isinstance(e, Exchange)
+        ]
+        flows += [(names.index(e.joint), len(names) + i, e) for i, e in enumerate(stores(self))]
         return Motion(
             acceleration,
             drive_force,
@@ -82,7 +89,7 @@ class _Equations(HostSimulator):
             dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
             plays=tuple((names.index(e.joint), e) for e in self.plays()),
             capped=tuple((names.index(e.joint), e) for e in limits),
-            exchanges=tuple((names.index(e.pair[0]), names.index(e.pair[1]), e) for e in exchanges),
+            flows=tuple(flows),
             span=span,
         )
 
@@ -110,7 +117,7 @@ class EquationOfMotion(_Equations):
 
     def _own_joints(self) -> tuple[Joint, ...]:
         rates = [channel for channel in self.state_channels if channel.kind == "rate"]
-        return tuple(_joint(rate, self.state_channels) for rate in rates)
+        return tuple(joint_of(rate, self.state_channels) for rate in rates)
 
     def _arrange(self) -> None:
         self.has_drive_force = type(self).drive_force is not EquationOfMotion.drive_force
@@ -192,11 +199,11 @@ class EquationOfMotion(_Equations):
         # The system's author sees rows first.
         def acceleration(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
             found = self.acceleration(q.T, v.T, u.T, f.T, p)
-            return _by_joint(found, q.shape, "acceleration")
+            return by_joint(found, q.shape, "acceleration")
 
         def drive_force(q: Array, v: Array, u: Array, p: SimpleNamespace) -> Array:
             found = self.drive_force(q.T, v.T, u.T, p)
-            return _by_joint(found, q.shape, "drive_force")
+            return by_joint(found, q.shape, "drive_force")
 
         return self._moved([joint.name for joint in self.joints], acceleration, drive_force, span)
 
@@ -237,12 +244,14 @@ class FirstOrderSystem(_Equations):
 
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
         """See ``HostSimulator.integrate``: the states are rates of positions that are not used."""
+        names = [channel.name for channel in self.physical_channels]
 
         def rates(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
-            return _by_joint(self.derivative(v.T, u.T, p), v.shape, "derivative", "x") + f
+            own = v[: len(names)]
+            change = by_joint(self.derivative(own.T, u.T, p), own.shape, "derivative", "x")
+            return np.concatenate([change + f[: len(names)], f[len(names) :]])
 
         # Nothing has play, so nobody asks for a drive force.
-        names = [channel.name for channel in self.physical_channels]
         motion = self._moved(names, rates, lambda q, v, u, p: np.zeros_like(v))
         x = np.ascontiguousarray(np.asarray(states, float).T)
         inputs = np.asarray(inputs, float)
@@ -268,32 +277,3 @@ def substep_ends(inputs: Array) -> Array:
         mean, rise = inputs[..., 0], inputs[..., 1]
         ends = np.stack([mean - 0.5 * rise, mean + 0.5 * rise])
     return np.ascontiguousarray(ends.transpose(2, 0, 3, 1))
-
-
-def _by_joint(found: Any, shape: tuple[int, ...], what: str, column: str = "q") -> Array:
-    """What the system's author returned, rows last; checked, since broadcasting hides errors."""
-    plain = type(found) is np.ndarray and found.dtype == np.float64
-    if not plain and np.iscomplexobj(found):
-        raise ValueError(f"{what} returned complex numbers, expected real ones")
-    found = np.asarray(found, dtype=float)
-    if found.shape != shape[::-1]:
-        raise ValueError(
-            f"{what} returned shape {found.shape}, expected {shape[::-1]}: one row for each "
-            f"state. Compute with columns such as {column}[:, 0], since parameters are scalars or "
-            "shape (n,), and stack the results on axis 1"
-        )
-    # A copy, since it may be one of the arrays that the author was given.
-    return np.array(found.T, order="C")
-
-
-def _joint(rate: Channel, channels: Sequence[Channel]) -> Joint:
-    """The joint of a rate channel, called after its position."""
-    position = next((c for c in channels if c.name == rate.rate_of), None)
-    if position is None:
-        names = ", ".join(repr(c.name) for c in channels if c.kind == "position")
-        raise ValueError(
-            f"channel {rate.name!r} has rate_of={rate.rate_of!r}, expected the name of its "
-            f"position, one of {names or 'none that is declared'}"
-        )
-    turns = position.angle or position.unit in ANGLES
-    return Joint(position.name, position.name, rate.name, "N m" if turns else "N")

@@ -16,7 +16,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sims.actuation import clipped, driven, memory_channels, next_inputs, with_memory
+from sims.actuation import clipped, driven, memory_channels, moving_memory, next_inputs, with_memory
 from sims.drive import lagged
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
@@ -114,8 +114,8 @@ class HostSimulator(Simulator):
 
     @property
     def integrated_channels(self) -> tuple[Channel, ...]:
-        """Columns of ``integrate``: the physical channels, then a gap for each backlash."""
-        return self.state_channels[: len(self.physical_channels) + len(self.plays())]
+        """Columns of ``integrate``: the physical channels, then one for each play or store."""
+        return self.state_channels[: len(self.physical_channels) + moving_memory(self)]
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:
         """A copy with these effects instead of its own.

@@ -16,6 +16,7 @@ from sims.effects.exchange import Exchange
 from sims.effects.friction import CoulombFriction, DryFriction
 from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
+from sims.effects.store import SecondStore
 from sims.rows import Mask, Rows, State
 from sims.simulator import Array
 
@@ -33,7 +34,7 @@ class Motion:
         drive_force: (q, v, u, parameters) -> (n_joints, n).
         parameters: Each a scalar or (n,).
         smooth, dry, plays, capped: Effects with the number of the joint they act on.
-        exchanges: The same with the numbers of both states of a first-order system.
+        flows: The same with the numbers of both states that something flows between.
         span: Time in s, by row, in which a rate comes back to its limit; None of a first-order
             system, whose limit is of what ``acceleration`` tells.
     """
@@ -45,7 +46,7 @@ class Motion:
     dry: tuple[tuple[int, DryFriction], ...] = ()
     plays: tuple[tuple[int, Backlash], ...] = ()
     capped: tuple[tuple[int, RateLimit], ...] = ()
-    exchanges: tuple[tuple[int, int, Exchange], ...] = ()
+    flows: tuple[tuple[int, int, Exchange | SecondStore], ...] = ()
     span: Array | None = None
 
     def take(self, rows: Rows) -> Motion:
@@ -58,7 +59,7 @@ class Motion:
             tuple((j, effect.take(rows)) for j, effect in self.dry),
             tuple((j, effect.take(rows)) for j, effect in self.plays),
             tuple((j, effect.take(rows)) for j, effect in self.capped),
-            tuple((i, j, effect.take(rows)) for i, j, effect in self.exchanges),
+            tuple((i, j, effect.take(rows)) for i, j, effect in self.flows),
             None if self.span is None else self.span[rows],
         )
 
@@ -77,8 +78,8 @@ class Motion:
         total = np.zeros(q.shape) if force is None else force
         for j, effect in self.smooth:
             total[j] += effect.force(q[j], v[j])
-        for i, j, exchange in self.exchanges:
-            inward, outward = exchange.flows(v[i], v[j])
+        for i, j, flow in self.flows:
+            inward, outward = flow.flows(v[i], v[j])
             total[i] += inward
             total[j] += outward
         return total

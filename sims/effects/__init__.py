@@ -43,3 +43,4 @@ from sims.effects.parameter import ParameterChange as ParameterChange
 from sims.effects.sensor import SensorEffect as SensorEffect
 from sims.effects.sensor import SensorOffset as SensorOffset
 from sims.effects.sensor import SensorScale as SensorScale
+from sims.effects.store import SecondStore as SecondStore

@@ -118,7 +118,8 @@ def through(way: Value, values: Sequence[Value]) -> Value:
     """
     basis = _basis(len(values))
     t = np.clip(way, 0.0, 1.0) * (len(values) - 1)
-    piece = np.minimum(np.asarray(t).astype(int), len(basis) - 1)
+    # What is no number, as of a trial that ran away, stays none.
+    piece = np.minimum(np.nan_to_num(np.asarray(t)).astype(int), len(basis) - 1)
     into, of_piece = t - piece, basis[piece]
     found = 0.0 * t
     for j, value in enumerate(values):

@@ -39,6 +39,7 @@ from sims.effects.joint import (
 from sims.effects.limit import RateLimit, follows_command
 from sims.effects.parameter import ParameterChange
 from sims.effects.sensor import SensorOffset, SensorScale
+from sims.effects.store import SecondStore
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
@@ -53,6 +54,7 @@ JOINT_EFFECTS: tuple[type[Effect], ...] = (
     CubicSpring,
     ConstantLoad,
     ProportionalLoss,
+    SecondStore,
     Cogging,
     Backlash,
 )

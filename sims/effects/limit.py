@@ -16,6 +16,8 @@ from sims.simulator import ANGLES
 if TYPE_CHECKING:
     from sims.host import HostSimulator
 
+TEMPERATURES = {"K", "mK", "degC", "degF"}
+
 
 @dataclasses.dataclass(frozen=True)
 class RateLimit(Effect):
@@ -70,12 +72,14 @@ def follows_command(simulator: HostSimulator, joint: str) -> bool:
     """Whether an input is of the kind of what the joint's state tells, so that this follows it.
 
     So do the angle of a servo and its command. A force or a voltage sets nothing that is reached;
-    and a speed that is slow to follow is easily taken for one whose change is limited.
+    a speed that is slow to follow is easily taken for one whose change is limited; and a room
+    follows the temperature outside, at any rate.
     """
     where = next(j.position for j in simulator.joints if j.name == joint)
     kind = _kind(next(c.unit for c in simulator.state_channels if c.name == where))
     speed = kind == "rpm" or kind.endswith("/s")
-    return not speed and any(_kind(channel.unit) == kind for channel in simulator.action_channels)
+    followed = not speed and kind not in TEMPERATURES
+    return followed and any(_kind(channel.unit) == kind for channel in simulator.action_channels)
 
 
 def _kind(unit: str) -> str:

@@ -25,7 +25,7 @@ class Tank(FirstOrderSystem):
 
 def row(effect: Effect) -> str:
     """The effect's row of the table; units are those of a joint that turns, driven by a voltage."""
-    first_order = effect.name in ("proportional_loss", "state_curve", "exchange")
+    first_order = effect.name in ("proportional_loss", "state_curve", "exchange", "second_store")
     known = effect.quantities(Tank() if first_order else PendulumEquation())
     numbers = ", ".join(f"`{name}` {quantity.unit}" for name, quantity in known.items())
     place = PLACES[next(iter(inspect.signature(type(effect)).parameters))]

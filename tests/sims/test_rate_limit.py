@@ -67,6 +67,16 @@ def test_a_rate_beyond_the_limit_comes_back_to_it_and_friction_still_holds():
     assert 0 < abs(np.pi / 2 - path[-1, 0]) < 10.0 / FREQUENCY**2
 
 
+class Room(FirstOrderSystem):
+    """It follows the temperature outside, and no limit is in that."""
+
+    state_channels = (Channel("inside", "degC", "other"),)
+    action_channels = (Channel("outside", "degC", "input"),)
+
+    def derivative(self, x, u, p):
+        return (u - x) / 500.0
+
+
 @pytest.mark.parametrize("kind", [SlowServo, Servo])
 def test_rows_have_limits_of_their_own_and_an_infinite_one_changes_no_bit(kind):
     plain, rng = kind(), np.random.default_rng(0)
@@ -96,6 +106,7 @@ class Drive(FirstOrderSystem):
 def test_it_is_looked_for_where_a_place_is_commanded():
     for kind in (SlowServo, Servo):
         assert "rate_limit@angle" in {str(effect) for effect in library(kind())}
+    assert not any(effect.name == "rate_limit" for effect in library(Room()))
     assert not any(effect.name == "rate_limit" for effect in library(Drive()))
     (asked,) = chosen_effects(Drive(), ["sims.effects.RateLimit@speed"])
     assert asked == RateLimit("speed")

@@ -25,6 +25,7 @@ from sims.effects.joint import JointEffect
 from sims.effects.library import typical
 from sims.effects.limit import RateLimit
 from sims.effects.sensor import SensorEffect
+from sims.effects.store import SecondStore
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -167,6 +168,8 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     """
     if isinstance(effect, Exchange):
         return not set(effect.pair) <= measured
+    if isinstance(effect, SecondStore):
+        return effect.joint not in measured
     joint = next((j for j in simulator.joints if j.name == effect.where), None)
     if not isinstance(effect, JointEffect) or joint is None or joint.position in measured:
         return False

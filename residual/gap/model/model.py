@@ -7,12 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from residual.gap.data.samples import Samples
 from residual.gap.model.candidates import Candidate, Knob
 from residual.gap.model.workers import integrate
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
+from sims.effects.store import SecondStore, stores
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -29,7 +31,7 @@ class Model:
         knobs: One for each unknown, with its bounds and step.
         owner: Which candidate each unknown belongs to, (p,).
         physical: Number of physical state channels, the first columns of a state.
-        width: Number of state columns: physical, then the play of each backlash.
+        width: Number of state columns: physical, then each play of a backlash, or store.
         free: Columns whose start value is free in every window.
         batched: Whether the simulator advances all rows at once, each with its own numbers.
     """
@@ -43,9 +45,9 @@ class Model:
         self.high = np.array([knob.high for knob in self.knobs])
         self.step = np.array([knob.step for knob in self.knobs])
         self.known = np.array([knob.known for knob in self.knobs])
-        plays = sum(isinstance(c.effect, Backlash) for c in self.chosen)
+        memories = sum(isinstance(c.effect, Backlash | SecondStore) for c in self.chosen)
         self.physical = len(simulator.physical_channels)
-        self.width = len(simulator.integrated_channels) + plays
+        self.width = len(simulator.integrated_channels) + memories
         self.free = list(range(self.physical))
         self.batched = simulator.advances_rows_at_once
         enters = [c.effect.enters for c in self.chosen]
@@ -106,6 +108,11 @@ class Model:
         host = self.bind(theta)
         full = np.zeros((len(states), self.width))
         full[:, : self.physical] = states
+        for i, store in enumerate(self._stores(host)):
+            column = full[:, self._place(store)]
+            full[:, self.physical + i] = _following(samples, column, float(store.time))
+        if self._stores(host):
+            return full
         if len(host.integrated_channels) == self.width:
             # The play lies where the input before the sample has pushed it.
             before = np.vstack([samples.actions[:1], samples.actions[:-1]])
@@ -117,8 +124,20 @@ class Model:
 
     def scales(self, physical: Array) -> Array:
         """Typical variation of every state column, from that of the physical ones."""
-        effects = (*self.simulator.plays(), *(c.effect for c in self.chosen))
-        return np.append(physical, [0.1 for effect in effects if isinstance(effect, Backlash)])
+        chosen = [candidate.effect for candidate in self.chosen]
+        plays = [0.1 for e in (*self.simulator.plays(), *chosen) if isinstance(e, Backlash)]
+        filled = [*stores(self.simulator), *(e for e in chosen if isinstance(e, SecondStore))]
+        return np.concatenate([physical, plays, [physical[self._place(e)] for e in filled]])
+
+    def _stores(self, host: HostSimulator) -> list[SecondStore]:
+        """The stores with columns of their own, in their order; those that are chosen have them
+        at zero strength, too."""
+        last = host.effects[len(self.simulator.effects) :] if host is not self.simulator else ()
+        return [*stores(self.simulator), *(e for e in last if isinstance(e, SecondStore))]
+
+    def _place(self, store: SecondStore) -> int:
+        names = [channel.name for channel in self.simulator.physical_channels]
+        return names.index(store.joint)
 
     def inputs(self, samples: Samples, theta: Array) -> Array:
         """Mean and rise of the input in every sub-step, (V, n, substeps, n_a, 2).
@@ -242,6 +261,18 @@ class Model:
 
 
 def _halves(host: HostSimulator, rows: int) -> Array:
-    """Half the width of every play, (rows, n_plays); 1 in rows without play."""
+    """Half the width of every play, (rows, n_plays); 1 in rows without play, and of stores."""
     widths = [np.broadcast_to(play.width, rows) for play in host.plays()]
+    widths += [np.full(rows, 2.0) for _ in stores(host)]
     return np.stack([np.where(width > 0, 0.5 * width, 1.0) for width in widths], axis=1)
+
+
+def _following(samples: Samples, column: Array, time: float) -> Array:
+    """What a store holds that follows a state (n,), in every run first in balance with it."""
+    found = np.empty_like(column)
+    for start, stop in samples.runs:
+        away = column[start:stop] - column[start]
+        step = float(np.median(np.diff(samples.times[start:stop]))) if stop - start > 1 else 0.0
+        kept = np.exp(-step / time)
+        found[start:stop] = column[start] + lfilter([0.0, 1.0 - kept], [1.0, -kept], away)
+    return found

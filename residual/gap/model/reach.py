@@ -9,6 +9,7 @@ import numpy as np
 from residual.gap.data.samples import Samples
 from sims.effects.base import Effect, Quantity
 from sims.effects.limit import RateLimit
+from sims.effects.store import SecondStore
 from sims.host import HostSimulator
 from sims.simulator import Channel
 
@@ -16,6 +17,8 @@ from sims.simulator import Channel
 NEAR_FULL = 0.5
 #: A limit of a rate is looked for up to so many times the fastest motion over so many rows.
 BEYOND, SPAN = 1.2, 5
+#: Time constants of a store that are tried, as parts of the longest record.
+STORED = (0.01, 0.03, 0.1, 0.3)
 
 
 def full_command(channel: Channel, reach: float) -> float:
@@ -66,6 +69,12 @@ def within_reach(
             name: dataclasses.replace(q, high=min(q.high, longest)) if q.unit == "s" else q
             for name, q in known.items()
         }
+    if isinstance(effect, SecondStore):
+        longest = max(float(run.durations.sum()) for run in samples.recorded)
+        starts = tuple(part * longest for part in STORED)
+        # What follows faster than samples come is a part of the state.
+        time = dataclasses.replace(known["time"], low=simulator.dt, high=longest, starts=starts)
+        return {**known, "time": time}
     joint = next((j for j in simulator.joints if j.name == effect.where), None)
     if effect.enters != "joint" or joint is None:
         return known

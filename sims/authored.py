@@ -1,0 +1,40 @@
+"""What authors of equations return, and the joints of what they declare."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from sims.host import Joint
+from sims.simulator import ANGLES, Array, Channel
+
+
+def by_joint(found: Any, shape: tuple[int, ...], what: str, column: str = "q") -> Array:
+    """What the system's author returned, rows last; checked, since broadcasting hides errors."""
+    plain = type(found) is np.ndarray and found.dtype == np.float64
+    if not plain and np.iscomplexobj(found):
+        raise ValueError(f"{what} returned complex numbers, expected real ones")
+    found = np.asarray(found, dtype=float)
+    if found.shape != shape[::-1]:
+        raise ValueError(
+            f"{what} returned shape {found.shape}, expected {shape[::-1]}: one row for each "
+            f"state. Compute with columns such as {column}[:, 0], since parameters are scalars or "
+            "shape (n,), and stack the results on axis 1"
+        )
+    # A copy, since it may be one of the arrays that the author was given.
+    return np.array(found.T, order="C")
+
+
+def joint_of(rate: Channel, channels: Sequence[Channel]) -> Joint:
+    """The joint of a rate channel, called after its position."""
+    position = next((c for c in channels if c.name == rate.rate_of), None)
+    if position is None:
+        names = ", ".join(repr(c.name) for c in channels if c.kind == "position")
+        raise ValueError(
+            f"channel {rate.name!r} has rate_of={rate.rate_of!r}, expected the name of its "
+            f"position, one of {names or 'none that is declared'}"
+        )
+    turns = position.angle or position.unit in ANGLES
+    return Joint(position.name, position.name, rate.name, "N m" if turns else "N")
