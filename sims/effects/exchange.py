@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 from sims.effects.actuator import AND
 from sims.effects.base import Effect, number, place
 from sims.effects.joint import Value
+from sims.effects.store import is_stored
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
@@ -58,8 +59,9 @@ class Exchange(Effect):
 
 
 def like_states(simulator: HostSimulator) -> list[tuple[str, str]]:
-    """Every two states of a first-order system that have the same unit, speeds left out."""
+    """Every two states of a first-order system that have one unit, and are of what is stored."""
     if not simulator.written_out:
         return []
-    still = [joint for joint in simulator.joints if joint.rate is None]
+    stored = {channel.name for channel in simulator.state_channels if is_stored(channel)}
+    still = [j for j in simulator.joints if j.rate is None and j.position in stored]
     return [(a.name, b.name) for a, b in itertools.combinations(still, 2) if a.unit == b.unit]

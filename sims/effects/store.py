@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from sims.effects.base import Effect, number, place
 from sims.effects.joint import Value
+from sims.simulator import ANGLES, Channel
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
@@ -42,16 +43,23 @@ class SecondStore(Effect):
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of the state, of its rate of change, and of time."""
         joint = place("joint", self.joint, {joint.name: joint for joint in simulator.joints})
-        if not simulator.written_out or joint.rate is not None:
+        channel = next(c for c in simulator.state_channels if c.name == joint.position)
+        if not simulator.written_out or joint.rate is not None or not is_stored(channel):
             raise ValueError(
                 f"{self.name} needs the state of a first-order system, and {self.joint!r} moves"
             )
-        channel = next(c for c in simulator.state_channels if c.name == joint.position)
         return {
             "force": (joint.unit, simulator.force_scale(joint)),
             "position": (channel.unit, channel.scale),
             "time": ("s", SLOWLY * simulator.dt),
         }
+
+
+def is_stored(channel: Channel) -> bool:
+    """Whether a state may be of something that is stored: no angle, no speed, and no coordinate
+    that nothing depends on."""
+    moves = channel.angle or channel.unit in ANGLES or channel.unit == "rpm"
+    return not (moves or channel.invariant or channel.unit.endswith("/s"))
 
 
 def stores(simulator: HostSimulator) -> list[SecondStore]:
