@@ -134,8 +134,12 @@ def excluded(
     left, a rival has to be clearly worse, also from starts that are better known: errors of the
     start fade in a sluggish model otherwise than in a late one. One that differs in form alone
     has to lose at the horizon, beyond chance, and at half of it. What leaves three times as much
-    of all data is out.
+    of all data is out, and of another family what has more numbers and fits no better: a store that
+    is quickly filled is nothing but more capacity.
     """
+    more = search.numbers(rival) > search.numbers(key)
+    if more and not alike and search.tried[rival].merit >= search.tried[key].merit:
+        return True
     if adequate:
         if search.simulator.has_contacts and search.error(key) >= BETTER * search.error(rival):
             return False

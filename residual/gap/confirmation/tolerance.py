@@ -83,7 +83,9 @@ def allow_for_parameters(
         its = asked[other] = calibrated(search, other, parameters)
         if adequate:
             more = search.numbers(key) - search.numbers(other)
-            price = np.log(size(search)) * more + search.fitter.tie(search.tried[()])
+            # What has more numbers has to fit better for them.
+            tie = search.fitter.tie(search.tried[()]) if more >= 0 else 0.0
+            price = np.log(size(search)) * more + tie
             return bool(its.fit.merit <= beside.fit.merit + price)
         group = where_it_matters(search, key, claim.number)
         return bool(its.errors[group] <= CLEARLY * beside.errors[group])
