@@ -105,9 +105,10 @@ def cut(
             while readings(a, last) >= shortest:
                 product, size = np.eye(len(scale)), 1
                 while a + size < last:
-                    product = scaled[a + size - 1] @ product
+                    with np.errstate(over="ignore", invalid="ignore"):
+                        product = scaled[a + size - 1] @ product
                     enough = readings(a, a + size) >= shortest
-                    if enough and np.linalg.norm(product, 2) > growth:
+                    if enough and _grown(product, growth):
                         break
                     size += 1
                 if readings(a + size, last) < shortest:
@@ -119,6 +120,11 @@ def cut(
             f"every record is shorter than {shortest} samples, the least for a window: log longer"
         )
     return Windows.cut(pieces)
+
+
+def _grown(product: Array, growth: float) -> bool:
+    """Whether errors grow by more than a factor; what overflows before readings come has."""
+    return not np.isfinite(product).all() or bool(np.linalg.norm(product, 2) > growth)
 
 
 def carry(

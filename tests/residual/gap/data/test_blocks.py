@@ -1,12 +1,13 @@
 """Folds interpolate, and neither order nor names of files matter."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from residual.gap.data.blocks import FOLDS, blocks, drive
 from residual.gap.data.samples import Samples
-from residual.gap.data.windows import fixed
+from residual.gap.data.windows import cut, fixed
 from residual.trajectories import Trajectory
 
 
@@ -81,3 +82,13 @@ def test_what_is_left_out_for_cost_is_left_out_evenly():
 def test_few_windows_make_small_blocks_rather_than_few():
     _, _, found = dealt(table(3, runs=1, rows=60), length=6)
     assert len(found) >= 8
+
+
+@pytest.mark.parametrize("jacobian", [1e200, np.nan])
+def test_windows_end_where_the_simulator_runs_away_before_readings_come(jacobian):
+    """Rare readings amid samples that tell nothing: products of the Jacobians overflow."""
+    seen = np.full((101, 1), np.nan)
+    seen[::10] = 1.0
+    samples = Samples.join([Trajectory("run", np.arange(101.0), seen, np.zeros((100, 1)))], 1)
+    windows = cut(samples, np.full((101, 1, 1), jacobian), np.ones(1), 90.0, shortest=3)
+    assert len(windows) == 3
