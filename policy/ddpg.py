@@ -268,8 +268,8 @@ class DDPG:
         known = {field.name for field in dataclasses.fields(DDPGConfig)}
         settings = {name: value for name, value in metadata["config"].items() if name in known}
         config, n_o = DDPGConfig(**settings), metadata["observation_size"]
-        scaling = Scaling.taken_from(arrays, n_o)
         check_sizes(config, n_o, len(low), arrays)
+        scaling = Scaling.taken_from(arrays, n_o)
         if low.dtype != np.float32 or high.dtype != np.float32 or not np.all(low <= high):
             raise ValueError("the bounds of the action are no float32, or the wrong way round")
         observed = gymnasium.spaces.Box(-np.inf, np.inf, (n_o,))

@@ -139,6 +139,9 @@ class MlpPolicy:
         """
         arrays, metadata = read_arrays(path, FORMAT)
         with content_of(path, "policy"):
+            if empty := [name for name, array in arrays.items() if not array.size]:
+                # Without entries a shape may claim any length.
+                raise ValueError(f"its array {empty[0]!r} is empty")
             low, high = arrays.pop("low"), arrays.pop("high")
             scaling = Scaling.taken_from(arrays, arrays["weight1"].shape[-1])
             _check_shapes(arrays, low, high)

@@ -52,7 +52,7 @@ def attempt(kind: str, rng: np.random.Generator, folder: Path, whole: bool = Fal
     said = io.StringIO()
     with contextlib.ExitStack() as stack:
         if not whole:
-            stack.enter_context(mock.patch("residual.gap.find.prepare", side_effect=Begun))
+            stack.enter_context(mock.patch("residual.gap.log.prepare", side_effect=Begun))
         stack.enter_context(contextlib.redirect_stderr(said))
         stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
         try:
