@@ -16,12 +16,17 @@ class Clock:
     """Processor time that is left, and seconds by step."""
 
     def __init__(self, minutes: float) -> None:
-        begin = time.process_time()
-        self.search_until = begin + 60 * minutes * SEARCHING
-        self.over = begin + 60 * minutes
-        self.confirm_until = begin + 120 * minutes
+        self._minutes = minutes
+        self.begin()
         self.laps: dict[str, float] = {}
         self._last = time.perf_counter()
+
+    def begin(self) -> None:
+        """Count from now on: a log of a million rows is read in what time that takes."""
+        begin = time.process_time()
+        self.search_until = begin + 60 * self._minutes * SEARCHING
+        self.over = begin + 60 * self._minutes
+        self.confirm_until = begin + 120 * self._minutes
 
     @contextlib.contextmanager
     def besides(self) -> Iterator[None]:

@@ -65,9 +65,9 @@ def find_gap(
         parameter_tolerance: How well the simulator's parameters are known, as a share of each: an
             effect is certain only if they cannot stand in for it within that, and its interval
             allows for them. 0 takes them for exact, so that intervals are of the data alone.
-        minutes: Budget of processor time, so that a busy machine finds the same: the search for
-            further explanations ends in time. Confirming may take as long again, and a choice on
-            more windows what it takes.
+        minutes: Budget of processor time once the log is read, so that a busy machine finds the
+            same: the search for further explanations ends in time. Confirming may take as long
+            again, and a choice on more windows what it takes.
         n_jobs: Processes for a simulator that steps row by row.
         progress: Called with a line of text now and then.
 
@@ -92,6 +92,7 @@ def find_gap(
         clock.lap("read")
 
         log, prepared = settle(simulator, log, tell)
+        clock.begin()
         conventions = otherwise(simulator, prepared.fitter)
         conventions = conventions or beyond_scale(simulator, prepared.fitter.samples)
         if conventions is not None:
