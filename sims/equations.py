@@ -249,6 +249,8 @@ class FirstOrderSystem(_Equations):
         def rates(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
             own = v[: len(names)]
             change = by_joint(self.derivative(own.T, u.T, p), own.shape, "derivative", "x")
+            if len(v) == len(names):
+                return change + f
             return np.concatenate([change + f[: len(names)], f[len(names) :]])
 
         # Nothing has play, so nobody asks for a drive force.

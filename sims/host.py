@@ -39,7 +39,7 @@ class HostSimulator(Simulator):
         joints: Where generalized forces can act.
         substeps: Sub-steps in one control period.
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
-        written_out: True if it is given by equations, and hosts ``RateLimit`` and ``Exchange``.
+        written_out: True if given by equations, which host rate limits, exchanges and stores.
         has_contacts: True if motion jumps at impacts, so that only short windows compare with
             logs; see ``for_motion``.
         advances_rows_at_once: True if ``integrate`` advances rows together, each its own values.

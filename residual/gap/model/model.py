@@ -14,6 +14,7 @@ from residual.gap.model.candidates import Candidate, Knob
 from residual.gap.model.workers import integrate
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
+from sims.effects.base import Effect
 from sims.effects.store import SecondStore, stores
 from sims.host import HostSimulator
 
@@ -108,10 +109,11 @@ class Model:
         host = self.bind(theta)
         full = np.zeros((len(states), self.width))
         full[:, : self.physical] = states
-        for i, store in enumerate(self._stores(host)):
+        filled = self._stores(host.effects[len(self.simulator.effects) :])
+        for i, store in enumerate(filled):
             column = full[:, self._place(store)]
             full[:, self.physical + i] = _following(samples, column, float(store.time))
-        if self._stores(host):
+        if filled:
             return full
         if len(host.integrated_channels) == self.width:
             # The play lies where the input before the sample has pushed it.
@@ -126,14 +128,13 @@ class Model:
         """Typical variation of every state column, from that of the physical ones."""
         chosen = [candidate.effect for candidate in self.chosen]
         plays = [0.1 for e in (*self.simulator.plays(), *chosen) if isinstance(e, Backlash)]
-        filled = [*stores(self.simulator), *(e for e in chosen if isinstance(e, SecondStore))]
-        return np.concatenate([physical, plays, [physical[self._place(e)] for e in filled]])
+        filled = [physical[self._place(store)] for store in self._stores(chosen)]
+        return np.concatenate([physical, plays, filled])
 
-    def _stores(self, host: HostSimulator) -> list[SecondStore]:
+    def _stores(self, chosen: Sequence[Effect]) -> list[SecondStore]:
         """The stores with columns of their own, in their order; those that are chosen have them
         at zero strength, too."""
-        last = host.effects[len(self.simulator.effects) :] if host is not self.simulator else ()
-        return [*stores(self.simulator), *(e for e in last if isinstance(e, SecondStore))]
+        return [*stores(self.simulator), *(e for e in chosen if isinstance(e, SecondStore))]
 
     def _place(self, store: SecondStore) -> int:
         names = [channel.name for channel in self.simulator.physical_channels]

@@ -51,6 +51,11 @@ def greatest_rate(effect: RateLimit, simulator: HostSimulator, samples: Samples)
     return fastest
 
 
+def _longest(samples: Samples) -> float:
+    """How long the longest record lasts, in s."""
+    return max(float(run.durations.sum()) for run in samples.recorded)
+
+
 def within_reach(
     effect: Effect, known: dict[str, Quantity], simulator: HostSimulator, samples: Samples
 ) -> dict[str, Quantity]:
@@ -64,13 +69,13 @@ def within_reach(
     than that is wide: a spring that rests farther away is a constant load with another name.
     """
     if effect.enters == "actuator":
-        longest = max(float(run.durations.sum()) for run in samples.recorded)
+        longest = _longest(samples)
         return {
             name: dataclasses.replace(q, high=min(q.high, longest)) if q.unit == "s" else q
             for name, q in known.items()
         }
     if isinstance(effect, SecondStore):
-        longest = max(float(run.durations.sum()) for run in samples.recorded)
+        longest = _longest(samples)
         starts = tuple(part * longest for part in STORED)
         # What follows faster than samples come is a part of the state.
         time = dataclasses.replace(known["time"], low=simulator.dt, high=longest, starts=starts)
