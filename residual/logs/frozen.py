@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from residual.logs.faults import RARE, WILD, in_full_motion, rounding, stretches
 
@@ -18,6 +19,9 @@ _STILL = 10
 _MOVING, _CLEAR = 0.8, 4.0
 # Changes that say how a channel scatters, and the part of them that turn back where it is noise.
 _KNOWN, _TURNS = 50, 0.3
+# Noise by steps of rounding from which on readings are hardly ever equal for long, and the odds of
+# as many equal ones, once in a whole log.
+_SHAKES, _ODDS = 0.6, 1e-6
 # A sensor that thaws leaps so many times as far as it moves after that; what breaks away speeds up.
 _CATCHES_UP = 2.0
 
@@ -28,9 +32,9 @@ def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) 
     A system at rest gives equal samples too, and dry friction stops it at once. A frozen sensor
     does not slow down before, and has to catch up when it thaws, by more than it moves from then
     on, or by what it would have gone meanwhile; if it does not thaw, only another sensor can tell.
-    Where samples scatter so that two are
-    hardly ever equal, ten in a row are no rest either, but for those at zero or at an end of the
-    range, where sensors hold still.
+    Where samples scatter, more of them in a row than chance makes equal (ten, if two hardly ever
+    are) are no rest either, but for those at zero or at an end of the range, where sensors hold
+    still.
 
     Args:
         runs: As for ``wild_samples``.
@@ -47,13 +51,13 @@ def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) 
         return found
     typical, step = float(np.median(moving)), rounding(runs)
     known = np.concatenate(list(runs))
-    noisy, ends = _noisy(runs), (0.0, np.nanmin(known), np.nanmax(known))
+    chance, ends = _equal_by_chance(runs), (0.0, np.nanmin(known), np.nanmax(known))
     others = moved or [np.zeros(len(change)) for change in changes]
     for values, change, other, mask in zip(runs, changes, others, found, strict=True):
         for a, b in stretches(change == 0):  # samples a to b are equal
             if b - a < _STILL or a < 3:
                 continue
-            if (noisy and values[a] not in ends) or _owed(values, a, b):
+            if (b - a > chance and values[a] not in ends) or _owed(values, a, b):
                 mask[a + 1 : b + 1] = True
                 continue
             least = max(WILD * typical, 2.1 * step)
@@ -83,16 +87,32 @@ def _owed(values: Array, a: int, b: int) -> bool:
     return bool(clear and 0.5 < leap / gone < 2.0)
 
 
-def _noisy(runs: Sequence[Array]) -> bool:
-    """Whether samples scatter more than they are rounded, and more than the channel moves."""
-    steps = [np.diff(values) for values in runs]
-    for step in steps:
-        for a, b in stretches(step == 0):
+def _equal_by_chance(runs: Sequence[Array]) -> float:
+    """How many readings in a row may be equal where they scatter; infinite where they do not."""
+    step = rounding(runs)
+    changes = [np.diff(values) for values in runs]
+    for change in changes:
+        for a, b in stretches(change == 0):
             if b - a >= _STILL:
-                step[a:b] = np.nan
-    loose = np.concatenate(steps)
+                change[a:b] = np.nan
+    loose = np.concatenate(changes)
     loose = loose[np.isfinite(loose)]
-    if len(loose) < _KNOWN:
-        return False
-    turns = float((loose[1:] * loose[:-1] < 0).mean())
-    return bool((loose == 0).mean() <= RARE and turns >= _TURNS)
+    pairs = loose[1:] * loose[:-1]
+    pairs = pairs[pairs != 0.0]
+    if len(loose) < _KNOWN or len(pairs) < _KNOWN / 2 or np.mean(pairs < 0) < _TURNS:
+        return np.inf
+    equal = float(np.mean(loose == 0))
+    if equal <= RARE:
+        return _STILL - 1
+    if not step:
+        return np.inf
+    # Noise, rounding apart: of second differences it makes six times its variance, and readings
+    # are equal less often the larger it is. Motion adds to both, so the lesser counts.
+    bends = np.concatenate([np.diff(change) for change in changes])
+    variance = float(np.nanmean(bends**2)) / 6 - step**2 / 12
+    noise = min(np.sqrt(max(0.0, variance)), step / (2 * np.sqrt(np.pi) * equal))
+    if noise < _SHAKES * step:
+        return np.inf
+    # They are most often so if what is measured lies in the middle of a step.
+    shares = np.diff(ndtr((np.arange(-20, 21) - 0.5) * step / noise))
+    return float(np.log(_ODDS / len(loose)) / np.log(np.sum(shares**2)))

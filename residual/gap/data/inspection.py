@@ -230,7 +230,7 @@ def measured(
 _WORDS = {
     "dropped": "are one and the same value far from all others, as if the sensor had dropped out",
     "wild": "stand alone far from both neighbours",
-    "frozen": "repeat the one before in full motion, as if the sensor had frozen",
+    "frozen": "repeat the one before amid motion or noise, as if the sensor had frozen",
 }
 
 

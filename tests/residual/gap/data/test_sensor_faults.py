@@ -187,6 +187,25 @@ def test_where_readings_scatter_equal_ones_are_frozen(row, seed):
     assert set(np.flatnonzero(frozen)) == set(range(row + 1, row + 15))
 
 
+@given(
+    noise=st.floats(0.1, 4.0), seed=st.integers(0, 100), row=st.integers(100, 270),
+    level=st.floats(0.0, 1.0),
+)  # fmt: skip
+@settings(max_examples=200, deadline=None)
+def test_rounded_readings_that_scatter_are_frozen_only_if_chance_cannot_make_them_equal(
+    noise, seed, row, level
+):
+    """A thermometer's steps of a quarter; equal ones come in fives and sixes by chance."""
+    drawn = level + noise * np.random.default_rng(seed).standard_normal(300)
+    values = 0.25 * np.round(drawn + 20 * (1 - np.exp(-np.arange(300) / 40)))
+    assert not frozen_samples([values])[0].any()
+    values[row:] = values[row]
+    (frozen,) = frozen_samples([values])
+    first = row - np.argmin(values[row::-1] == values[row]) + 1
+    ends = values[row] in (values.min(), values.max())
+    assert ends or noise < 1 or np.flatnonzero(frozen).tolist() == list(range(first + 1, 300))
+
+
 def test_where_readings_are_rounded_more_than_they_scatter_equal_ones_are_rest():
     for noise, step in ((0.1, 1.0), (0.0, 0.01)):
         assert not frozen_samples([pressure(0, noise, step)])[0].any()
