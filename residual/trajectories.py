@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +136,12 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         samples = len(self.times)
+        for name, one in (("states", self.states), ("actions", self.actions)):
+            if np.ndim(one) != 2:
+                raise ValueError(
+                    f"{self.name}: {name} has shape {np.shape(one)}, expected two dimensions: a "
+                    f"row for each sample and a column for each channel (values[:, None] for one)"
+                )
         if len(self.states) != samples or len(self.actions) != samples - 1:
             raise ValueError(
                 f"{self.name} has {samples} times, {len(self.states)} states and "
@@ -169,3 +175,24 @@ class Trajectory:
     def __repr__(self) -> str:
         seconds = self.times[-1] - self.times[0] if len(self.times) else 0.0
         return f"Trajectory({self.name!r}, {len(self)} steps, {seconds:.4g} s)"
+
+
+def trajectories_of(given: Any) -> list[Trajectory]:
+    """Runs as a list, from one of them, several, or what ``residual.logs.read_logs`` returned.
+
+    Raises:
+        ValueError: It is something else.
+    """
+    if isinstance(given, Trajectory):
+        return [given]
+    given = getattr(given, "trajectories", given)
+    listed = isinstance(given, Iterable) and not isinstance(given, str)
+    runs = list(given) if listed else [given]
+    for run in runs:
+        if not isinstance(run, Trajectory):
+            kind = type(run if isinstance(given, list | tuple) else given).__name__
+            raise ValueError(
+                f"expected measured runs (Trajectory), got {kind}: read logs with "
+                "read_logs(paths, simulator.state_channels, simulator.action_channels)"
+            )
+    return runs

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sims.host import Joint
 from sims.simulator import ANGLES, Array, Channel
@@ -38,3 +40,25 @@ def joint_of(rate: Channel, channels: Sequence[Channel]) -> Joint:
         )
     turns = position.angle or position.unit in ANGLES
     return Joint(position.name, position.name, rate.name, "N m" if turns else "N")
+
+
+def force_is_added(
+    acceleration: Callable[..., Any], joints: int, inputs: int, values: Mapping[str, Any]
+) -> NDArray[np.bool_]:
+    """Of which joints a force is an acceleration, since the author adds it as it is, (joints,).
+
+    Args:
+        acceleration: What the author wrote.
+        joints, inputs: How many there are.
+        values: Parameters by name.
+    """
+    force = np.vstack([np.zeros(joints), np.eye(joints)])
+    rest, u = np.zeros_like(force), np.zeros((joints + 1, inputs))
+    try:
+        with np.errstate(all="ignore"):
+            moved = np.asarray(acceleration(rest, rest, u, force, SimpleNamespace(**values)))
+            if moved.shape == force.shape:
+                return np.isclose(np.diag(moved[1:] - moved[0]), 1.0, rtol=1e-9)
+    except Exception:  # what is wrong with it is told where a simulator is checked
+        pass
+    return np.zeros(joints, bool)

@@ -30,6 +30,9 @@ def refuse_unsound(simulator: Simulator) -> None:
             overwrites its arguments, gives other numbers for the same rows, or is an equation of
             motion that no force on a joint moves.
     """
+    if isinstance(simulator, type):
+        called = simulator.__name__
+        raise Unsound(f"simulator {called} is a class, expected one of it: {called}()")
     name = f"simulator {getattr(simulator, 'name', type(simulator).__name__)}"
     try:
         for finding in _sound(simulator):

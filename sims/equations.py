@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import abc
+import dataclasses
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from sims.authored import by_joint, joint_of
+from sims.authored import by_joint, force_is_added, joint_of
 from sims.effects.base import Effect
 from sims.effects.exchange import Exchange
 from sims.effects.friction import DryFriction
@@ -99,7 +100,8 @@ class EquationOfMotion(_Equations):
 
     A subclass gives ``state_channels`` (each position and its rate, in any order),
     ``action_channels``, ``dt``, ``parameters`` and ``acceleration``. It needs ``joints`` only if
-    forces are not to be called after the positions, or not in N m (angles) and N (the rest).
+    forces are not to be called after the positions, or not in N m (angles) and N (the rest), or in
+    the unit of an acceleration where ``force`` is added to it as it is.
 
     Runge-Kutta 4 over ``substeps`` equal sub-steps advances all rows at once. With dry
     friction a rate that reaches zero is located in the sub-step and held exactly.
@@ -117,7 +119,16 @@ class EquationOfMotion(_Equations):
 
     def _own_joints(self) -> tuple[Joint, ...]:
         rates = [channel for channel in self.state_channels if channel.kind == "rate"]
-        return tuple(joint_of(rate, self.state_channels) for rate in rates)
+        joints = tuple(joint_of(rate, self.state_channels) for rate in rates)
+        values = [{n: k * np.mean(p.value) for n, p in self.parameters.items()} for k in (1, 1.1)]
+        added = [
+            force_is_added(self.acceleration, len(joints), len(self.action_channels), one)
+            for one in values
+        ]
+        return tuple(
+            dataclasses.replace(joint, unit=f"{rate.unit}/s") if as_it_is else joint
+            for joint, rate, as_it_is in zip(joints, rates, np.all(added, axis=0), strict=True)
+        )
 
     def _arrange(self) -> None:
         self.has_drive_force = type(self).drive_force is not EquationOfMotion.drive_force

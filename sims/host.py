@@ -55,6 +55,9 @@ class HostSimulator(Simulator):
     advances_rows_at_once: bool = False
     lagged = staticmethod(lagged)
 
+    def __repr__(self) -> str:
+        return " + ".join([super().__repr__(), *map(str, self.effects)])
+
     @abc.abstractmethod
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
         """Advance true states under effective inputs; a pure function of its rows.
@@ -166,14 +169,9 @@ class HostSimulator(Simulator):
 
     def take(self, index: Any) -> Self:
         """A copy for some rows: values given per row are indexed, the others kept."""
-        changed = copy.copy(self)
+        values = {name: np.asarray(p.value) for name, p in self.parameters.items()}
+        changed = self.with_parameters(**{n: v[index] for n, v in values.items() if v.ndim})
         changed.effects = tuple(effect.take(index) for effect in self.effects)
-        changed.parameters = {
-            name: dataclasses.replace(parameter, value=np.asarray(parameter.value)[index])
-            if np.ndim(parameter.value)
-            else parameter
-            for name, parameter in self.parameters.items()
-        }
         return changed
 
     def parameter_values(self) -> dict[str, float | Array]:

@@ -160,8 +160,8 @@ def run(
         tell(line)
     result = find_gap(
         simulator,
-        data.trajectories,
-        held=held.trajectories if held else (),
+        data,
+        held_out=held or (),
         tolerance=study.tolerance,
         effects=effects,
         hold=hold or None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -22,7 +22,8 @@ from residual.gap.preparation.numerics import held_as
 from residual.gap.result import GapResult
 from residual.gap.search.finals import on_more_windows
 from residual.gap.search.known import KNOWN
-from residual.trajectories import Trajectory
+from residual.logs import LogData
+from residual.trajectories import Trajectory, trajectories_of
 from sims.contract import refuse_unsound
 from sims.effects.base import Effect
 from sims.host import HostSimulator
@@ -31,9 +32,9 @@ from sims.simulator import Hold
 
 def find_gap(
     simulator: HostSimulator,
-    trajectories: Sequence[Trajectory],
+    trajectories: Trajectory | Iterable[Trajectory] | LogData,
     *,
-    held: Sequence[Trajectory] = (),
+    held_out: Trajectory | Iterable[Trajectory] | LogData = (),
     tolerance: float | None = None,
     effects: Iterable[Effect | str | Mapping[str, Any]] | None = None,
     hold: Hold | Mapping[str, Hold] | None = None,
@@ -48,8 +49,8 @@ def find_gap(
 
     Args:
         simulator: The nominal simulator.
-        trajectories: Measured runs; blocks of them are left out in turn to judge what is found.
-        held: Runs that are used for the final table only; where the corrected simulator is worse on
+        trajectories: Measured runs, or what ``read_logs`` returned; blocks of them are left out in turn to judge what is found.
+        held_out: Runs that are used for the final table only; where the corrected simulator is worse on
             them, nothing is certain.
         tolerance: Forecast error that does not matter, in the unit of the first measured
             position; below it the verdict is "nothing that matters".
@@ -81,9 +82,10 @@ def find_gap(
             that strikes the ground was not measured.
     """
     refuse_unsound(simulator)
+    runs, apart = trajectories_of(trajectories), trajectories_of(held_out)
     clock = Clock(minutes)
     tell = progress or (lambda _: None)
-    log = look(simulator, trajectories, held, horizon, tell)
+    log = look(simulator, runs, apart, horizon, tell)
     tell("looking for effects that move alike")
     offered = Offered.of(log, effects, measured_input)
     inquiry = Inquiry(offered, clock, tell)
@@ -115,9 +117,9 @@ def find_gap(
         differ = unlike(answer) if asked and conventions is None and not clock.late else ()
         clock.lap("confirm")
 
-        table, apart = summed_up(answer), None
+        table, judged = summed_up(answer), None
         if log.apart:
-            apart = judged_apart(answer, known.prepared, log.apart, table, rested=bool(on_rest))
+            judged = judged_apart(answer, known.prepared, log.apart, table, rested=bool(on_rest))
         answer = replace(
             answer,
             claims=tuple(
@@ -125,8 +127,8 @@ def find_gap(
                     claim,
                     counted=conventions is not None,
                     unlike=stands_for(answer, claim, differ),
-                    refuted=apart is not None and apart.refutes,
-                    helpless=apart is not None and apart.denies,
+                    refuted=judged is not None and judged.refutes,
+                    helpless=judged is not None and judged.denies,
                 )
                 for claim in answer.claims
             ),
@@ -135,7 +137,7 @@ def find_gap(
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
     quality = [*log.findings, *log.left_out, *other, *on_hold, *on_rest, *on_more, *known.says]
     quality += inquiry.untried(answer)
-    result = told(answer, table, apart, offered.sets, tolerance, quality, clock.laps)
+    result = told(answer, table, judged, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)
     conventions = conventions or other_sign(simulator, result.effects)
     return replace(result, conventions=conventions, unlike=differ, nearly_late=late)

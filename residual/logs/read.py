@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +34,7 @@ class LogData:
 
 
 def read_logs(
-    paths: Sequence[Any],
+    paths: Any,
     state_channels: Sequence[Channel],
     action_channels: Sequence[Channel],
     columns: LogFormat | None = None,
@@ -46,7 +46,7 @@ def read_logs(
     finding. Nothing is resampled or smoothed.
 
     Args:
-        paths: Files (``.csv .txt .tsv .dat .log``, ``.parquet .pq``, ``.npz``, ``.mcap``,
+        paths: One or several files (``.csv .txt .tsv .dat .log``, ``.parquet .pq``, ``.npz``, ``.mcap``,
             ``.h5 .hdf5``), folders of LeRobot and Minari data sets, data frames, or arrays by name.
         state_channels: Of the simulator; those of kind ``"memory"`` are never in a log.
         action_channels: Of the simulator.
@@ -58,6 +58,8 @@ def read_logs(
     Raises:
         LogError: A file or the layout is not usable; one line names file, row, column and fix.
     """
+    alone = isinstance(paths, str | Path | Mapping) or hasattr(paths, "columns")
+    paths = [paths] if alone else list(paths)
     columns = columns or LogFormat()
     channels = [c for c in state_channels if c.kind != "memory"]
     if not paths:
@@ -75,8 +77,8 @@ def read_logs(
             if table.headers:
                 says = f"The header stands there {table.headers} times more, and was left out."
                 findings.append(Finding("headers", str(path), says))
-            alone = len(paths) == 1
-            runs += runs_of(table, layout, channels, action_channels, findings, alone)
+            only = len(paths) == 1
+            runs += runs_of(table, layout, channels, action_channels, findings, only)
         _refuse_nowhere(runs, channels, columns)
         runs = tidy(
             runs, columns.gap, columns.minimum_samples, findings, [c.name for c in channels]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from residual import gap
+from residual.logs import LogData
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.host import HostSimulator
@@ -70,7 +71,7 @@ class FoundGap(gap.GapResult):
 
 def find_gap(
     simulator: HostSimulator,
-    trajectories: Sequence[Trajectory],
+    trajectories: Trajectory | Iterable[Trajectory] | LogData,
     *,
     effects: Iterable[Effect | str | Mapping[str, Any]] | None = None,
     minutes: float = 2.0,
@@ -81,14 +82,14 @@ def find_gap(
 
     Args:
         simulator: The nominal simulator.
-        trajectories: Measured runs, such as ``read_logs(...).trajectories``.
+        trajectories: Measured runs, or what ``read_logs`` returned.
         effects: What may be missing, as objects or as on the command line: ``"library"``,
             ``"viscous_friction"``, ``"delay@voltage"``, ``"mass"``, the import path of a class of
             your own; by default all that the simulator can host.
         minutes: Budget of processor time.
         progress: Called with a line of text now and then; by default a bar on stderr or in the
             notebook shows them.
-        options: See ``residual.gap.find_gap``; errors as there.
+        options: ``held_out`` and more, see ``residual.gap.find_gap``; errors as there.
 
     Returns:
         The verdicts and everything behind them.

@@ -238,6 +238,28 @@ def test_a_state_that_is_neither_position_nor_rate_is_explained():
         Warm()
 
 
+def test_a_force_that_is_added_as_it_is_counts_as_an_acceleration():
+    """And of a mass in kg that happens to be 1 it does not."""
+
+    class Bowl(EquationOfMotion):
+        state_channels = (
+            Channel("x", "px", "position"), Channel("x rate", "px/s", "rate", rate_of="x"),
+            Channel("tilt", "rad", "position"),
+            Channel("tilt rate", "rad/s", "rate", rate_of="tilt"),
+            Channel("z", "m", "position"), Channel("z rate", "m/s", "rate", rate_of="z"),
+        )  # fmt: skip
+        action_channels = ()
+        parameters = {
+            "stiffness": Parameter(5.0, "1/s^2", "slope"), "mass": Parameter(1.0, "kg", "mass"),
+        }  # fmt: skip
+
+        def acceleration(self, q, v, u, force, p):
+            pulled = force - p.stiffness * q
+            return np.stack([pulled[:, 0], pulled[:, 1], force[:, 2] / p.mass], axis=1)
+
+    assert [joint.unit for joint in Bowl().joints] == ["px/s/s", "rad/s/s", "N"]
+
+
 def test_an_acceleration_of_the_wrong_shape_is_explained():
     class Careless(CartPole):
         def acceleration(self, q, v, u, force, p):

@@ -64,6 +64,7 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
     Raises:
         ValueError: No answer could mean anything; the message says why and what to do.
     """
+    refuse_columns(simulator, trajectories)
     physical = slice(len(simulator.physical_channels))
     trajectories = [replace(run, states=run.states[:, physical]) for run in trajectories]
     trajectories, copied = once(trajectories)
@@ -77,6 +78,27 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
     runs, scaled = kinematics(simulator, runs)
     runs, late = begun_late(simulator, runs)
     return Examined(tuple(runs), (*found, *scaled, *late))
+
+
+def refuse_columns(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> None:
+    """Refuse runs whose columns are not the simulator's channels.
+
+    Raises:
+        ValueError: The message names the run, and the channels that are expected.
+    """
+    expected = (
+        ("states", simulator.state_channels, len(simulator.physical_channels)),
+        ("actions", simulator.action_channels, len(simulator.action_channels)),
+    )
+    for run in trajectories:
+        for what, channels, least in expected:
+            columns = getattr(run, what).shape[1]
+            if not least <= columns <= len(channels):
+                names = ", ".join(channel.name for channel in channels) or "none"
+                raise ValueError(
+                    f"{run.name}: {what} has {columns} columns, expected {least}: {names} (NaN in "
+                    "the column of what was not measured)"
+                )
 
 
 def findings(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:

@@ -129,7 +129,7 @@ def test_friction_is_sought_where_it_breaks_away_harder_than_it_slides(sliding, 
 @pytest.mark.parametrize(("breakaway", "seed"), [(110.0, 1), (90.0, 2), (110.0, 5), (110.0, 6)])
 def test_of_a_servo_that_hunts_nothing_wrong_is_certain(breakaway, seed):
     """The same servo's other motion is foretold, however few blocks of the log can be."""
-    found = find_gap(Servo(), [hunting(breakaway, seed)], held=[hunting(breakaway, 100 + seed)])
+    found = find_gap(Servo(), [hunting(breakaway, seed)], held_out=[hunting(breakaway, 100 + seed)])
     told = {v.effect: v for v in found.verdicts if v.kind == "confirmed"}
     assert set(told) <= {"stribeck_friction", "actuator_gain", "gain"}
     named = {v.effect for v in found.verdicts if v.kind in ("confirmed", "ambiguous")}

@@ -133,7 +133,7 @@ def test_records_set_aside_only_judge():
     logs = make_logs(Truth(inertia=0.3), 11, "strong", "A", 6)
     options = {"effects": few(), "hold": "zero", "minutes": 20.0}
     alone = find_gap(PendulumEquation(), logs[:4], **options)
-    judged = find_gap(PendulumEquation(), logs[:4], held=logs[4:], **options)
+    judged = find_gap(PendulumEquation(), logs[:4], held_out=logs[4:], **options)
     assert judged.verdicts == alone.verdicts
     assert judged.gap == alone.gap
     assert alone.held_out is None
@@ -145,7 +145,7 @@ def test_nothing_is_certain_that_records_set_aside_speak_against(inertia, doubt)
     """They are of a lighter rotor, or of one between the nominal one and the heavier one."""
     logs = make_logs(Truth(inertia=0.3), 11, "strong", "A", 4)
     others = make_logs(Truth(inertia=inertia), 12, "strong", "A", 2)
-    found = find_gap(PendulumEquation(), logs, held=others, effects=few(), hold="zero")
+    found = find_gap(PendulumEquation(), logs, held_out=others, effects=few(), hold="zero")
     first = found.verdicts[0]
     assert (first.kind, first.effect) == ("ambiguous", "inertia")
     assert first.doubts == (doubt,)

@@ -66,7 +66,9 @@ def eddy_brake(v):
 @pytest.fixture(scope="module")
 def braked():
     held = [log(eddy_brake, 2)]
-    return find_gap(Rotor(), [log(eddy_brake, 0), log(eddy_brake, 1)], held=held, effects=OFFERED)
+    return find_gap(
+        Rotor(), [log(eddy_brake, 0), log(eddy_brake, 1)], held_out=held, effects=OFFERED
+    )
 
 
 def test_a_brake_that_weakens_with_speed_is_a_curve(braked):

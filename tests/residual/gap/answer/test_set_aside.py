@@ -19,7 +19,7 @@ def measuring(runs, *columns):
 
 
 def ask(fitted, held):
-    return find_gap(PendulumEquation(), fitted, held=held, effects=["mass"], hold="zero")
+    return find_gap(PendulumEquation(), fitted, held_out=held, effects=["mass"], hold="zero")
 
 
 @pytest.fixture(scope="module")

@@ -63,7 +63,7 @@ def test_it_is_asked_where_only_a_delay_is_offered():
 
 
 def test_records_set_aside_are_judged_likewise():
-    found = find_gap(Oven(), TESTS[:3], held=TESTS[3:], effects=OFFERED)
+    found = find_gap(Oven(), TESTS[:3], held_out=TESTS[3:], effects=OFFERED)
     assert found.held_out.after.value < 0.1 * found.held_out.before.value
 
 
@@ -71,7 +71,7 @@ def test_a_record_set_aside_that_goes_on_is_not_taken_to_begin_from_rest():
     """As where a step test is cut in two: a lag has nothing to do in the second half."""
     ends = [Trajectory(f"end {i}", t.times[60:], t.states[60:], t.actions[60:]) for i, t in
             enumerate(TESTS)]  # fmt: skip
-    found = find_gap(Oven(), TESTS, held=ends, effects=OFFERED)
+    found = find_gap(Oven(), TESTS, held_out=ends, effects=OFFERED)
     assert lag_of(found) == pytest.approx(LAG, rel=0.05)
     assert told(found)
     noise = found.held_out.noise_floor.value

@@ -218,7 +218,7 @@ def test_records_at_rest_are_alike_and_no_copies():
 def test_a_record_set_aside_that_is_fitted_too_is_told():
     logs = make_logs(Truth(), 4, "strong", "A", 5)
     copy = dataclasses.replace(logs[0], name="test.csv")
-    found = find_gap(PendulumEquation(), logs, held=[copy], effects=["mass"], minutes=0.2)
+    found = find_gap(PendulumEquation(), logs, held_out=[copy], effects=["mass"], minutes=0.2)
     assert any("test.csv" in says and "is no test" in says for says in found.quality)
 
 

@@ -92,7 +92,7 @@ def slid(seed, friction=1300.0, rows=600):
 
 def test_friction_too_fast_for_steps_that_suit_the_nominal_simulator_is_found_and_judged():
     offered = [e for e in library(Slide()) if e.name in ("viscous_friction", "actuator_gain")]
-    found = find_gap(Slide(), [slid(0)], held=[slid(1)], effects=offered, hold="zero")
+    found = find_gap(Slide(), [slid(0)], held_out=[slid(1)], effects=offered, hold="zero")
     by_name = {verdict.effect: verdict for verdict in found.verdicts}
     friction = by_name["viscous_friction"].parameters["coefficient"]
     assert friction.low < 1240.0 < friction.high  # beside a damping of 60
