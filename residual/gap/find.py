@@ -49,9 +49,10 @@ def find_gap(
 
     Args:
         simulator: The nominal simulator.
-        trajectories: Measured runs, or what ``read_logs`` returned; blocks of them are left out in turn to judge what is found.
-        held_out: Runs that are used for the final table only; where the corrected simulator is worse on
-            them, nothing is certain.
+        trajectories: Measured runs, or what ``read_logs`` returned; blocks of them are left out in
+            turn to judge what is found.
+        held_out: Runs that are used for the final table only; where the corrected simulator is
+            worse on them, nothing is certain.
         tolerance: Forecast error that does not matter, in the unit of the first measured
             position; below it the verdict is "nothing that matters".
         effects: Effects that may be missing, as objects or by name (``sims.loading.

@@ -46,8 +46,9 @@ def read_logs(
     finding. Nothing is resampled or smoothed.
 
     Args:
-        paths: One or several files (``.csv .txt .tsv .dat .log``, ``.parquet .pq``, ``.npz``, ``.mcap``,
-            ``.h5 .hdf5``), folders of LeRobot and Minari data sets, data frames, or arrays by name.
+        paths: One or several files (``.csv .txt .tsv .dat .log``, ``.parquet .pq``, ``.npz``,
+            ``.mcap``, ``.h5 .hdf5``), folders of LeRobot and Minari data sets, data frames, or
+            arrays by name.
         state_channels: Of the simulator; those of kind ``"memory"`` are never in a log.
         action_channels: Of the simulator.
         columns: The layout of the files.
