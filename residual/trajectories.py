@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ from simgap_files.arrays import FileError
 from simgap_files.npz import read_npz, write_npz
 
 Array = NDArray[np.float64]
+
+# Seconds between which times count from 1970, as those of dates do.
+_CALENDAR = 1e8, 1e11
 
 
 @dataclasses.dataclass(frozen=True)
@@ -175,6 +179,14 @@ class Trajectory:
     def __repr__(self) -> str:
         seconds = self.times[-1] - self.times[0] if len(self.times) else 0.0
         return f"Trajectory({self.name!r}, {len(self)} steps, {seconds:.4g} s)"
+
+
+def moment(seconds: float) -> str:
+    """A time of a record, for messages; that of a calendar with its date."""
+    if not _CALENDAR[0] <= seconds < _CALENDAR[1]:
+        return f"{seconds:.6g} s"
+    date = datetime.fromtimestamp(float(seconds), UTC)
+    return f"{seconds:.2f} s ({date:%Y-%m-%d %H:%M:%S.%f}"[:-5] + " UTC)"
 
 
 def trajectories_of(given: Any) -> list[Trajectory]:

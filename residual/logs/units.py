@@ -108,6 +108,12 @@ def units_of(target: str) -> list[str]:
     return fitting if target in fitting else [target, *fitting]
 
 
+def other_units(unit: str) -> list[tuple[str, Unit]]:
+    """Usual units that values may be in but are not, with what they are in this one."""
+    units = [(name, find_unit(name, unit)) for name in units_of(unit)]
+    return [(name, other) for name, other in units if other != Unit(1.0)]
+
+
 @functools.cache
 def _root(unit: str) -> _Root | None:
     """The unit in base units; None if it is unknown, or no straight line leads there."""

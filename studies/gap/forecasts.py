@@ -10,6 +10,7 @@ from matplotlib.figure import Figure as Drawing
 
 from residual.gap import GapResult
 from residual.gap.result import Gap, Rollout, Verdict
+from residual.trajectories import moment
 from sims.effects import Curve, CurveFromZero
 from studies.gap.figures import curve, drawn, lags, profile, rollout, shrinking
 from studies.gap.words import (
@@ -19,7 +20,6 @@ from studies.gap.words import (
     duration_text,
     percent,
     quantity_text,
-    seconds_text,
     unit_text,
     with_unit,
 )
@@ -48,7 +48,7 @@ def rollouts(result: GapResult, folder: Path) -> list[Section]:
         Figure(
             rollout(result, shown, folder / f"rollout-{number}.png"),
             f"Forecast of {shown.run}: measured dots, nominal and corrected curves.",
-            heading=f"{Path(shown.run).name}, from {seconds_text(shown.times[0])}",
+            heading=f"{Path(shown.run).name}, from {moment(shown.times[0])}",
         )
         for number, shown in enumerate(spread(result), start=1)
     ]

@@ -19,7 +19,7 @@ from residual.gap.fitting.contract import Fitter
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.fitting.validation import by_block
 from residual.gap.search.comparisons import takes_off
-from residual.trajectories import Trajectory
+from residual.trajectories import Trajectory, moment
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ class Stretch:
         error = "squared error that is left" if self.beside else "squared error"
         told = (
             f"{self.share:.0%} of the {error} lies in one stretch, {self.run} from "
-            f"{self.begin:.4g} to {self.end:.4g} s, and nothing that was tried explains it: "
+            f"{moment(self.begin)} to {moment(self.end)}, and nothing that was tried explains it: "
         )
         moves = self.motion > MOVES * self.share
         told += (

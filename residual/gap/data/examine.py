@@ -18,6 +18,7 @@ from residual.gap.data.inspection import (
     faults,
     faulty,
     measured,
+    other_clock,
     refusal,
     rounded,
     sampling,
@@ -28,6 +29,7 @@ from residual.gap.data.inspection import (
 from residual.gap.data.kinematics import kinematics
 from residual.gap.data.nominal import nominal
 from residual.gap.data.onset import begun_late
+from residual.gap.data.sizes import sizes, wrapped
 from residual.gap.data.wild_inputs import without_wild_inputs
 from residual.logs.checks import Finding
 from residual.trajectories import Trajectory
@@ -107,7 +109,8 @@ def findings(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
         return [refusal("empty", "", "there are no trajectories: give at least one measured run")]
     found = _refusals(simulator, trajectories)
     if not found:
-        checks = (sampling, bounds, speeds, still, faults, clipped, rounded, sums, nominal)
+        checks = (sampling, bounds, speeds, sizes, wrapped, still, faults, clipped, rounded, sums,
+                  nominal)  # fmt: skip
         found = [one for check in checks for one in check(simulator, trajectories)]
     ranks = {"refuse": 0, "warning": 1, "note": 2}
     return sorted(found, key=lambda one: ranks[one.severity])
@@ -125,10 +128,11 @@ def _refusals(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> l
     for run in trajectories:
         if run.durations.min() > _SLOWEST * simulator.dt:
             period = float(np.median(run.durations))
+            unit = other_clock(period / simulator.dt) or "ms"
             says = (
                 f"a sample every {period:.4g} s, {period / simulator.dt:.0f} control periods of "
-                f"{simulator.name}: if the times are in ms, set columns.time to "
-                "{column: time, unit: ms}"
+                f"{simulator.name}: if the times are in {unit}, set columns.time to "
+                f"{{column: time, unit: {unit}}}"
             )
             return [refusal("sampling", run.name, says)]
     if simulator.has_contacts:

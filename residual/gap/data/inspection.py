@@ -11,7 +11,7 @@ from residual.logs.checks import Finding
 from residual.logs.derived import differenced, summed_up
 from residual.logs.faults import clipped_samples, dropped_samples, rounding, wild_samples
 from residual.logs.frozen import frozen_samples
-from residual.trajectories import Trajectory
+from residual.trajectories import Trajectory, moment
 from sims.host import HostSimulator
 from sims.simulator import Channel
 
@@ -32,21 +32,20 @@ _FAR_BEYOND = 3.0
 # No more than this share of them are accidents.
 _FEW_WILD = 0.01
 # Units of time that are taken for seconds if samples come so many times as often, or nearly so.
-_LONGER, _ALMOST = {"min": 60.0, "h": 3600.0}, 0.02
+_LONGER, _ALMOST = {"min": 60.0, "h": 3600.0}, 0.15
 
 
 def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
-    """Samples much rarer than the control period, or as often as if minutes were seconds."""
+    """Samples much rarer than the control period, or as if minutes were seconds."""
     period = float(np.median(np.concatenate([run.durations for run in trajectories])))
     numbers = {"period_s": period, "control_period_s": simulator.dt}
-    for unit, seconds in _LONGER.items():
-        if abs(seconds * period / simulator.dt - 1) < _ALMOST:
-            says = (
-                f"a sample every {period:.4g} s, {seconds:.0f} in a control period of "
-                f"{simulator.name} ({simulator.dt:g} s): if the times are in {unit}, set "
-                f"columns.time to {{column: time, unit: {unit}}}"
-            )
-            return [Finding("sampling", "", says, numbers, "warning")]
+    if unit := other_clock(period / simulator.dt):
+        says = (
+            f"a sample every {period:.4g} s, beside a control period of {simulator.name} of "
+            f"{simulator.dt:g} s: if the times are in {unit}, set columns.time to "
+            f"{{column: time, unit: {unit}}}"
+        )
+        return [Finding("sampling", "", says, numbers, "warning")]
     if period <= _SLOW * simulator.dt:
         return []
     driven = any(np.ptp(run.actions, axis=0).any() for run in trajectories if run.actions.size)
@@ -57,6 +56,17 @@ def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
         "control period if you can"
     )
     return [Finding("sampling", "", says, numbers, "warning")]
+
+
+def other_clock(times: float) -> str:
+    """What unit the times of a log are in, perhaps, if samples come so many control periods apart;
+    empty if no other one is likely."""
+    for unit, seconds in _LONGER.items():
+        if abs(seconds * times - 1) < _ALMOST:
+            return unit
+        if abs(times / seconds - 1) < _ALMOST:
+            return "s"
+    return ""
 
 
 def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
@@ -267,7 +277,7 @@ def _rows(
 
 def _first(rows: Sequence[tuple[str, float]]) -> str:
     name, time = rows[0]
-    return f" (the first at {time:.6g} s of {name})"
+    return f" (the first at {moment(time)} of {name})"
 
 
 def refusal(kind: str, where: str, says: str) -> Finding:

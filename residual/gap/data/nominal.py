@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from residual.gap.data.inspection import refusal
 from residual.logs.checks import Finding
-from residual.trajectories import Trajectory
+from residual.trajectories import Trajectory, moment
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ def nominal(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
             channel = simulator.state_channels[int(np.flatnonzero(~np.isfinite(after[bad[0]]))[0])]
             says = (
                 f"{simulator.name} returns {after[bad[0]][~np.isfinite(after[bad[0]])][0]} for "
-                f"{channel.name} from the state recorded at {run.times[row]:.6g} s "
+                f"{channel.name} from the state recorded at {moment(run.times[row])} "
                 f"({_listed(simulator, states[row])}): mend the simulator, or cut these rows"
             )
             return [refusal("nominal", run.name, says)]

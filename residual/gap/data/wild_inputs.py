@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.logs.checks import Finding
-from residual.trajectories import Trajectory
+from residual.trajectories import Trajectory, moment
 from sims.host import HostSimulator
 from sims.simulator import Channel
 
@@ -56,7 +56,7 @@ def without_wild_inputs(
         most = max(np.concatenate(values), key=abs)
         says = (
             f"reaches {most:.4g} {channel.unit} in {len(rows)} of {sum(map(len, masks))} samples "
-            f"(the first at {rows[0][1]:.6g} s of {rows[0][0]}), far beyond all others: no such "
+            f"(the first at {moment(rows[0][1])} of {rows[0][0]}), far beyond all others: no such "
             "command can have been meant; cut there"
         )
         numbers = {"samples": len(rows), "most": float(most)}

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.samples import Samples
-from residual.logs.units import Unit, find_unit, units_of
+from residual.logs.units import Unit, other_units
 from sims.host import HostSimulator
 from sims.simulator import Channel
 
@@ -62,8 +62,10 @@ def conventions(simulator: HostSimulator, samples: Samples) -> list[Convention]:
     for place, action in enumerate(simulator.action_channels):
         if action.low < 0 < action.high:
             found.append(_of_input(simulator, reversed_sign(action.name), place, -1.0))
-        for name, unit in other_units(action):
+        for name, unit in other_units(action.unit):
             says = f"`unit: {name}` for {action.name} ({_beside_a_unit(unit)})"
+            found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
+        for says, unit in _misread(action):
             found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
     joints = _measured_joints(simulator, samples)
     for seen in joints:
@@ -127,14 +129,29 @@ def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Conv
     """A position and its rate in units that go together."""
     channels = [simulator.physical_channels[i] for i in joint]
     found = []
-    for name, unit in other_units(channels[0]):
+    for name, unit in other_units(channels[0].unit):
         said = [f"`unit: {name}` for {channels[0].name}"]
         for rate in channels[1:]:
-            alike = [n for n, u in other_units(rate) if np.isclose(u.factor, unit.factor)]
+            alike = [n for n, u in other_units(rate.unit) if np.isclose(u.factor, unit.factor)]
             said += [f"`unit: {one}` for {rate.name}" for one in alike]
         if len(said) == len(channels):
             says = f"{' and '.join(said)} ({_beside_a_unit(unit)})"
             found.append(_of_states(simulator, says, joint, unit.factor, unit.offset))
+    for says, unit in _misread(channels[0]):
+        found.append(_of_states(simulator, says, joint[:1], unit.factor, unit.offset))
+    return found
+
+
+def _misread(channel: Channel) -> list[tuple[str, Unit]]:
+    """What undoes the conversion of a column from a unit that it is not in, in words and numbers;
+    but for what another unit does, too."""
+    others = other_units(channel.unit)
+    found = []
+    for name, unit in others:
+        back = Unit(1 / unit.factor, -unit.offset / unit.factor)
+        if not any(np.allclose(back, other) for _, other in others):
+            says = f"`unit: {channel.unit}` for {channel.name} (not {name})"
+            found.append((says, back))
     return found
 
 
@@ -143,12 +160,6 @@ def _beside_a_unit(unit: Unit) -> str:
     lines = [f"`scale: {unit.factor:.6g}`"] if unit.factor != 1.0 else []
     lines += [f"`offset: {unit.offset:.6g}`"] if unit.offset else []
     return f"{' and '.join(lines)} if a unit is stated"
-
-
-def other_units(channel: Channel) -> list[tuple[str, Unit]]:
-    """Units that a channel may be in but is not, with what they are in its own."""
-    units = [(name, find_unit(name, channel.unit)) for name in units_of(channel.unit)]
-    return [(name, unit) for name, unit in units if unit != (1.0, 0.0)]
 
 
 def _of_input(

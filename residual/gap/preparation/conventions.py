@@ -26,9 +26,9 @@ from residual.gap.preparation.alternatives import (
     as_said,
     beyond,
     conventions,
-    other_units,
     reversed_sign,
 )
+from residual.logs.units import other_units
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 
@@ -43,6 +43,8 @@ BETTER, ALIKE = 2.0, 1.2
 #: The same with two columns in each other's place, and how good they have to be then: no physics
 #: comes near, so that in honest logs it makes forecasts worse.
 EXCHANGED, FAIR = 1.5, 1.0
+#: The same where another convention is so much better that the log as it is said to be is absurd.
+ABSURD = 1.25
 #: Error from which on a sign or an exchange is asked after that makes it so many times smaller:
 #: what swings by itself hides a reversed input.
 HIDDEN, CLEARLY = 0.1, 4.0
@@ -79,6 +81,8 @@ def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
     errors = [(_error(simulator, fitter, one), one) for one in asked]
     least, best = min(errors, key=lambda pair: pair[0], default=(own, as_said(simulator)))
     times, good = (EXCHANGED, FAIR) if best.exchanged else (BETTER, GOOD)
+    if CLEARLY * least <= own:
+        good = ABSURD
     if (times if poor else CLEARLY) * least > own or least > good:
         return None
     further = beyond(best)
@@ -106,7 +110,7 @@ def beyond_scale(simulator: HostSimulator, samples: Samples) -> Conventions | No
         times = float(np.abs(values).max()) / channel.scale
         if channel.scale == UNDECLARED or times < BEYOND:
             continue
-        units = [(name, times * unit.factor) for name, unit in other_units(channel)]
+        units = [(name, times * unit.factor) for name, unit in other_units(channel.unit)]
         near = [name for name, then in units if 1 / NEAR <= then <= NEAR]
         if near:
             changes = tuple(f"`unit: {name}` for {channel.name}" for name in near)

@@ -81,6 +81,14 @@ def test_sensors_that_are_equally_late_are_not_told_apart(late, noise, seed):
     assert kinematics(PendulumEquation(), two_sensors(late, late, noise, seed))[1] == []
 
 
+def test_seconds_that_are_taken_for_hours_are_refused():
+    (run,) = swings(1.0)
+    period = 3600 * PendulumEquation().dt
+    slow = dataclasses.replace(run, times=period * np.arange(len(run.times)))
+    with pytest.raises(ValueError, match=r"run: a sample every .*unit: s}"):
+        examine(PendulumEquation(), [slow])
+
+
 def test_times_in_ms_are_refused():
     (run,) = swings(1.0)
     examine(PendulumEquation(), [run])
@@ -145,7 +153,10 @@ def test_a_log_in_which_nothing_moves_is_refused():
 
 def test_minutes_that_are_taken_for_seconds_are_told():
     period = PendulumEquation().dt
-    for part, unit in ((1 / 60, "unit: min"), (1 / 3600, "unit: h"), (1 / 50, None), (1, None)):
+    for part, unit in (
+        (1 / 60, "unit: min"), (1 / 57, "unit: min"), (1 / 3600, "unit: h"), (1 / 40, None),
+        (1, None), (57, "unit: s"),
+    ):  # fmt: skip
         run = dataclasses.replace(noisy(), times=part * period * np.arange(400))
         found = [f for f in findings(PendulumEquation(), [run]) if f.kind == "sampling"]
         assert [unit in one.says for one in found] == [True] * (unit is not None)

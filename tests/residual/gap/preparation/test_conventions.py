@@ -124,6 +124,25 @@ def test_degrees_celsius_are_no_kelvin():
         assert (found and found.changes) == wanted
 
 
+def test_degrees_that_a_header_calls_kelvin_are_told():
+    """Also where the nominal simulator forecasts poorly with the right unit."""
+    rng = np.random.default_rng(0)
+    watts = np.repeat(rng.uniform(0.0, 3000.0, (1, 20, 1)), 30, axis=1)
+    warm = Room().with_effects([ActuatorGain("heater", -0.3)]).rollout(np.array([[293.0]]), watts)
+    read = warm[0] + 0.1 * rng.standard_normal(warm[0].shape) - 273.15
+    run = Trajectory("room", 10.0 * np.arange(len(read)), read - 273.15, watts[0])
+
+    class InDegrees(Room):
+        state_channels = (Channel("room", "degC", "other", scale=10.0),)
+        parameters = Room.parameters | {"outside": Parameter(-3.15, "degC", "outside")}
+
+    found = otherwise(InDegrees(), prepare(InDegrees(), [run], 300.0).fitter)
+    assert found is not None
+    assert found.changes == ("`unit: degC` for room (not K)",)
+    right = dataclasses.replace(run, states=read)
+    assert otherwise(InDegrees(), prepare(InDegrees(), [right], 300.0).fitter) is None
+
+
 def test_thousandths_are_told_of_any_unit():
     rng = np.random.default_rng(0)
     watts = np.repeat(rng.uniform(0.0, 3000.0, (1, 20, 1)), 30, axis=1)

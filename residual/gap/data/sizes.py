@@ -1,0 +1,99 @@
+"""Columns whose size says that they are in another unit, and angles that were cut at a turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.data.inspection import measured, refusal
+from residual.logs.checks import Finding
+from residual.logs.units import other_units
+from residual.trajectories import Trajectory, moment
+from sims.host import HostSimulator
+from sims.simulator import Channel
+
+Array = NDArray[np.float64]
+
+#: Times the size that a channel declares, or part of it, from which on another unit is asked after,
+#: and how near to that size values have to be in it.
+FAR, NEAR = 50.0, 4.0
+#: A scale that nobody declared.
+UNDECLARED = 1.0
+#: A turn by unit, how nearly a jump has to be one, and the share of it that no other step reaches.
+TURNS, ALMOST, SMALL = {"deg": 360.0, "rad": 2 * np.pi}, 0.03, 0.3
+
+
+def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Columns that move far more or far less than declared, as they would not in another unit."""
+    found = []
+    for channel, size, declared in _sizes(simulator, trajectories):
+        times = size / declared
+        if not times > 0.0 or 1 / FAR < times < FAR:
+            continue
+        units = other_units(channel.unit)
+        near = [
+            *(f"`unit: {n}`" for n, unit in units if _near(times * unit.factor)),
+            *(f"`unit: {channel.unit}` in place of {n}" for n, unit in units
+              if _near(times / unit.factor)),
+        ]  # fmt: skip
+        if near:
+            says = (
+                f"moves by {size:.3g} {channel.unit} in all, where {declared:.3g} {channel.unit} "
+                f"are declared: if it counts otherwise than read, set {' or '.join(near[:3])}"
+            )
+            found.append(Finding("size", channel.name, says, {"times": times}, "warning"))
+    return found
+
+
+def _sizes(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory]
+) -> Iterator[tuple[Channel, float, float]]:
+    """Channels with the range of their values and the size that they declare.
+
+    Inputs that are far larger are asked after where forecasts are compared.
+    """
+    for channel, runs in measured(simulator, trajectories):
+        if channel.scale != UNDECLARED and not (channel.angle or channel.invariant):
+            yield channel, float(np.ptp(_known(runs))), channel.scale
+    for column, channel in enumerate(simulator.action_channels):
+        bounds = [abs(bound) for bound in (channel.low, channel.high) if np.isfinite(bound)]
+        declared = channel.scale if channel.scale != UNDECLARED else max(bounds, default=0.0)
+        size = float(np.abs(_known([run.actions[:, column] for run in trajectories])).max())
+        if 0.0 < size < declared:
+            yield channel, size, declared
+
+
+def _known(runs: Sequence[Array]) -> Array:
+    values = np.concatenate(list(runs))
+    return values[np.isfinite(values)]
+
+
+def _near(times: float) -> bool:
+    return 1 / NEAR <= times <= NEAR
+
+
+def wrapped(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Angles that jump by a turn, of channels that do not say that they are angles."""
+    found = []
+    for channel, runs in measured(simulator, trajectories):
+        turn = TURNS.get(channel.unit)
+        if turn is None or channel.angle:
+            continue
+        steps = [np.abs(np.diff(values)) for values in runs]
+        jumps = [np.abs(step - turn) < ALMOST * turn for step in steps]
+        others = _known([step[~jump] for step, jump in zip(steps, jumps, strict=True)])
+        rows = [
+            f"{moment(run.times[row + 1])} of {run.name}"
+            for run, jump in zip(trajectories, jumps, strict=True)
+            for row in np.flatnonzero(jump)
+        ]
+        if rows and (not others.size or others.max() < SMALL * turn):
+            fix = "declare it with angle=True" if channel.unit == "rad" else "unwrap the column"
+            says = (
+                f"jumps by a whole turn {len(rows)} times (the first at {rows[0]}), as an angle "
+                f"does that is cut there: {fix} (numpy.unwrap(values, period={turn:.6g}))"
+            )
+            found.append(refusal("wrapped", channel.name, says))
+    return found

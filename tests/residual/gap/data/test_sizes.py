@@ -1,0 +1,85 @@
+"""Columns in another unit than they are read in, and angles that were cut at a turn."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from residual.gap.data.examine import examine, findings
+from residual.trajectories import Trajectory, moment
+from sims.equations import FirstOrderSystem
+from sims.simulator import Channel
+
+
+class Head(FirstOrderSystem):
+    """A pan head that turns as commanded."""
+
+    dt = 0.05
+    state_channels = (Channel("pan", "deg", "other", scale=20.0),)
+    action_channels = (Channel("speed", "deg/s", "input", low=-40.0, high=40.0),)
+
+    def derivative(self, x, u, p):
+        return u
+
+
+def turning(seed=0, rows=300):
+    """A run that ranges over tens of degrees."""
+    rng = np.random.default_rng(seed)
+    speed = np.repeat(rng.uniform(-30.0, 30.0, (1, rows // 30, 1)), 30, axis=1)
+    pan = Head().rollout(np.array([[5.0]]), speed)[0] + 0.05 * rng.standard_normal((rows + 1, 1))
+    return Trajectory("run", 0.05 * np.arange(rows + 1), pan, speed[0])
+
+
+def said(run, kind):
+    return [one.says for one in findings(Head(), [run]) if one.kind == kind]
+
+
+@given(seed=st.integers(0, 50), factor=st.floats(0.1, 3.0))
+@settings(max_examples=25, deadline=None)
+def test_sizes_of_about_what_is_declared_raise_no_question(seed, factor):
+    run = turning(seed)
+    run = dataclasses.replace(run, states=factor * run.states, actions=0.4 * factor * run.actions)
+    assert not said(run, "size")
+
+
+def test_a_column_in_radians_that_is_read_as_degrees_is_asked_after():
+    run = turning()
+    (says,) = said(dataclasses.replace(run, states=np.deg2rad(run.states) / 10), "size")
+    assert "`unit: rad`" in says
+
+
+def test_a_command_that_was_converted_once_too_often_is_asked_after():
+    run = turning()
+    (says,) = said(dataclasses.replace(run, actions=run.actions / 60), "size")
+    assert "where 40 deg/s are declared" in says
+
+
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_an_angle_that_is_cut_at_a_turn_is_refused_with_the_fix(unit):
+    turn = {"deg": 360.0, "rad": 2 * np.pi}[unit]
+
+    class Turning(Head):
+        state_channels = (Channel("pan", unit, "other"),)
+
+    run = turning()
+    middle = float(np.median(run.states))
+    states = run.states - middle + turn / 2
+    cut = dataclasses.replace(run, states=(states + turn / 2) % turn - turn / 2)
+    whole = dataclasses.replace(run, states=states)
+    if unit == "rad":
+        states = states - turn / 2
+        states *= 0.02
+        whole = dataclasses.replace(run, states=states + turn / 2)
+        cut = dataclasses.replace(run, states=(whole.states + turn / 2) % turn - turn / 2)
+    assert not [one for one in findings(Turning(), [whole]) if one.kind == "wrapped"]
+    with pytest.raises(ValueError, match=r"pan: jumps by a whole turn .*unwrap"):
+        examine(Turning(), [cut])
+
+
+def test_times_of_a_calendar_are_told_with_their_date():
+    assert moment(12.25) == "12.25 s"
+    assert moment(1585250253.569) == "1585250253.57 s (2020-03-26 19:17:33.5 UTC)"
+    assert moment(1e18) == "1e+18 s"
+    assert moment(float("nan")) == "nan s"
