@@ -118,9 +118,11 @@ def find_gap(
         differ = unlike(answer) if asked and conventions is None and not clock.late else ()
         clock.lap("confirm")
 
-        table, judged = summed_up(answer), None
+        table, judged, useless = summed_up(answer), None, frozenset[int]()
         if log.apart:
-            judged = judged_apart(answer, known.prepared, log.apart, table, rested=bool(on_rest))
+            judged, useless = judged_apart(
+                answer, known.prepared, log.apart, table, rested=bool(on_rest)
+            )
         answer = replace(
             answer,
             claims=tuple(
@@ -129,7 +131,7 @@ def find_gap(
                     counted=conventions is not None,
                     unlike=stands_for(answer, claim, differ),
                     refuted=judged is not None and judged.refutes,
-                    helpless=judged is not None and judged.denies,
+                    helpless=claim.number in useless or (judged is not None and judged.denies),
                 )
                 for claim in answer.claims
             ),

@@ -5,25 +5,33 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.table import held_out
+from residual.gap.answer.table import AS_GOOD_AS_NOISE, held_out, squares_of
 from residual.gap.confirmation.rest import beginning_as, each_as_it_fits
 from residual.gap.data.excerpt import excerpt
 from residual.gap.data.samples import in_order
+from residual.gap.fitting.contract import Fit, Fitter
 from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.model import Model
 from residual.gap.preparation.numerics import enough_for, own_substeps, stride_for
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.result import Gap
+from residual.gap.search.sets import Key, Search, all_but
 from residual.trajectories import Trajectory
+
+Array = NDArray[np.float64]
+
+#: Part of what an effect takes off where it was found that it has to take off elsewhere.
+AS_WELL = 0.25
 
 
 def judged_apart(
     answer: Answer, prepared: Prepared, held: Sequence[Trajectory], table: Gap, rested: bool
-) -> Gap:
-    """The same table for records that were set aside.
+) -> tuple[Gap, frozenset[int]]:
+    """The same table for records that were set aside, and effects that do not help there.
 
     Args:
         answer: What was found in ``prepared``, whose errors ``table`` holds.
@@ -50,4 +58,40 @@ def judged_apart(
     fits = [other.fit(Model(simulator), np.zeros(0)) for simulator in (nominal, found)]
     sigma = other.samples.of_these(search.fitter.samples, answer.found.floor.sigma)
     floor = noise_floor(other, fits[1], sigma)
-    return held_out(table, other, fits[0], fits[1], floor)
+    useless = [
+        claim.number
+        for claim in answer.claims
+        if not _helps(search, answer.key, claim.number, other, fits[1], floor)
+    ]
+    return held_out(table, other, fits[0], fits[1], floor), frozenset(useless)
+
+
+def _helps(search: Search, key: Key, number: int, other: Fitter, found: Fit, floor: Array) -> bool:
+    """Whether an effect takes off a quarter of what it took off where it was found, at the channel
+    that it helped most there, if more than noise is left of that.
+
+    Args:
+        search: With the chosen set, and that without the effect.
+        key: The chosen set.
+        number: The effect.
+        other: For the records set aside.
+        found: The corrected simulator there.
+        floor: See ``noise_floor``, of these records.
+    """
+    rest = all_but(key, number)
+    if rest not in search.validated:
+        return True
+    took = 1 - _mean(search.validated[key].squares) / _mean(search.validated[rest].squares)
+    took = other.samples.of_these(search.fitter.samples, took)
+    place = int(np.argmax(took))
+    own = squares_of(other, found)
+    if took[place] <= 0 or not _mean(own)[place] > AS_GOOD_AS_NOISE * _mean(floor)[place]:
+        return True
+    fit = search.tried[rest]
+    without = squares_of(other, other.fit(Model(fit.model.bind(fit.theta)), np.zeros(0)))
+    return bool(1 - (_mean(own) / _mean(without))[place] >= AS_WELL * took[place])
+
+
+def _mean(squares: Array) -> Array:
+    """Mean over blocks by channel, (B, m) -> (m,)."""
+    return np.maximum(np.nanmean(squares, axis=0), 1e-300)

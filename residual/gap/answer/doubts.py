@@ -18,7 +18,7 @@ DOUBTS: dict[Doubt, str] = {
     "records": "an effect with its own size in each record does better, or may be what this one "
     "stands for",
     "set_aside": "the corrected simulator is worse on the records that were set aside",
-    "no_help": "the corrected simulator is no better on the records that were set aside",
+    "no_help": "it hardly helps on the records that were set aside, where it could",
     "sensor": "sensors are seldom wrong in their scale, or by a fifth of all that they showed, and "
     "what has no name yet may look so",
     "no_time": "there was no time to ask whether parameters that are a few percent off would do as "

@@ -104,6 +104,13 @@ def rollouts(search: Search, before: Validated, after: Validated) -> tuple[Rollo
     return tuple(found)
 
 
+def squares_of(fitter: Fitter, fit: Fit) -> Array:
+    """Squared errors of a fit's forecasts by block and channel, (B, m)."""
+    which = np.zeros(len(fitter.blocks.windows), np.int64)
+    foretold = fitter.foretell(fit.model, fit.theta[None], which, fit)
+    return by_block(foretold.squares, fitter.blocks)
+
+
 def held_out(gap: Gap, fitter: Fitter, before: Fit, after: Fit, floor: Array) -> Gap:
     """The same table for records that were set aside, about the channel that is furthest off there.
 
@@ -113,11 +120,7 @@ def held_out(gap: Gap, fitter: Fitter, before: Fit, after: Fit, floor: Array) ->
         before, after: Nominal and corrected simulator with start states on these records.
         floor: See ``noise_floor``.
     """
-    which = np.zeros(len(fitter.blocks.windows), np.int64)
-    squares = [
-        by_block(fitter.foretell(fit.model, fit.theta[None], which, fit).squares, fitter.blocks)
-        for fit in (before, after)
-    ]
+    squares = [squares_of(fitter, fit) for fit in (before, after)]
     channels = before.model.simulator.physical_channels
     by_channel = {
         channels[c].name: ChannelGap(

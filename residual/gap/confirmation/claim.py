@@ -45,7 +45,8 @@ class Claim:
         extreme: Whether a number of its set is out of all proportion to the simulator's.
         unlike: Whether it may stand for one effect in a size of its own in each record.
         refuted: Whether the corrected simulator forecasts records that were set aside worse.
-        helpless: Whether it forecasts them no better, though they show more than noise.
+        helpless: Whether it, or all that was found, forecasts them no better, though they show more
+            than noise.
         sensor: Whether it is a sensor wrong as sensors seldom are, beside a remainder.
         by_fit: Whether a fit to all data leaves three times as much without it: forecasts of single
             blocks may go astray all the same, where motion hangs on a hair.

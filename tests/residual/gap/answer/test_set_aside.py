@@ -58,3 +58,19 @@ def test_what_is_found_about_them_is_told_as_such(runs):
         says.startswith("records set aside: rate is 0.5 rad/s in all") for says in found.quality
     )
     assert set(found.held_out.by_channel) == {"angle"}
+
+
+def test_an_effect_that_does_not_help_there_is_not_certain(runs):
+    """A brake that was on in the records searched, and off in those set aside."""
+    braked = make_logs(Truth(mass=0.2, coulomb_friction=2e-3), 3, "strong", "A", runs=4)
+    offered = ["mass", "coulomb_friction"]
+    found, alone = (
+        find_gap(PendulumEquation(), braked, held_out=held, effects=offered, hold="zero")
+        for held in (runs[4:], ())
+    )
+    kinds, kinds_alone = (
+        {v.label: (v.kind, v.doubts) for v in one.verdicts if v.parameters} for one in (found, alone)
+    )
+    assert {kind for kind, _ in kinds_alone.values()} == {"confirmed"}
+    assert kinds["mass"][0] == "confirmed"
+    assert kinds["coulomb_friction@pivot"] == ("ambiguous", ("no_help",))
