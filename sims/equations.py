@@ -176,7 +176,8 @@ class EquationOfMotion(_Equations):
         force[1, j] = 1.0
         rest, u = np.zeros((2, joints)), np.zeros((2, len(self.action_channels)))
         values = {name: np.mean(p.value) for name, p in self.parameters.items()}
-        a = self.acceleration(rest, rest, u, force, SimpleNamespace(**values))[:, j]
+        with np.errstate(all="ignore"):
+            a = self.acceleration(rest, rest, u, force, SimpleNamespace(**values))[:, j]
         return float(
             abs(self.state_channels[self._rates[j]].scale / (10 * self.dt * (a[1] - a[0])))
         )

@@ -59,7 +59,7 @@ def generic_forces(
     """Functions of state and input that a missing force could be made of, (n, g), and names.
 
     Where an angle does not run through half a wave, it shows no wave: that has no name. Nor has
-    the sign of an input that never changes it.
+    the sign of a rate or an input that never changes it.
     """
     columns: list[Array] = []
     names: list[str] = []
@@ -85,8 +85,9 @@ def generic_forces(
         add(f"{channel.name}^3", z**3)
         if channel.kind == "rate":
             add(f"{channel.name} |{channel.name}|", z * np.abs(z))
-            add(f"sign of {channel.name}", np.tanh(3 * z))
-            add(f"sharp sign of {channel.name}", np.tanh(12 * z))
+            turns = float(x.min()) < 0 < float(x.max())
+            add(f"sign of {channel.name}" if turns else "", np.tanh(3 * z))
+            add(f"sharp sign of {channel.name}" if turns else "", np.tanh(12 * z))
     before = np.vstack([samples.actions[:1], samples.actions[:-1]])
     for start, _ in samples.runs:
         before[start] = samples.actions[start]

@@ -69,7 +69,8 @@ def test_an_effect_that_does_not_help_there_is_not_certain(runs):
         for held in (runs[4:], ())
     )
     kinds, kinds_alone = (
-        {v.label: (v.kind, v.doubts) for v in one.verdicts if v.parameters} for one in (found, alone)
+        {v.label: (v.kind, v.doubts) for v in one.verdicts if v.parameters}
+        for one in (found, alone)
     )
     assert {kind for kind, _ in kinds_alone.values()} == {"confirmed"}
     assert kinds["mass"][0] == "confirmed"

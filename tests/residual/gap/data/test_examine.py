@@ -107,6 +107,13 @@ def test_a_walk_without_one_encoder_is_refused():
         examine(Leo(), [walk])
 
 
+def test_a_parameter_of_zero_that_makes_no_number_is_named():
+    with pytest.raises(
+        ValueError, match=r"\(its inertia is 0\) returns .* from the state recorded at"
+    ):
+        examine(PendulumEquation().with_parameters(inertia=0.0), [noisy()])
+
+
 def test_no_log_is_refused():
     with pytest.raises(ValueError, match="there are no trajectories"):
         find_gap(PendulumEquation(), [])
