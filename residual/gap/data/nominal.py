@@ -33,10 +33,11 @@ def nominal(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
         if bad.size:
             row = int(rows[bad[0]])
             channel = simulator.state_channels[int(np.flatnonzero(~np.isfinite(after[bad[0]]))[0])]
+            value = after[bad[0]][~np.isfinite(after[bad[0]])][0]
             zero = [n for n, p in simulator.parameters.items() if not np.all(p.value)]
             perhaps = f" (its {' and '.join(zero)} is 0)" if zero else ""
             says = (
-                f"{simulator.name}{perhaps} returns {after[bad[0]][~np.isfinite(after[bad[0]])][0]} for "
+                f"{simulator.name}{perhaps} returns {value} for "
                 f"{channel.name} from the state recorded at {moment(run.times[row])} "
                 f"({_listed(simulator, states[row])}): mend the simulator, or cut these rows"
             )
