@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sims.effects.dimensions import product
+
 if TYPE_CHECKING:
     from sims.host import HostSimulator
 
@@ -227,7 +229,7 @@ class Effect(abc.ABC):
                 measures[kind][1] ** power for kind, power in known["dimension"].items()
             )
             found[field.name] = Quantity(
-                unit=_unit(known["dimension"], measures),
+                unit=product(known["dimension"], measures),
                 scale=_tidy(known["share"] * typical),
                 low=known["low"],
                 high=known["high"],
@@ -264,24 +266,6 @@ def _known(kind: type[Effect]) -> dict[str, Mapping[str, Any]]:
 def _tidy(value: float) -> float:
     """Without the dust of a product of decimal fractions: 0.1 x 3 is 0.3."""
     return float(f"{value:.12g}")
-
-
-def _unit(dimension: Mapping[str, int], measures: Mapping[str, tuple[str, float]]) -> str:
-    """Unit of a product of powers: ``force=1, rate=-1`` is ``"N m s/rad"``."""
-    powers: dict[str, int] = {}
-    for kind, power in dimension.items():
-        first, *others = measures[kind][0].split("/")
-        powers[first] = powers.get(first, 0) + power
-        for unit in others:
-            powers[unit] = powers.get(unit, 0) - power
-    above = [_power(unit, power) for unit, power in powers.items() if power > 0]
-    below = [_power(unit, -power) for unit, power in powers.items() if power < 0]
-    under = f"({' '.join(below)})" if len(below) > 1 else "".join(below)
-    return (" ".join(above) or "1") + (f"/{under}" if under else "")
-
-
-def _power(unit: str, power: int) -> str:
-    return unit if power == 1 else f"{unit}^{power}"
 
 
 def place(kind: str, name: str, known: Mapping[str, Any]) -> Any:
