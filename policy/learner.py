@@ -170,7 +170,11 @@ def imported(path: str, what: str) -> Any:
     """
     module, _, name = path.rpartition(".")
     if not module:
-        raise ValueError(f"{what} {path!r} is no import path: write my_file.NAME")
+        package = "stable_baselines3" if what == "learner" else "my_file"
+        name = path if what == "learner" else "NAME"
+        raise ValueError(f"{what} {path!r} is no import path: write {package}.{name}")
+    if name == "py":
+        raise ValueError(f"{what} {path!r} is a file: write the name in it, too, {module}.NAME")
     try:
         return getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError) as error:

@@ -17,6 +17,8 @@ _CENTRED = 2.0
 _STEPS, _EPISODES = 2000, 8
 # Less is rounding, and nothing that moved.
 _MOVED = 1e-9
+# Nothing that can be controlled goes so far.
+_AWAY = 1e100
 _NAMES = ("middle", "spread", "reward")
 
 
@@ -63,6 +65,14 @@ class Scaling:
             seed: Of what is drawn.
         """
         observations, rewards = _random_episodes(env, seed)
+        with np.errstate(over="ignore"):
+            size = float(np.sqrt(np.mean(np.square(rewards))))
+        if not (np.isfinite(size) and np.abs(observations).max() < _AWAY):
+            raise ValueError(
+                f"random actions drive {env.unwrapped!r} to an observation of "
+                f"{np.abs(observations).max():.3g} and a reward of {np.abs(rewards).max():.3g}: it "
+                "runs away; mend its equation (a sign, a unit), or end episodes before (terminal)"
+            )
         box = env.observation_space
         assert isinstance(box, gymnasium.spaces.Box)
         bounded = np.isfinite(box.low) & np.isfinite(box.high)
@@ -74,7 +84,6 @@ class Scaling:
         centred = good & (np.abs(middle) <= _CENTRED * spread)
         # A column that never moved, such as a set point, only loses its middle.
         moved = spread > _MOVED * np.maximum(np.abs(middle), 1.0)
-        size = float(np.sqrt(np.mean(np.square(rewards))))
         return cls(
             np.where(bounded | centred, 0.0, middle),
             np.where(bounded | good | ~moved, 1.0, spread),

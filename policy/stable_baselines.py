@@ -97,7 +97,10 @@ class StableBaselines:
         self._seed = seed % 2**32
         self.columns = columns
         self.scaling = scaling or Scaling.none(int(np.prod(env.observation_space.shape or ())))
-        self.model: Any = kind(env=env, seed=self._seed, **chosen)
+        try:
+            self.model: Any = kind(env=env, seed=self._seed, **chosen)
+        except AssertionError as error:  # such as an algorithm for discrete actions alone
+            raise ValueError(f"learner {kind.__name__} does not fit: {error}") from error
         if not {"verbose", "tensorboard_log"} & chosen.keys():
             # Else it leaves a folder for its log in the system's temporary one.
             self.model.set_logger(Logger(folder=None, output_formats=[]))

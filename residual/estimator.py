@@ -3,27 +3,49 @@
 from __future__ import annotations
 
 import abc
-from typing import ClassVar, Literal, Self, overload
+import warnings
+from typing import Any, ClassVar, Literal, Protocol, Self, overload, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin, clone
 from sklearn.utils import get_tags
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from sims.simulator import Simulator
+
 Array = NDArray[np.float64]
+# Of a plane that a regressor is asked to learn before anything else.
+_ROWS = 32
 
 
-def check_regressor(estimator: object) -> None:
+@runtime_checkable
+class ForSimulator(Protocol):
+    """An estimator that wants raw rows of a simulator rather than features."""
+
+    def for_simulator(self, simulator: Simulator) -> Any:
+        """An unfitted copy for this simulator."""
+        ...
+
+
+def check_regressor(estimator: object, simulator: Simulator | None = None) -> None:
     """Refuse what cannot learn a difference, before anything is computed for it.
 
     Args:
         estimator: Of any library.
+        simulator: Whose difference it is to learn.
 
     Raises:
-        ValueError: It says of itself that it is no regressor, or does not predict.
+        ValueError: It says of itself that it is no regressor, has no ``fit`` or ``predict``,
+            predicts other shapes than it learnt, or values that are not finite, or cannot learn
+            the difference of this simulator.
     """
     name = type(estimator).__name__
+    if not callable(getattr(estimator, "fit", None)):
+        raise ValueError(
+            f"estimator is {name}, which has no method fit(X, y); expected a scikit-learn "
+            "regressor, such as residual.GaussianProcess"
+        )
     kind = get_tags(estimator).estimator_type if isinstance(estimator, BaseEstimator) else None
     if kind not in (None, "regressor") or not callable(getattr(estimator, "predict", None)):
         what = (kind or "it has no predict").replace("_", " ")
@@ -31,6 +53,30 @@ def check_regressor(estimator: object) -> None:
             f"estimator is {name}, which is no regressor ({what}); expected one, such as "
             "residual.GaussianProcess or sklearn.ensemble.ExtraTreesRegressor"
         )
+    if simulator is not None and isinstance(estimator, ForSimulator):
+        estimator.for_simulator(simulator)
+    if not isinstance(estimator, Estimator):
+        _refuse_predictions(estimator)
+
+
+def _refuse_predictions(estimator: Any) -> None:
+    """Refuse a regressor that predicts something else than it was asked, once it has learnt a
+    plane from few rows; one that cannot learn that from so few is judged by its own data."""
+    X = np.random.default_rng(0).normal(size=(_ROWS, 4))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = np.asarray(clone(estimator, safe=False).fit(X, X.sum(axis=1)).predict(X))
+    except Exception:
+        return
+    name = type(estimator).__name__
+    if found.size != _ROWS or len(found) != _ROWS:
+        raise ValueError(
+            f"estimator {name} predicts shape {found.shape} for {_ROWS} rows of one output, "
+            f"expected ({_ROWS},)"
+        )
+    if not np.isfinite(found.astype(float)).all():
+        raise ValueError(f"estimator {name} predicts {found[~np.isfinite(found)][0]} after fit")
 
 
 class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):

@@ -12,7 +12,7 @@ from sims.simulator import Array, Simulator, physical
 from sims.tasks import Task
 from sims.unsound import Unsound
 
-_ROWS, _STARTS = 8, 20
+_ROWS, _STARTS, _LEAST = 8, 20, 2
 _ROUNDING = 1e-6
 
 
@@ -33,8 +33,11 @@ def refuse_unsound_task(task: Task, simulator: Simulator) -> None:
     fits = f"{name} does not fit {simulator.name} ({', '.join(names)})"
     horizon: Any = getattr(task, "horizon", None)
     whole = isinstance(horizon, int | np.integer) and not isinstance(horizon, bool)
-    if not whole or horizon < 1:
-        raise Unsound(f"{name}.horizon is {horizon!r}, expected a whole number of steps from 1")
+    if not whole or horizon < _LEAST:
+        raise Unsound(
+            f"{name}.horizon is {horizon!r}, expected a whole number of steps from {_LEAST}: of an "
+            "episode that ends with its first step nothing can be learnt"
+        )
     starts = [_start(task, k, names, simulator, fits) for k in range(_STARTS)]
     rng = np.random.default_rng(0)
     states, actions = draw(simulator, _ROWS, rng)

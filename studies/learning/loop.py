@@ -132,7 +132,7 @@ def learn_by_difference(
     """
     _expect("estimator", estimator, Regressor, "residual.Linear()")
     if estimator is not None:
-        check_regressor(estimator)
+        check_regressor(estimator, nominal)
     _expect("evaluation", evaluation, EvaluationProtocol, "EvaluationProtocol(every=1000)")
     _expect("ddpg", ddpg, DDPGConfig, "DDPGConfig(hidden=(64, 64))")
     _expect("budget", budget, Budget, "Budget(450, 2, 20_000, 20_000)")
@@ -152,7 +152,7 @@ def learn_by_difference(
     system.check()
     loop = Steps(
         system,
-        estimator or GaussianProcess(),
+        GaussianProcess() if estimator is None else estimator,
         algorithm,
         int(seed),
         OnDisk(keep) if keep else None,

@@ -122,7 +122,7 @@ class Study:
                 f"ddpg has settings of {OURS}, but {trial.learner} learns: give its own as "
                 "learner_options"
             )
-        check_regressor(trial.estimator)
+        check_regressor(trial.estimator, system.nominal)
         if trial.seed < 0:
             raise ValueError(f"seed is {trial.seed}, expected a whole number from 0")
         trial.budget.check(trial.algorithm, trial.replay == "all", trial.corrected is not None)

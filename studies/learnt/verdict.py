@@ -22,6 +22,10 @@ Tone = Literal["good", "warning", "bad", "neutral"]
 _PLACE = ["true_samples", "estimator", "iteration"]
 # A model that leaves so much of the gap in one step, in its worst group of channels, closes none.
 _OPEN = 0.5
+# One that leaves more than this closes most of it.
+_SMALL = 0.2
+# Part of the gain by which an earlier update has to be better to be told.
+_EARLIER = 0.1
 # Returns that differ by a smaller share are the same.
 _UNCHANGED = 1e-3
 
@@ -84,7 +88,8 @@ class Evidence:
             return "better, gap remains", "warning"
         if self.gain.count == 1:
             return "better, not settled", "warning"
-        return "gap closed", "good"
+        most = "most of the gap" if self.error is not None and self.error > _SMALL else "gap"
+        return f"{most} closed{', on one seed' if self.seeds == 1 else ''}", "good"
 
 
 def headline(once: pd.DataFrame, errors: pd.DataFrame, about: About) -> list[Section]:
@@ -131,6 +136,7 @@ def headline(once: pd.DataFrame, errors: pd.DataFrame, about: About) -> list[Sec
     alone = _value(control) if len(control) else None
     text = [went] if found.same else []
     text += [_of_gain(found, starts(chosen)), *_of_target(found, target)]
+    text += [*_of_earlier(learnt[learnt["estimator"] == estimator], start, value)]
     text += [*_of_cause(found, alone), *_of_rest(found, true, about.get("best"))]
     tiles = {
         "idealised policy": return_text(start), f"after update {update}": return_text(value),
@@ -151,12 +157,23 @@ def _of_gain(found: Evidence, tested: int) -> str:
     if found.gain.count == 1:
         return "One seed without several common starts gives no interval: run more seeds."
     common = f"{tested} common starts" if tested > 1 else "one start"
+    settled = found.unchanged or found.gain.low > 0 or found.gain.high < 0
+    more = "" if settled else " More seeds, or more starts (true_episodes), narrow that interval."
     if found.seeds == 1:
         return (
             f"Start by start over {common} the gain is {found.gain}, of this training alone: "
-            "another seed may do otherwise."
+            f"another seed may do otherwise.{more}"
         )
-    return f"Seed by seed, each over {common}, the gain is {found.gain}."
+    return f"Seed by seed, each over {common}, the gain is {found.gain}.{more}"
+
+
+def _of_earlier(learnt: pd.DataFrame, start: float, value: float) -> list[str]:
+    """An update that was clearly better than the one that is judged."""
+    returns = learnt.groupby("iteration")["return_true"].mean()
+    if returns.empty or returns.max() - value <= _EARLIER * max(abs(value - start), 1e-12):
+        return []
+    best = return_text(float(returns.max()))
+    return [f"Update {returns.idxmax()} had returned {best}: not every update helps."]
 
 
 def _of_target(found: Evidence, target: float | None) -> list[str]:

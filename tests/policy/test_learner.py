@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from policy import DDPG, Algorithm, DDPGConfig, action_of, learn_and_select, load_policy, rollout
+from policy.learner import imported
 from policy.replay import Seen
 from tests.policy.tiny import Reach
 
@@ -81,12 +82,22 @@ def test_ours_and_theirs_remember_the_same_actions():
     [
         ("stable_baselines3.PPO", "no off-policy algorithm"),
         ("stable_baselines3.Nothing", "no learner 'stable_baselines3.Nothing'"),
-        ("SAC", "no import path"),
+        ("SAC", r"no import path: write stable_baselines3\.SAC"),
     ],
 )
 def test_a_wrong_algorithm_is_named(path, message):
     with pytest.raises(ValueError, match=message):
         Algorithm(path)
+
+
+def test_an_algorithm_for_discrete_actions_is_refused_in_its_own_words():
+    with pytest.raises(ValueError, match=r"learner DQN does not fit: .*Discrete"):
+        Algorithm("stable_baselines3.DQN").make(Reach(), 0)
+
+
+def test_a_file_in_place_of_what_is_in_it_is_told():
+    with pytest.raises(ValueError, match=r"'my_file.py' is a file: .*my_file\.NAME"):
+        imported("my_file.py", "system")
 
 
 def test_options_of_another_algorithm_are_not_ddpgs():

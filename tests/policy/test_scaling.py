@@ -89,6 +89,18 @@ class Columns(gymnasium.Env):
         return self._seen(), 2e-4, False, False, {}
 
 
+class Runaway(Columns):
+    """Rewards that no square holds."""
+
+    def step(self, action):
+        return self._seen(), -1e200, False, False, {}
+
+
+def test_what_runs_away_is_refused_with_what_it_reached():
+    with pytest.raises(ValueError, match=r"a reward of 1e\+200: it runs away; mend its equation"):
+        Scaling.measured(Runaway())
+
+
 def test_only_what_networks_could_not_learn_from_is_scaled():
     scaling = Scaling.measured(Columns())
     assert scaling.middle[0] == pytest.approx(350, abs=5)

@@ -29,6 +29,7 @@ from residual.features import ChannelFeatures
 from residual.gaussian_process import GaussianProcess
 from residual.linear import Linear
 from residual.named_effects import NamedEffects
+from sims.simulator import Simulator
 
 CHECKED = [
     Linear(),
@@ -232,11 +233,40 @@ def test_regressors_of_any_library_may_learn_a_difference(given):
     check_regressor(given)
 
 
+class Short(Mean):
+    def predict(self, X):
+        return np.zeros(3)
+
+
+class Blank(Mean):
+    def predict(self, X):
+        return np.full(len(X), np.nan)
+
+
+def test_effects_need_a_simulator_that_hosts_them_before_anything_is_computed():
+    class Plain(Simulator):
+        name, dt, state_channels, action_channels, parameters = "plain", 0.1, (), (), {}
+
+        def step(self, states, actions):
+            return states
+
+    with pytest.raises(ValueError, match="NamedEffects needs a simulator that hosts effects"):
+        check_regressor(NamedEffects(), Plain())
+
+
+@pytest.mark.parametrize(("given", "says"), [
+    (object(), r"object, which has no method fit\(X, y\)"),
+    (Short(), r"Short predicts shape \(3,\) for 32 rows"), (Blank(), "Blank predicts nan"),
+], ids=lambda v: v if isinstance(v, str) else type(v).__name__)  # fmt: skip
+def test_what_cannot_learn_a_plane_is_refused_before_anything_is_computed(given, says):
+    with pytest.raises(ValueError, match=says):
+        check_regressor(given)
+
+
 @pytest.mark.parametrize(("given", "says"), [
     (LogisticRegression(), "classifier"), (KMeans(), "clusterer"),
     (IsolationForest(), "outlier detector"), (StandardScaler(), "it has no predict"),
     (make_pipeline(StandardScaler(), LogisticRegression()), "classifier"),
-    (object(), "it has no predict"),
 ], ids=lambda v: v if isinstance(v, str) else type(v).__name__)  # fmt: skip
 def test_what_is_no_regressor_is_refused_before_anything_is_computed(given, says):
     name = type(given).__name__

@@ -30,7 +30,8 @@ def greedy(states, actions, next_states):
 @pytest.mark.parametrize(
     ("parts", "says"),
     [
-        ({"horizon": 0}, r"horizon is 0, expected a whole number of steps from 1"),
+        ({"horizon": 0}, r"horizon is 0, expected a whole number of steps from 2"),
+        ({"horizon": 1}, r"horizon is 1, expected a whole number of steps from 2"),
         ({"horizon": 2.5}, r"horizon is 2.5"),
         ({"horizon": None}, r"horizon is None"),
         ({"start": lambda rng: np.zeros(1)}, r"start returned shape \(1,\), expected \(2,\).*rate"),

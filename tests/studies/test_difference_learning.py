@@ -5,6 +5,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
+from sklearn.ensemble import ExtraTreesRegressor
 
 from policy import Algorithm, DDPGConfig
 from residual import Linear, NamedEffects
@@ -238,6 +239,16 @@ def test_what_named_effects_named_is_told(tmp_path):
     (record,) = found.accuracy
     assert record["says"] == found.model.fitted().says_ and "mass" in record["says"]
     assert record["says"] in found.report(tmp_path / "page.html").read_text()
+
+
+def test_an_estimator_that_has_a_length_is_taken_as_well():
+    """An ensemble of trees that is not fitted yet has no length, and asking for it raises."""
+    trees = ExtraTreesRegressor(3, random_state=0)
+    found = learn_by_difference(
+        SYSTEM.nominal, SYSTEM.true, SYSTEM.task, estimator=trees, samples=40, updates=1,
+        steps=120, ddpg=DDPG, evaluation=SYSTEM.evaluation, progress=Silent(),
+    )  # fmt: skip
+    assert type(found.model.estimator).__name__ == "ExtraTreesRegressor"
 
 
 def test_settings_of_another_learner_are_not_taken_in_silence():

@@ -64,7 +64,7 @@ def verdict(*trials):
 
 def test_a_gap_is_closed_where_pairs_show_it_and_that_the_model_did_it():
     found, tiles = verdict(trial([more(8)], control=more(1)))
-    assert (found.label, found.tone) == ("gap closed", "good")
+    assert (found.label, found.tone) == ("gap closed, on one seed", "good")
     assert "over 5 common starts the gain is 8.1 ± 0.7" in found.text.replace("\u00a0", " ")
     assert "worth 7.0 ± 0.0" in found.text.replace("\u00a0", " ")
     assert tiles.items["gain"].startswith("8.1")
@@ -86,6 +86,19 @@ def test_a_control_that_does_as_well_shows_no_cause():
     assert half.label == "better, cause not shown"  # one seed: as likely the luck of training
 
 
+@pytest.mark.parametrize(("error", "label"), [(0.19, "gap"), (0.21, "most of the gap")])
+def test_a_third_of_the_gap_that_is_left_is_not_called_closed(error, label):
+    several = [trial([more(8)], control=more(1), error=error, seed=seed) for seed in range(3)]
+    assert verdict(*several)[0].label == f"{label} closed"
+
+
+def test_an_update_that_was_better_is_told():
+    found, _ = verdict(trial([more(20), more(2)]))
+    assert "Update 1 had returned -20.9: not every update helps." in found.text
+    better, _ = verdict(trial([more(2), more(20)]))
+    assert "not every update" not in better.text
+
+
 @pytest.mark.parametrize("error", [0.5, 0.89, 1.6])
 def test_nothing_is_closed_by_a_model_that_leaves_the_gap(error):
     found, _ = verdict(trial([more(8)], control=more(1), error=error))
@@ -97,6 +110,7 @@ def test_a_gain_within_its_interval_is_not_settled():
     uneven = [value + gain for value, gain in zip(STARTS, [30, -12, 9, -8, 4], strict=True)]
     found, _ = verdict(trial([uneven], control=STARTS))
     assert (found.label, found.tone) == ("not settled", "warning")
+    assert "More seeds, or more starts (true_episodes)" in found.text
     kept, _ = verdict(trial([more(-0.01, wobble=0)]))
     assert kept.label == "unchanged" and "-0.010" in kept.text
     worse, _ = verdict(trial([more(-8)]))
@@ -144,14 +158,14 @@ def test_a_true_system_like_the_simulator_is_said_to_be():
         assert "does what the simulator does" in found.headline
         assert not any("error" in name for name in tiles.items)
     unknown = trial([more(8)], control=more(1), error=None, gap=None)
-    assert verdict(unknown)[0].label == "gap closed"
+    assert verdict(unknown)[0].label == "gap closed, on one seed"
 
 
 def test_a_channel_without_a_gap_has_no_error():
     found = trial([more(8)], control=more(1))
     visited = found["accuracy"][0]["visited"]
     visited["one_step"]["upper"], visited["gap"]["upper"] = 7.0, 1e-9
-    assert verdict(found)[0].label == "gap closed"
+    assert verdict(found)[0].label == "gap closed, on one seed"
 
 
 def test_the_last_update_is_judged_and_not_the_luckiest():
