@@ -143,12 +143,17 @@ class NamedEffects(Estimator):
 
     def _words(self, ratio: float, adequate: bool) -> str:
         if not self.effects_:
-            return f"no effect found; the nominal simulator leaves {ratio:.3g} times the noise"
+            return (
+                f"no effect found; what the simulator leaves is {ratio:.3g} times what scatters in "
+                "these rows without a law"
+            )
         spreads = np.sqrt(np.diag(self.covariance_))
         parts = []
         for (place, name), spread in zip(self.numbers_, spreads, strict=True):
             effect = self.effects_[place]
-            parts.append(f"{effect} {name} {getattr(effect, name):.5g} +- {1.96 * spread:.2g}")
+            unit = effect.quantities(self._host())[name].unit
+            number = f"{getattr(effect, name):.5g} +- {1.96 * spread:.2g} {unit}"
+            parts.append(f"{effect} {name} {number}".removesuffix(" 1"))
         rest = "" if adequate else f"; unexplained: {ratio:.3g} times the noise is left"
         return ", ".join(parts) + rest
 
