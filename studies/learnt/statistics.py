@@ -47,11 +47,11 @@ class Mean:
         return self._decimals(0 if abs(self.value) >= 100 else int(np.clip(1 - size, 1, 9)))
 
     def text(self, digits: int) -> str:
-        """The mean to so many digits, and its interval."""
+        """The mean to so many digits, at most four behind the point, and its interval."""
         if not np.isfinite(self.value):
             return ""
         size = np.floor(np.log10(abs(self.value))) if self.value else 0
-        return self._decimals(int(max(0, digits - 1 - size)))
+        return self._decimals(int(np.clip(digits - 1 - size, 0, 4)))
 
     def _decimals(self, digits: int) -> str:
         # With spaces that do not break a line.
