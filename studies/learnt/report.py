@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
+from policy.learner import OURS
 from simgap_files.npz import read_npz
 from studies.learnt.figures import (
     Drawn,
@@ -100,7 +101,9 @@ def write_report(
     seeds = len(set(rows["seed"]))
     subtitle = f"{len(results)} trials, {seeds} seeds"
     if len(results) == 1:
-        own = [results[0].get("label", ""), f"seed {results[0].get('seed', 0)}"]
+        learner = str(results[0].get("config", {}).get("learner") or OURS)
+        by = "" if learner == OURS else learner.rsplit(".", 1)[-1]
+        own = [results[0].get("label", ""), by, f"seed {results[0].get('seed', 0)}"]
         subtitle = ", ".join(filter(None, own))
     Report(title, subtitle, sections).write(folder / name)
     # What others published makes lines too long for a terminal.

@@ -292,6 +292,8 @@ def test_systems_of_one_file_have_folders_of_their_own():
         for name in ("arm.SYSTEM", "robots.arm.LAGGED", "")
     ]
     assert labels == ["arm.SYSTEM-Linear-9-seed0", "arm.LAGGED-Linear-9-seed0", "Linear-9-seed0"]
+    other = trial_label({**config, "seed": 0, "learner": "stable_baselines3.SAC"})
+    assert other == "SAC-Linear-9-seed0"
 
 
 def test_a_budget_that_teaches_nothing_is_refused():
