@@ -238,7 +238,8 @@ def test_what_named_effects_named_is_told(tmp_path):
     )  # fmt: skip
     (record,) = found.accuracy
     assert record["says"] == found.model.fitted().says_ and "mass" in record["says"]
-    assert record["says"] in found.report(tmp_path / "page.html").read_text()
+    page = found.report(tmp_path / "page.html").read_text()
+    assert record["says"] in page.replace("\u00a0", " ")
 
 
 def test_an_estimator_that_has_a_length_is_taken_as_well():
