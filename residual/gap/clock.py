@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 
 #: Part of the time budget after which nothing new is tried.
-SEARCHING = 0.6
+SEARCHING = 0.5
 #: Seconds in which not more than one line tells how a search goes.
 OFTEN = 2.0
 
