@@ -25,6 +25,9 @@ from sims.simulator import Array, wrap
 
 #: Rows that must follow each other before anything is looked for, and the longest piece.
 SHORTEST, LONGEST = 8, 50
+#: Sets of effects that are fitted, and of a system that strikes the ground, where each takes
+#: seconds.
+SETS, SETS_AT_IMPACTS = 300, 40
 #: Control periods that forecasts last; of exact states that strike the ground one says more.
 HORIZON = 9
 
@@ -113,10 +116,12 @@ def look(simulator: HostSimulator, runs: list[Trajectory], exact: bool = True) -
     kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
     periods = 1 if exact and simulator.has_contacts else HORIZON
     prepared = prepare(simulator, runs, periods * simulator.dt, exact)
+    # By number and not by time, so that the same rows have the same answer on every machine.
+    most = SETS_AT_IMPACTS if simulator.has_contacts else SETS
+    effort = dataclasses.replace(prepared.effort, tried=most)
     pool = prepared.pool(candidates(simulator, kept, prepared.fitter.samples))
     found = explain(
-        simulator, pool, prepared.fitter, prepared.floor, prepared.weigh, prepared.effort,
-        _quiet, np.inf,
+        simulator, pool, prepared.fitter, prepared.floor, prepared.weigh, effort, _quiet, np.inf,
     )  # fmt: skip
     fit = found.search.tried[found.key]
     known = len(simulator.effects)

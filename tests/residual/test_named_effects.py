@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from residual import CorrectedSimulator, DifferenceModel, NamedEffects, load, save
+from residual.gap import rows as rows_of_effects
 from residual.gap.rows import SHORTEST
 from residual.trajectories import Transitions
 from sims.effects import CoulombFriction, Delay
@@ -133,6 +134,24 @@ def test_what_a_difference_cannot_hold_stays_unexplained():
     found = DifferenceModel(NamedEffects(), simulator).fit(rows(late, 100, 5)).fitted()
     assert "unexplained" in found.says_ or not found.effects_
     assert (found.residual_ > 0).all()
+
+
+def test_a_search_ends_after_as_many_sets_as_may_be(monkeypatch):
+    """By their number: a limit of time would give other machines other answers."""
+    counts = []
+    explained = rows_of_effects.explain
+
+    def counted(*given):
+        found = explained(*given)
+        counts.append(len(found.search.tried))
+        return found
+
+    monkeypatch.setattr(rows_of_effects, "explain", counted)
+    true = Pendulum.true().with_effects([CoulombFriction("pivot", 5e-4)])
+    for most in (4, 300):
+        monkeypatch.setattr(rows_of_effects, "SETS", most)
+        DifferenceModel(NamedEffects(), Pendulum()).fit(rows(true))
+    assert counts[0] < counts[1]
 
 
 def test_shuffled_rows_get_one_clear_error():

@@ -19,6 +19,7 @@ class Effort:
         stale: Share of the error that one more effect must take off for the search to go on.
         enough: Error over that of the nominal simulator below which nothing larger is tried.
         partners: Best single effects of which every two are fitted together.
+        tried: Sets that are fitted before nothing new is tried, however much time is left.
     """
 
     singles: int = 8
@@ -30,3 +31,4 @@ class Effort:
     stale: float = 0.05
     enough: float = 0.0
     partners: int = 0
+    tried: int = 100_000

@@ -154,8 +154,8 @@ class Search:
 
     @property
     def late(self) -> bool:
-        """Whether the time for searching is over."""
-        return time.process_time() > self.until
+        """Whether the time for searching is over, or as many sets are fitted as may be."""
+        return time.process_time() > self.until or len(self.tried) > self.effort.tried
 
     def signatures(self, key: Key) -> Signatures:
         """What every candidate would add to a fitted set."""
