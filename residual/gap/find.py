@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from residual.gap.answer.answer import summed_up, told
-from residual.gap.answer.apart import judged_apart
+from residual.gap.answer.apart import NOT_JUDGED, judged_apart
 from residual.gap.answer.confirmed import matters
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.records import stands_for, unlike
@@ -83,10 +83,10 @@ def find_gap(
             that strikes the ground was not measured.
     """
     refuse_unsound(simulator)
-    runs, apart = trajectories_of(trajectories), trajectories_of(held_out)
+    runs, set_aside = trajectories_of(trajectories), trajectories_of(held_out)
     clock = Clock(minutes)
     tell = progress or (lambda _: None)
-    log = look(simulator, runs, apart, horizon, tell)
+    log = look(simulator, runs, set_aside, horizon, tell)
     tell("looking for effects that move alike")
     offered = Offered.of(log, effects, measured_input)
     inquiry = Inquiry(offered, clock, tell)
@@ -118,11 +118,9 @@ def find_gap(
         differ = unlike(answer) if asked and conventions is None and not clock.late else ()
         clock.lap("confirm")
 
-        table, judged, useless = summed_up(answer), None, frozenset[int]()
+        table, judged = summed_up(answer), NOT_JUDGED
         if log.apart:
-            judged, useless = judged_apart(
-                answer, known.prepared, log.apart, table, rested=bool(on_rest)
-            )
+            judged = judged_apart(answer, known.prepared, log.apart, table, rested=bool(on_rest))
         answer = replace(
             answer,
             claims=tuple(
@@ -130,8 +128,8 @@ def find_gap(
                     claim,
                     counted=conventions is not None,
                     unlike=stands_for(answer, claim, differ),
-                    refuted=judged is not None and judged.refutes,
-                    helpless=claim.number in useless or (judged is not None and judged.denies),
+                    refuted=judged.refuted,
+                    helpless=claim.number in judged.helpless,
                 )
                 for claim in answer.claims
             ),
@@ -140,7 +138,7 @@ def find_gap(
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
     quality = [*log.findings, *log.left_out, *other, *on_hold, *on_rest, *on_more, *known.says]
     quality += inquiry.untried(answer)
-    result = told(answer, table, judged, offered.sets, tolerance, quality, clock.laps)
+    result = told(answer, table, judged.table, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)
     conventions = conventions or other_sign(simulator, result.effects)
     return replace(result, conventions=conventions, unlike=differ, nearly_late=late)

@@ -147,10 +147,13 @@ def train(
         recorder = Recorder(env)  # type: ignore[arg-type]
     protocol, updates, begin = system.evaluation, learner.updates, time.perf_counter()
     with steps.progress.task(_TITLES[kind], count) as tell:
+        best = -np.inf
 
         def report(point: Point) -> None:
-            numbers = {"return": point.deterministic}
-            tell(point.step, f"return {point.deterministic:.4g}", numbers)
+            nonlocal best
+            best, numbers = max(best, point.deterministic), {"return": point.deterministic}
+            told = f"return {point.deterministic:.4g}, best {best:.4g}"
+            tell(point.step, told, numbers)
 
         selection = learn_and_select(
             learner,

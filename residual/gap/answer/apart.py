@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -28,10 +29,29 @@ Array = NDArray[np.float64]
 AS_WELL = 0.25
 
 
+@dataclasses.dataclass(frozen=True)
+class Apart:
+    """What records that were set aside say.
+
+    Attributes:
+        table: Their errors; None without such records.
+        refuted: Whether the corrected simulator is worse on them.
+        helpless: Otherwise, the effects that do not help there, though they could.
+    """
+
+    table: Gap | None
+    refuted: bool
+    helpless: frozenset[int]
+
+
+#: Nothing was set aside.
+NOT_JUDGED = Apart(None, False, frozenset())
+
+
 def judged_apart(
     answer: Answer, prepared: Prepared, held: Sequence[Trajectory], table: Gap, rested: bool
-) -> tuple[Gap, frozenset[int]]:
-    """The same table for records that were set aside, and effects that do not help there.
+) -> Apart:
+    """The same table for records that were set aside, and what it says against effects.
 
     Args:
         answer: What was found in ``prepared``, whose errors ``table`` holds.
@@ -58,12 +78,15 @@ def judged_apart(
     fits = [other.fit(Model(simulator), np.zeros(0)) for simulator in (nominal, found)]
     sigma = other.samples.of_these(search.fitter.samples, answer.found.floor.sigma)
     floor = noise_floor(other, fits[1], sigma)
-    useless = [
-        claim.number
-        for claim in answer.claims
-        if not _helps(search, answer.key, claim.number, other, fits[1], floor)
-    ]
-    return held_out(table, other, fits[0], fits[1], floor), frozenset(useless)
+    judged = held_out(table, other, fits[0], fits[1], floor)
+    if judged.refutes:
+        return Apart(judged, True, frozenset())
+    useless = (
+        number
+        for number in answer.key
+        if judged.denies or not _helps(search, answer.key, number, other, fits[1], floor)
+    )
+    return Apart(judged, False, frozenset(useless))
 
 
 def _helps(search: Search, key: Key, number: int, other: Fitter, found: Fit, floor: Array) -> bool:
