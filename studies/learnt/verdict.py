@@ -24,6 +24,8 @@ _PLACE = ["true_samples", "estimator", "iteration"]
 _OPEN = 0.5
 # One that leaves more than this closes most of it.
 _SMALL = 0.2
+# Part of its return that more training brings a policy that had only begun to learn.
+_BEGUN = 0.5
 # Part of the gain by which an earlier update has to be better to be told.
 _EARLIER = 0.1
 # Returns that differ by a smaller share are the same.
@@ -137,7 +139,8 @@ def headline(once: pd.DataFrame, errors: pd.DataFrame, about: About) -> list[Sec
     text = [went] if found.same else []
     text += [_of_gain(found, starts(chosen)), *_of_target(found, target)]
     text += [*_of_earlier(learnt[learnt["estimator"] == estimator], start, value)]
-    text += [*_of_cause(found, alone), *_of_rest(found, true, about.get("best"))]
+    text += [*_of_cause(found, alone), *_of_training(before, control)]
+    text += _of_rest(found, true, about.get("best"))
     tiles = {
         "idealised policy": return_text(start), f"after update {update}": return_text(value),
         "gain": str(found.gain), "true interaction": duration(samples * about["dt"]),
@@ -202,6 +205,20 @@ def _of_cause(found: Evidence, control: float | None) -> list[str]:
     return [
         "Whether that is the difference model's doing or that of longer training, a control shows: "
         "give --budget.control_steps."
+    ]
+
+
+def _of_training(idealised: pd.DataFrame, control: pd.DataFrame) -> list[str]:
+    """Whether the idealised policy had only begun to learn on its own simulator."""
+    if control.empty:
+        return []
+    first, then = (float(rows["return_model"].mean()) for rows in (idealised, control))
+    if not then - first > _BEGUN * abs(first):
+        return []
+    return [
+        f"The idealised policy had only begun to learn: as much training again brings it from "
+        f"{return_text(first)} to {return_text(then)} on its own simulator. Give more "
+        "--budget.idealised_steps before the gap is judged."
     ]
 
 

@@ -92,6 +92,15 @@ def test_a_third_of_the_gap_that_is_left_is_not_called_closed(error, label):
     assert verdict(*several)[0].label == f"{label} closed"
 
 
+def test_an_idealised_policy_that_had_only_begun_to_learn_is_told():
+    """As much training again then does what the difference model seems to do."""
+    for before, again, told in ((-509.0, -100.0, True), (-60.0, -58.0, False), (3.0, 4.0, False)):
+        one = trial([more(8)], control=more(1))
+        one["policies"][0]["return_model"], one["policies"][-1]["return_model"] = before, again
+        found, _ = verdict(one)
+        assert ("only begun to learn" in found.text) == told
+
+
 def test_an_update_that_was_better_is_told():
     found, _ = verdict(trial([more(20), more(2)]))
     assert "Update 1 had returned -20.9: not every update helps." in found.text
