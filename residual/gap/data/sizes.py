@@ -53,16 +53,22 @@ def _sizes(
     """Channels with the size of their values and the one that they declare: of states the range
     of nine tenths of them, of inputs the largest.
 
-    Inputs that are far larger are asked after where forecasts are compared.
+    Inputs that are far larger are asked after where forecasts are compared. Whether a rate is in
+    the unit of its position, if that was measured, ``kinematics`` says.
     """
-    for channel, runs in measured(simulator, trajectories):
-        if channel.scale != UNDECLARED and not (channel.angle or channel.invariant):
+    columns = measured(simulator, trajectories)
+    names = {channel.name for channel, _ in columns}
+    for channel, runs in columns:
+        vague = channel.angle or channel.invariant or channel.rate_of in names
+        if channel.scale != UNDECLARED and not vague:
             low, high = np.quantile(_known(runs), [0.05, 0.95])
             yield channel, float(high - low), channel.scale
     for column, channel in enumerate(simulator.action_channels):
         bounds = [abs(bound) for bound in (channel.low, channel.high) if np.isfinite(bound)]
         declared = channel.scale if channel.scale != UNDECLARED else max(bounds, default=0.0)
-        size = float(np.abs(_known([run.actions[:, column] for run in trajectories])).max())
+        size = float(
+            np.abs(_known([run.actions[:, column] for run in trajectories])).max(initial=0.0)
+        )
         if 0.0 < size < declared:
             yield channel, size, declared
 
