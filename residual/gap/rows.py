@@ -27,7 +27,7 @@ from sims.simulator import Array, wrap
 SHORTEST, LONGEST = 8, 50
 #: Sets of effects that are fitted, and of a system that strikes the ground, where each takes
 #: seconds.
-SETS, SETS_AT_IMPACTS = 300, 25
+SETS, SETS_AT_IMPACTS = 300, 60
 #: Control periods that forecasts last; of exact states that strike the ground one says more.
 HORIZON = 9
 
