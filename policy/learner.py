@@ -158,6 +158,11 @@ class Algorithm:
         return int(self.options.get("learning_starts", 100))
 
 
+def other_name(path: str | None) -> str:
+    """The class of an algorithm by its import path; empty if it is ours."""
+    return "" if path in (None, OURS) else str(path).rsplit(".", 1)[-1]
+
+
 def imported(path: str, what: str) -> Any:
     """What an import path names.
 

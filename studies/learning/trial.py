@@ -13,7 +13,7 @@ import threadpoolctl
 import torch
 from jsonargparse.typing import NonNegativeFloat
 
-from policy.learner import OURS
+from policy.learner import other_name
 from residual.persistence import is_ours, save
 from simgap_files.npz import write_npz
 from studies.learning.described import modules_in, settings_of
@@ -84,9 +84,8 @@ def resolve(study: Study, config: Config) -> dict[str, Any]:
 def trial_label(config: Config) -> str:
     """A readable name for a trial's folder."""
     estimator = config["estimator"]["class_path"].rsplit(".", 1)[-1]
-    learner = str(config.get("learner") or OURS)
-    by = "" if learner == OURS else f"{learner.rsplit('.', 1)[-1]}-"
-    name = f"{by}{estimator}-{config['budget']['true_samples']}-seed{config['seed']}"
+    samples = f"{estimator}-{config['budget']['true_samples']}-seed{config['seed']}"
+    name = "-".join(filter(None, [other_name(config.get("learner")), samples]))
     # One file may hold several systems: arm.SYSTEM and arm.LAGGED.
     system = ".".join(str(config.get("system") or "").split(".")[-2:])
     return f"{system}-{name}" if system else name

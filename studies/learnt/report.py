@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from policy.learner import OURS
+from policy.learner import other_name
 from simgap_files.npz import read_npz
 from studies.learnt.figures import (
     Drawn,
@@ -101,8 +101,7 @@ def write_report(
     seeds = len(set(rows["seed"]))
     subtitle = f"{len(results)} trials, {seeds} seeds"
     if len(results) == 1:
-        learner = str(results[0].get("config", {}).get("learner") or OURS)
-        by = "" if learner == OURS else learner.rsplit(".", 1)[-1]
+        by = other_name(results[0].get("config", {}).get("learner"))
         own = [results[0].get("label", ""), by, f"seed {results[0].get('seed', 0)}"]
         subtitle = ", ".join(filter(None, own))
     Report(title, subtitle, sections).write(folder / name)
