@@ -114,11 +114,12 @@ def look(simulator: HostSimulator, runs: list[Trajectory], exact: bool = True) -
     ]
     groups, _ = aliases(simulator, offered)
     kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
-    periods = 1 if exact and simulator.has_contacts else HORIZON
+    alone = exact and simulator.has_contacts
+    periods = 1 if alone else HORIZON
     prepared = prepare(simulator, runs, periods * simulator.dt, exact)
     # By number and not by time, so that the same rows have the same answer on every machine.
     most = SETS_AT_IMPACTS if simulator.has_contacts else SETS
-    effort = dataclasses.replace(prepared.effort, tried=most)
+    effort = dataclasses.replace(prepared.effort, tried=most, parameters=alone)
     pool = prepared.pool(candidates(simulator, kept, prepared.fitter.samples))
     found = explain(
         simulator, pool, prepared.fitter, prepared.floor, prepared.weigh, effort, _quiet, np.inf,

@@ -20,6 +20,8 @@ class Effort:
         enough: Error over that of the nominal simulator below which nothing larger is tried.
         partners: Best single effects of which every two are fitted together.
         tried: Sets that are fitted before nothing new is tried, however much time is left.
+        parameters: Whether each of the simulator's own parameters is fitted alone, whatever the
+            screen says.
     """
 
     singles: int = 8
@@ -32,3 +34,4 @@ class Effort:
     enough: float = 0.0
     partners: int = 0
     tried: int = 100_000
+    parameters: bool = False

@@ -217,11 +217,13 @@ def boldly(search: Search, parameters: bool) -> list[Key]:
     found: list[Key] = []
     for number, candidate in enumerate(search.candidates[: search.screened]):
         fresh = (number,)
-        if candidate.bold is None or search.late or not search.fits_in(fresh):
+        own = candidate.effect.enters == "parameter"
+        start = candidate.bold
+        if start is None and own and search.effort.parameters:
+            start = 0.01 * candidate.trials[0].values[0]
+        if start is None or own != parameters or search.late or not search.fits_in(fresh):
             continue
-        if (candidate.effect.enters == "parameter") != parameters:
-            continue
-        found += sound(search, fresh, candidate.bold)
+        found += sound(search, fresh, start)
     return found
 
 
