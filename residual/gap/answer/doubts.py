@@ -9,6 +9,8 @@ DOUBTS: dict[Doubt, str] = {
     "not_needed": "without it forecasts are not worse in enough blocks of data to be sure",
     "unsteady": "its size differs between parts of the data",
     "creeps": "it is no constant: its size changes along the records, or from one to another",
+    "drift": "a push that grows steadily along the records, as of a room that warms, would do as "
+    "well",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
@@ -46,6 +48,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "not_needed": not claim.needed,
         "unsteady": not claim.steady,
         "creeps": claim.creeps,
+        "drift": claim.drifts,
         "numerics": not claim.sound,
         "at_bound": claim.bounded,
         "calibration": claim.calibration and not claim.slight,

@@ -10,7 +10,8 @@ from scipy.stats import t
 
 from residual.gap.confirmation.claim import Claim, other_than
 from residual.gap.confirmation.constancy import creeps
-from residual.gap.confirmation.numerics import at_half_step
+from residual.gap.confirmation.drift import Drift
+from residual.gap.confirmation.numerics import STEADY, at_half_step, in_the_limit, survives
 from residual.gap.fitting.intervals import bounded, deviations, ended
 from residual.gap.fitting.plausible import doubtful_sensor
 from residual.gap.search.comparisons import AT_ONE, no_match
@@ -28,8 +29,6 @@ CLEARLY = 1.5
 FORM, CHANCE = 1.2, 0.975
 #: The same from which on it is, whatever part of the data forecasts start from.
 HOPELESS = 3.0
-#: How far a strength may lie off in a fold, or with other numerics, as a share of it.
-STEADY = 0.5
 #: Standard errors by which forecasts must be worse without the effect.
 WORSE = 2.0
 #: Part of the time between samples below which a delay or lag is no more certain than the log's
@@ -58,7 +57,7 @@ def claims(
     fit = search.tried[key]
     half = 1.96 * deviations(fit, search.fitter.blocks)
     limits = in_the_limit(fit.theta, numerics)
-    found = []
+    found, drift = [], Drift(search)
     for place, number in enumerate(key):
         own = [int(j) for j in np.flatnonzero(fit.model.owner == place)]
         label = search.candidates[number].label
@@ -83,12 +82,14 @@ def claims(
                     survives(fit.theta[j], half[j], [n[j] for n in limits], least)
                     for j in strengths
                 ),
-                any(ended(fit, j) for j in strengths),
+                any(ended(fit, j) for j in (strengths if curved else own)),
                 taken,
                 brief=brief(search, number, fit.theta[own]),
                 sensor=not adequate and not twins and of_doubtful_sensor(search, key, place),
                 by_fit=by_fit(search, key, number),
                 creeps=creeps(search, key, number),
+                drifts=not search.candidates[number].effect.creeps
+                and drift.does_as_well(key, number),
                 extreme=key in search.extreme,
             )
         )
@@ -252,22 +253,6 @@ def steady(search: Search, key: Key, j: int, least: float = 0.0) -> bool:
     """
     value, folds = search.tried[key].theta[j], search.validated[key].thetas[:, j]
     return bool((np.abs(folds - value) <= STEADY * max(abs(value), least)).all())
-
-
-def in_the_limit(theta: Array, numerics: Sequence[Array]) -> list[Array]:
-    """Numbers where the step goes to zero, and with the other hold, each (p,).
-
-    What half the step changes is doubled: an integrator of first order has as much again to go, so
-    that a number which only makes up for its error, and is half as large at half the step, ends
-    at zero (Richardson's extrapolation).
-    """
-    return [2 * numerics[0] - theta, *numerics[1:]] if len(numerics) else []
-
-
-def survives(value: float, half: float, others: Sequence[float], least: float = 0.0) -> bool:
-    """Whether a number keeps its sign and about its size under other numerics."""
-    slack = max(STEADY * max(abs(value), least), half)
-    return all(abs(other - value) <= slack for other in others)
 
 
 def brief(search: Search, number: int, values: Array) -> bool:

@@ -33,8 +33,9 @@ class Claim:
             its share is above zero in its interval.
         steady: Whether its strength is about the same in every fold.
         creeps: Whether it is a constant that changes along the records, or from one to another.
+        drifts: Whether a push that grows steadily along the records would do its work as well.
         sound: Whether it survives other numerics.
-        bounded: Whether a strength lies at its bound.
+        bounded: Whether a number of it lies at its bound.
         share: Part of the nominal squared error that it takes off, with a 95 % interval.
         calibration: Whether forecasts are nearly as good without it if parameters of the simulator
             are free within their tolerance.
@@ -79,6 +80,7 @@ class Claim:
     by_fit: bool = False
     there: bool = False
     creeps: bool = False
+    drifts: bool = False
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
 
@@ -109,6 +111,7 @@ class Claim:
             self.alike,
             self.unasked,
             self.creeps,
+            self.drifts,
         )
         return self.needed and self.gains and self.steady and self.sound and not any(against)
 

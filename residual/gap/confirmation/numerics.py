@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 CLEARER = 0.05
 #: Sub-steps of a corrected simulator, at most, over the nominal one's.
 FINEST = 32
+#: How far a number may lie off, in a fold or with other numerics, as a share of it.
+STEADY = 0.5
 
 
 def with_enough_substeps(corrected: HostSimulator, search: Search, key: Key) -> HostSimulator:
@@ -98,3 +101,19 @@ def other_numerics(search: Search, key: Key, tie: float) -> list[Array]:
         if other.merit - fit.merit < tie:
             found.append(other.theta)
     return found
+
+
+def in_the_limit(theta: Array, numerics: Sequence[Array]) -> list[Array]:
+    """Numbers where the step goes to zero, and with the other hold, each (p,).
+
+    What half the step changes is doubled: an integrator of first order has as much again to go, so
+    that a number which only makes up for its error, and is half as large at half the step, ends
+    at zero (Richardson's extrapolation).
+    """
+    return [2 * numerics[0] - theta, *numerics[1:]] if len(numerics) else []
+
+
+def survives(value: float, half: float, others: Sequence[float], least: float = 0.0) -> bool:
+    """Whether a number keeps its sign and about its size under other numerics."""
+    slack = max(STEADY * max(abs(value), least), half)
+    return all(abs(other - value) <= slack for other in others)

@@ -128,11 +128,14 @@ class SmoothFitter:
             found.projected, found.by_knob, found.basis, found.converged, found,
         )  # fmt: skip
 
-    def columns(self, fit: Fit, candidates: Sequence[Candidate]) -> Array:
+    def columns(
+        self, fit: Fit, candidates: Sequence[Candidate], share: Array | None = None
+    ) -> Array:
         """See ``Fitter.columns``.
 
         A candidate acts for one sample interval from every row, and the change it makes is
         carried linearly along the window: one batch serves all windows, and none runs away.
+        ``share`` is how much it acts from each row, (n,); fully by default.
         """
         if not candidates:
             return np.zeros((*fit.projected.shape, 0))
@@ -158,8 +161,9 @@ class SmoothFitter:
                 after = joint.advance(samples, states, theta)[..., :width] - inner.slope.after
                 moved.append(after.transpose(1, 2, 0))
                 shown.append(still)
-        start = np.zeros((width, 0))
-        response = carry(windows, inner.slope.by_state, start, np.concatenate(moved, axis=2))
+        start, acts = np.zeros((width, 0)), np.concatenate(moved, axis=2)
+        acts = acts if share is None else acts * share[:, None, None]
+        response = carry(windows, inner.slope.by_state, start, acts)
         columns = observe(samples, windows, inner.slope, response, self.sigma)
         measured = samples.measured
         direct = np.concatenate(shown, axis=2)[:, measured][windows.index] / self.sigma[:, None]
