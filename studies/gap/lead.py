@@ -147,6 +147,11 @@ def _but_worse_apart(result: GapResult) -> str:
         if max(apart.before.value, apart.after.value) > OFF * apart.noise_floor.value:
             return f" The records set aside are too few to tell: there {errors}."
         return f" The records set aside cannot tell: there noise alone makes {alone}, and {errors}."
+    if not apart.refutes and not any("no_help" in verdict.doubts for verdict in result.verdicts):
+        return (
+            f" The records set aside do not show it: what was found hardly acts there, and the "
+            f"{ahead(apart)} is {after} with it and {before} without."
+        )
     if not apart.refutes:
         return (
             f" But it does not help on the records set aside, where the {ahead(apart)} is {after} "

@@ -84,14 +84,19 @@ def judged_apart(
     useless = (
         number
         for number in answer.key
-        if judged.denies or not _helps(search, answer.key, number, other, fits[1], floor)
+        if _useless(search, answer.key, number, other, fits[1], floor, judged.denies)
     )
     return Apart(judged, False, frozenset(useless))
 
 
-def _helps(search: Search, key: Key, number: int, other: Fitter, found: Fit, floor: Array) -> bool:
-    """Whether an effect takes off a quarter of what it took off where it was found, at the channel
-    that it helped most there, if more than noise is left of that.
+def _useless(
+    search: Search, key: Key, number: int, other: Fitter, found: Fit, floor: Array, denied: bool
+) -> bool:
+    """Whether an effect does not take off a quarter of what it took off where it was found, at the
+    channel that it helped most there, though it could.
+
+    It could if more than noise is left of that, and it moves forecasts by so much: a gain on an
+    input that is zero does not.
 
     Args:
         search: With the chosen set, and that without the effect.
@@ -100,19 +105,34 @@ def _helps(search: Search, key: Key, number: int, other: Fitter, found: Fit, flo
         other: For the records set aside.
         found: The corrected simulator there.
         floor: See ``noise_floor``, of these records.
+        denied: Whether all effects together help nothing there.
     """
     rest = all_but(key, number)
     if rest not in search.validated:
-        return True
+        return denied
     took = 1 - _mean(search.validated[key].squares) / _mean(search.validated[rest].squares)
     took = other.samples.of_these(search.fitter.samples, took)
     place = int(np.argmax(took))
-    own = squares_of(other, found)
-    if took[place] <= 0 or not _mean(own)[place] > AS_GOOD_AS_NOISE * _mean(floor)[place]:
-        return True
     fit = search.tried[rest]
-    without = squares_of(other, other.fit(Model(fit.model.bind(fit.theta)), np.zeros(0)))
-    return bool(1 - (_mean(own) / _mean(without))[place] >= AS_WELL * took[place])
+    without = other.fit(Model(fit.model.bind(fit.theta)), np.zeros(0))
+    own = _mean(squares_of(other, found))[place]
+    moved = _moved(other, found, without)[place]
+    least = AS_WELL * max(took[place], 0.0)
+    if moved < least * (moved + own):
+        return False
+    if denied:
+        return True
+    if took[place] <= 0 or not own > AS_GOOD_AS_NOISE * _mean(floor)[place]:
+        return False
+    return bool(1 - own / _mean(squares_of(other, without))[place] < least)
+
+
+def _moved(fitter: Fitter, one: Fit, other: Fit) -> Array:
+    """Mean squared difference between the forecasts of two fits by channel, (m,)."""
+    windows = fitter.blocks.windows
+    which = np.zeros(len(windows), np.int64)
+    shown = [fitter.foretell(fit.model, fit.theta[None], which, fit).shown for fit in (one, other)]
+    return np.asarray(((shown[0] - shown[1])[windows.inside] ** 2).mean(axis=0), float)
 
 
 def _mean(squares: Array) -> Array:

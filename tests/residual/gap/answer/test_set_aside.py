@@ -4,9 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from oven import Oven, steps
 
 from residual.gap import find_gap
 from sims.pendulum_equation import PendulumEquation
+from studies.gap.lead import lead
 from studies.hidden.data import Truth, make_logs
 
 ANGLE, RATE = 0, 1
@@ -75,3 +77,18 @@ def test_an_effect_that_does_not_help_there_is_not_certain(runs):
     assert {kind for kind, _ in kinds_alone.values()} == {"confirmed"}
     assert kinds["mass"][0] == "confirmed"
     assert kinds["coulomb_friction@pivot"] == ("ambiguous", ("no_help",))
+
+
+def test_what_cannot_act_there_is_not_judged():
+    """A gain of a heater that is off throughout the record set aside, in a warmer room."""
+    duties = [0.0, 0.8, 0.3, 1.0, 0.0, 0.6, 0.9, 0.2, 0.7, 0.1]
+    weak = steps(0, [0.8 * duty for duty in duties], 0.0, lag=0.0)
+    weak = dataclasses.replace(weak, actions=weak.actions / 0.8)
+    cool = steps(1, [0.0, 0.0, 0.0], 0.9, lag=0.0)
+    cool = dataclasses.replace(cool, states=cool.states + 2.0)
+    offered = ["actuator_gain", "delay"]
+    found = find_gap(Oven(), [weak], held_out=[cool], effects=offered, hold="zero")
+    (gain,) = (v for v in found.verdicts if v.effect == "actuator_gain")
+    assert (gain.kind, gain.doubts) == ("confirmed", ())
+    assert found.held_out.denies
+    assert "hardly acts there" in lead(found)
