@@ -33,6 +33,8 @@ def refuse_unsound(simulator: Simulator) -> None:
     if isinstance(simulator, type):
         called = simulator.__name__
         raise Unsound(f"simulator {called} is a class, expected one of it: {called}()")
+    if not isinstance(simulator, Simulator):
+        raise Unsound(f"simulator is of type {type(simulator).__name__}, expected a Simulator")
     name = f"simulator {getattr(simulator, 'name', type(simulator).__name__)}"
     try:
         with np.errstate(all="ignore"):  # what is not finite is told with the state it came from

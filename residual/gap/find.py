@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from numbers import Real
 from typing import Any
+
+import numpy as np
 
 from residual.gap.answer.answer import summed_up, told
 from residual.gap.answer.apart import NOT_JUDGED, judged_apart
@@ -36,7 +39,7 @@ def find_gap(
     *,
     held_out: Trajectory | Iterable[Trajectory] | LogData = (),
     tolerance: float | None = None,
-    effects: Iterable[Effect | str | Mapping[str, Any]] | None = None,
+    effects: Effect | str | Iterable[Effect | str | Mapping[str, Any]] | None = None,
     hold: Hold | Mapping[str, Hold] | None = None,
     measured_input: bool = False,
     horizon: float | None = None,
@@ -78,11 +81,13 @@ def find_gap(
 
     Raises:
         ValueError: There are no trajectories, nothing was measured (in those set aside: nothing
-            that was measured in the others), samples are too rare, the simulator is unsound
+            that was measured in the others), samples are too rare, a setting is no number or beyond
+            its range, the simulator is unsound
             (``sims.contract``) or returns values that are not finite, or a position of a system
             that strikes the ground was not measured.
     """
     refuse_unsound(simulator)
+    _refuse_settings(horizon, parameter_tolerance, minutes)
     runs, set_aside = trajectories_of(trajectories), trajectories_of(held_out)
     clock = Clock(minutes)
     tell = progress or (lambda _: None)
@@ -142,3 +147,20 @@ def find_gap(
     late = nearly_in_sensors(result.effects, answer.found.search)
     conventions = conventions or other_sign(simulator, result.effects)
     return replace(result, conventions=conventions, unlike=differ, nearly_late=late)
+
+
+def _refuse_settings(horizon: Any, parameter_tolerance: Any, minutes: Any) -> None:
+    """Refuse numbers that are none, or mean nothing.
+
+    Raises:
+        ValueError: Names the setting.
+    """
+    for name, value, most, what in (
+        ("horizon", 1.0 if horizon is None else horizon, np.inf, "seconds above 0"),
+        ("minutes", minutes, np.inf, "minutes above 0"),
+        ("parameter_tolerance", parameter_tolerance, 1.0, "a share up to 1, as 0.03 for 3 %"),
+    ):
+        number = isinstance(value, Real) and not isinstance(value, bool)
+        least = 0.0 if name == "parameter_tolerance" else np.nextafter(0.0, 1.0)
+        if not number or not least <= float(value) <= most:
+            raise ValueError(f"{name} is {value!r}, expected {what}")

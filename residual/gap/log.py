@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from residual.gap.data.copies import copies
+from residual.gap.data.copies import shared
 from residual.gap.data.examine import examine
 from residual.gap.data.excerpt import excerpt
 from residual.gap.preparation.horizon import held_by_records, usual_horizon
@@ -63,9 +63,9 @@ def look(
     findings += [f"records set aside: {says}" for says in more if says not in findings]
     simulator = simulator.for_motion([run.states for run in [*examined.trajectories, *apart]])
     findings += [
-        f"{copy.name} is set aside, and holds the same samples as {first.name}, which is fitted: "
-        "what is said of records set aside is no test"
-        for copy, first in copies(held, trajectories)[:1]
+        f"{copy.name} is set aside, and holds samples of {first.name}, which is fitted: what is "
+        "said of records set aside is no test"
+        for copy, first in shared(held, trajectories)[:1]
     ]
     every = examined.trajectories
     length = (

@@ -41,7 +41,7 @@ class Offered:
     def of(
         cls,
         log: Log,
-        effects: Iterable[Effect | str | Mapping[str, Any]] | None,
+        effects: Effect | str | Iterable[Effect | str | Mapping[str, Any]] | None,
         measured_input: bool,
     ) -> Offered:
         """Those that a user asks for, or the library, less what a measured input cannot show.
@@ -49,7 +49,10 @@ class Offered:
         Raises:
             ValueError: One of them is not known, or cannot be looked for here.
         """
-        offered = chosen_effects(log.simulator, [LIBRARY] if effects is None else list(effects))
+        wanted = LIBRARY if effects is None else effects
+        if isinstance(wanted, Effect | str | Mapping):
+            wanted = [wanted]
+        offered = chosen_effects(log.simulator, list(wanted))
         # Those by name have no range yet: the log gives it.
         without_range = curves_in(log.simulator)
         asked = [e for e in offered if isinstance(e, Curve) and e in without_range]

@@ -24,6 +24,9 @@ _KNOWN, _TURNS = 50, 0.3
 _SHAKES, _ODDS = 0.6, 1e-6
 # A sensor that thaws leaps so many times as far as it moves after that; what breaks away speeds up.
 _CATCHES_UP = 2.0
+# Samples before and after a stop at which another sensor would notice it, part of the pace that it
+# keeps there where it does not, and at the end of the stop.
+_ABOUT, _PACE, _LATE = 5, 0.7, 0.2
 
 
 def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) -> list[Mask]:
@@ -65,9 +68,28 @@ def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) 
             thawed = leap > least and leap > _CATCHES_UP * after > 0.0
             contradicted = float(np.abs(np.nancumsum(other[a:b])).max()) > least
             entry = max(0.3 * typical, 1.5 * step)
-            if (thawed or contradicted) and in_full_motion(values[a - 3 : a + 1], entry, 1):
+            moving_on = contradicted and _goes_on(other, a, b)
+            if moving_on or (
+                (thawed or contradicted) and in_full_motion(values[a - 3 : a + 1], entry, 1)
+            ):
                 mask[a + 1 : b + 1] = True
     return found
+
+
+def _goes_on(moved: Array, a: int, b: int) -> bool:
+    """Whether another sensor does not notice that a channel stands still from sample a to b.
+
+    A rate that is filtered is late to notice a stop, but notices it.
+    """
+    before, after, late = (
+        moved[max(0, a - _ABOUT) : a],
+        moved[a : a + _ABOUT],
+        moved[b - _ABOUT : b],
+    )
+    if not np.isfinite([*before, *after, *late]).all() or np.ptp(np.sign([*before, *after])):
+        return False
+    pace = float(np.abs(before).mean())
+    return bool(np.abs(after).mean() > _PACE * pace > 0.0 and np.abs(late).mean() > _LATE * pace)
 
 
 def _owed(values: Array, a: int, b: int) -> bool:

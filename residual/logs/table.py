@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
+#: Switches, as programs write them.
+_TRUTH = {"true": 1.0, "false": 0.0, "on": 1.0, "off": 0.0}
 
 #: A number with its unit behind it.
 _WITH_UNIT = re.compile(r"[-+]?[\d.,]*\d(?:[eE][-+]?\d+)? ?([^\W\d_]{1,4}|[%°µ]\w{0,3})")
@@ -155,7 +157,11 @@ class Table:
                     raise ValueError
                 numbers[index] = float(text if decimal == "." else text.replace(decimal, "."))
             except ValueError:
-                if text.lower() not in _MISSING:
+                if text.lower() in _TRUTH:
+                    numbers[index] = _TRUTH[text.lower()]
+                elif text.lower() in _MISSING:
+                    numbers[index] = np.nan
+                else:
                     comma = "," in text and decimal == "."
                     fix = "set decimal: ','" if comma else "correct the value or leave it empty"
                     if with_unit := _WITH_UNIT.fullmatch(text):
@@ -163,13 +169,14 @@ class Table:
                         fix = f"leave {unit} out of the cells, and say `unit: {unit}` of the column"
                     elif looks_dated(text):
                         fix = f"write times in seconds, or {DATED}"
+                    elif index and index == len(texts) - 1:
+                        fix = f"{fix}; if this row is no sample, delete it"
                     raise LogError(
                         f"found {shortened(text)}, expected a number; {fix}",
                         self.path,
                         int(self.rows[index]),
                         column,
                     ) from None
-                numbers[index] = np.nan
         return numbers
 
 

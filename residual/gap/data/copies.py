@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from residual.logs.checks import Finding
 from residual.trajectories import Trajectory
 
 #: Samples at which something changed that two measurements do not share to the last digit.
 SHARED = 10
+#: Samples in a row, all different, that two measurements do not share either.
+STRETCH = 30
 
 
 def copies(
@@ -33,6 +36,37 @@ def copies(
         if first is not run and _changes(run) >= SHARED:
             found.append((run, first))
     return found
+
+
+def shared(
+    trajectories: Sequence[Trajectory], among: Sequence[Trajectory]
+) -> list[tuple[Trajectory, Trajectory]]:
+    """Records that share a stretch of samples with one of the others: copies, parts, overlaps.
+
+    Returns:
+        Each with the first record that it shares some with.
+    """
+    found = []
+    for run in trajectories:
+        other = next((other for other in among if _overlap(run, other)), None)
+        if other is not None:
+            found.append((run, other))
+    return found
+
+
+def _overlap(one: Trajectory, other: Trajectory) -> bool:
+    """Whether two records hold the same samples in a row, all of them different."""
+    tables = [np.hstack([run.states[:-1], run.actions]).astype(float) for run in (one, other)]
+    if tables[0].shape[1] != tables[1].shape[1] or min(map(len, tables)) < STRETCH:
+        return False
+    _, rows = np.unique(np.concatenate(tables), axis=0, return_inverse=True)
+    mine, its = np.split(rows.ravel(), [len(tables[0])])
+    # A stretch of twice that length holds one that begins at a multiple of it.
+    there = {stretch.tobytes() for stretch in sliding_window_view(its, STRETCH)[::STRETCH]}
+    return any(
+        stretch.tobytes() in there and len(set(stretch.tolist())) == STRETCH
+        for stretch in sliding_window_view(mine, STRETCH)
+    )
 
 
 def once(trajectories: Sequence[Trajectory]) -> tuple[list[Trajectory], list[Finding]]:

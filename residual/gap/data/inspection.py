@@ -33,6 +33,8 @@ _FAR_BEYOND = 3.0
 _FEW_WILD = 0.01
 # Units of time that are taken for seconds if samples come so many times as often, or nearly so.
 _LONGER, _ALMOST = {"min": 60.0, "h": 3600.0}, 0.15
+# What seconds that were taken for milliseconds make of that.
+_FINER = 1000.0
 
 
 def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
@@ -66,7 +68,7 @@ def other_clock(times: float) -> str:
             return unit
         if abs(times / seconds - 1) < _ALMOST:
             return "s"
-    return ""
+    return "s" if abs(_FINER * times - 1) < _ALMOST else ""
 
 
 def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:

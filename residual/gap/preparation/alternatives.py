@@ -60,8 +60,9 @@ def conventions(simulator: HostSimulator, samples: Samples) -> list[Convention]:
     """What a column map may have to say: signs, zeros of angles, units, other columns."""
     found = []
     for place, action in enumerate(simulator.action_channels):
-        if action.low < 0 < action.high:
-            found.append(_of_input(simulator, reversed_sign(action.name), place, -1.0))
+        found.append(_of_input(simulator, reversed_sign(action.name), place, -1.0))
+        if 0 <= action.low < action.high < np.inf:
+            found.append(_upside_down(simulator, place))
         for name, unit in other_units(action.unit):
             says = f"`unit: {name}` for {action.name} ({_beside_a_unit(unit)})"
             found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
@@ -142,6 +143,14 @@ def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Conv
     return found
 
 
+def _upside_down(simulator: HostSimulator, place: int) -> Convention:
+    """A command counted from its other end, as that of a relay that is on at zero."""
+    action = simulator.action_channels[place]
+    ends = action.low + action.high
+    says = f"`scale: -1` and `offset: {ends:g}` for {action.name}"
+    return _of_input(simulator, says, place, -1.0, ends)
+
+
 def _misread(channel: Channel) -> list[tuple[str, Unit]]:
     """What undoes the conversion of a column from a unit that it is not in, in words and numbers;
     but for what another unit does, too."""
@@ -178,6 +187,18 @@ def _of_states(
     plain.states[0, joint] = factor
     plain.states[1, joint[0]] = offset
     return dataclasses.replace(plain, says=says)
+
+
+def plainest(conventions: Sequence[Convention]) -> list[Convention]:
+    """Conventions without those that another zero alone parts from one of the others: where they
+    do as well, nothing depends on it."""
+
+    def without_zero(one: Convention) -> tuple[bytes, ...]:
+        parts = (one.states[0], one.inputs, one.states_from, one.inputs_from)
+        return tuple(part.tobytes() for part in parts)
+
+    plain = {without_zero(one) for one in conventions if not one.states[1].any()}
+    return [one for one in conventions if not one.states[1].any() or without_zero(one) not in plain]
 
 
 def beyond(convention: Convention) -> Convention | None:

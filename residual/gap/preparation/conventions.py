@@ -26,6 +26,7 @@ from residual.gap.preparation.alternatives import (
     as_said,
     beyond,
     conventions,
+    plainest,
     reversed_sign,
 )
 from residual.logs.units import other_units
@@ -88,8 +89,8 @@ def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
     further = beyond(best)
     if further is not None and BETTER * least > _error(simulator, fitter, further):
         return None
-    alike = tuple(one.says for error, one in errors if error < ALIKE * least)
-    return Conventions(alike, own / least)
+    alike = plainest([one for error, one in errors if error < ALIKE * least])
+    return Conventions(tuple(one.says for one in alike), own / least)
 
 
 def other_sign(simulator: HostSimulator, found: Sequence[Effect]) -> Conventions | None:

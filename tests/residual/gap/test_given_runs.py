@@ -51,6 +51,29 @@ def test_a_class_in_place_of_a_simulator_is_told():
         find_gap(PendulumEquation, [noisy()])
 
 
+def test_runs_in_place_of_a_simulator_are_told():
+    with pytest.raises(ValueError, match="simulator is of type list, expected a Simulator"):
+        find_gap([noisy()], PendulumEquation())
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [({"horizon": "2"}, "horizon is '2', expected seconds above 0"),
+     ({"minutes": 0}, "minutes is 0, expected minutes above 0"),
+     ({"parameter_tolerance": 3}, "parameter_tolerance is 3, expected a share up to 1")],
+)  # fmt: skip
+def test_settings_that_are_no_numbers_or_beyond_their_range_are_refused(settings, says):
+    with pytest.raises(ValueError, match=says):
+        find_gap(PendulumEquation(), noisy(), **settings)
+
+
+def test_one_effect_by_name_is_a_list_of_one():
+    one, listed = (
+        find_gap(PendulumEquation(), noisy(), effects=effects) for effects in ("mass", ["mass"])
+    )
+    assert one.verdicts == listed.verdicts
+
+
 def test_one_file_and_one_table_are_read_alone(tmp_path):
     run = noisy()
     table = pd.DataFrame({"time": run.times[:-1], "angle": run.states[:-1, 0],

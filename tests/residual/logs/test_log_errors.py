@@ -45,6 +45,12 @@ def test_text_in_a_number_is_found_in_its_row(csv):
     assert message.startswith(f"{path}, row {row}, column 'voltage': found 'oops', expected a num")
 
 
+def test_a_last_row_that_is_no_sample_may_be_deleted(csv):
+    message = error(csv(lambda lines: [*lines, "Total,,,"]))
+    assert "found 'Total', expected a number" in message
+    assert message.endswith("; if this row is no sample, delete it")
+
+
 @pytest.mark.parametrize(("cell", "unit"), [("-100%", "%"), ("2.5 mV", "mV"), ("1e3°C", "°C")])
 def test_a_unit_in_a_cell_belongs_elsewhere(csv, cell, unit):
     def change(lines):

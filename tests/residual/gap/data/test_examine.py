@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from swing import changed, kinds, noisy
 
 from residual.gap import find_gap
+from residual.gap.data.copies import shared
 from residual.gap.data.examine import examine, findings
 from residual.gap.data.kinematics import kinematics
 from residual.trajectories import Trajectory
@@ -162,7 +163,7 @@ def test_minutes_that_are_taken_for_seconds_are_told():
     period = PendulumEquation().dt
     for part, unit in (
         (1 / 60, "unit: min"), (1 / 57, "unit: min"), (1 / 3600, "unit: h"), (1 / 40, None),
-        (1, None), (57, "unit: s"),
+        (1, None), (57, "unit: s"), (1 / 1000, "unit: s"), (1 / 500, None),
     ):  # fmt: skip
         run = dataclasses.replace(noisy(), times=part * period * np.arange(400))
         found = [f for f in findings(PendulumEquation(), [run]) if f.kind == "sampling"]
@@ -233,11 +234,23 @@ def test_records_at_rest_are_alike_and_no_copies():
     assert len(examine(PendulumEquation(), logs).trajectories) == 3
 
 
-def test_a_record_set_aside_that_is_fitted_too_is_told():
+@pytest.mark.parametrize("part", [slice(None), slice(0, 100), slice(60, None), slice(21, 90)])
+def test_a_record_set_aside_that_is_fitted_too_is_told(part):
+    """As a whole, and in part, whatever its times count from."""
     logs = make_logs(Truth(), 4, "strong", "A", 5)
-    copy = dataclasses.replace(logs[0], name="test.csv")
+    times, states = logs[0].times[part], logs[0].states[part]
+    actions = logs[0].actions[part][: len(times) - 1]
+    copy = Trajectory("test.csv", times - times[0], states, actions)
     found = find_gap(PendulumEquation(), logs, held_out=[copy], effects=["mass"], minutes=0.2)
     assert any("test.csv" in says and "is no test" in says for says in found.quality)
+
+
+def test_measured_again_under_the_same_commands_is_a_test():
+    logs = make_logs(Truth(), 4, "strong", "A", 5)
+    rng = np.random.default_rng(0)
+    states = logs[0].states + 1e-3 * rng.standard_normal(logs[0].states.shape)
+    assert not shared([dataclasses.replace(logs[0], states=states)], logs)
+    assert not shared(logs[:1], logs[1:])
 
 
 def spoilt(value, rows=(100,)):

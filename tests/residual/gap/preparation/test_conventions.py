@@ -124,6 +124,28 @@ def test_degrees_celsius_are_no_kelvin():
         assert (found and found.changes) == wanted
 
 
+def test_a_relay_that_is_on_at_zero_is_told():
+    rng = np.random.default_rng(0)
+    watts = np.repeat(rng.uniform(0.0, 3000.0, (1, 20, 1)), 30, axis=1)
+    warm = Room().rollout(np.array([[293.0]]), watts)[0]
+    warm += 0.1 * rng.standard_normal(warm.shape)
+    run = Trajectory("room", 10.0 * np.arange(len(warm)), warm, 3000.0 - watts[0])
+    found = otherwise(Room(), prepare(Room(), [run], 300.0).fitter)
+    assert found is not None
+    assert found.changes == ("`scale: -1` and `offset: 3000` for heater",)
+
+
+def test_zeros_on_which_nothing_depends_are_no_other_convention():
+    """Of a wheel that is turned, without gravity, the other sign alone is asked after."""
+    simulator = PendulumEquation(dt=0.02).with_parameters(gravity=0.0)
+    volts = np.repeat(np.random.default_rng(0).uniform(-2, 2, (1, 40, 1)), 20, axis=1)
+    states = simulator.rollout(np.array([[0.3, 0.0]]), volts)[0]
+    run = Trajectory("wheel", 0.02 * np.arange(len(states)), states, -volts[0])
+    found = otherwise(simulator, prepare(simulator, [run], 0.5).fitter)
+    assert found is not None
+    assert set(found.changes) == {"`scale: -1` for voltage", "`scale: -1` for angle and rate"}
+
+
 def test_degrees_that_a_header_calls_kelvin_are_told():
     """Also where the nominal simulator forecasts poorly with the right unit."""
     rng = np.random.default_rng(0)

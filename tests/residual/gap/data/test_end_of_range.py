@@ -1,0 +1,37 @@
+"""A position that stands still at the end of its sensor's range, while the rate goes on."""
+
+import numpy as np
+import pytest
+
+from residual.logs.frozen import frozen_samples
+
+DT = 0.01
+TIMES = DT * np.arange(200)
+#: A joint that is driven on, ever slower, with a sensor that hesitates once.
+RATE = 5.0 - 1.5 * TIMES
+POSITION = np.cumsum(RATE) * DT
+
+
+def read(values):
+    """With a repeated reading just before the end of the range, as of a slow bus."""
+    values = np.round(values, 4)
+    end = int(np.argmax(values == values.max()))
+    values[end - 4] = values[end - 5]
+    return values
+
+
+def test_a_sensor_at_the_end_of_its_range_is_seen_by_the_rate():
+    (marked,) = frozen_samples([read(np.minimum(POSITION, 4.0))], [RATE[:-1] * DT])
+    assert np.flatnonzero(marked)[0] == np.argmax(POSITION > 4.0) + 1
+    assert marked[-1]
+
+
+@pytest.mark.parametrize("samples", [0, 4, 7])
+def test_a_joint_at_a_stop_is_not_even_if_the_rate_is_filtered(samples):
+    stopped = np.minimum(POSITION, 4.0)
+    rate = np.gradient(stopped, DT)
+    if samples:
+        for i in range(1, len(rate)):
+            rate[i] = rate[i - 1] + (rate[i] - rate[i - 1]) / samples
+    (marked,) = frozen_samples([read(stopped)], [rate[:-1] * DT])
+    assert not marked.any()
