@@ -1,4 +1,4 @@
-"""Whether a push that grows steadily along the records does the work of effects.
+"""Whether a push that grows steadily along each record does the work of effects.
 
 A room warms, a battery sags, the zero of a sensor wanders. No effect of the library depends on
 time, so that what does is taken for others, each a little: a gain and a parameter that are a few
@@ -8,6 +8,7 @@ percent off, a store so slow that it never fills.
 from __future__ import annotations
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +19,24 @@ from residual.gap.fitting.shooting import capped
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
 from residual.gap.search.sets import Key, Search
-from residual.gap.search.significance import score, size
+from residual.gap.search.significance import size
 from sims.effects.joint import ConstantLoad
 
 Array = NDArray[np.float64]
 
 #: Blocks of data below which nothing is said: what lasts for a moment is no drift.
 FEW = 6
+#: Records of which it is no chance that a push grows alike in all.
+ALIKE = 3
 #: Rounds of weighing windows by what is left of them.
 TURNS = 8
+
+
+class Fall(NamedTuple):
+    """What a set leaves beside a push, and the numbers of that."""
+
+    loss: float
+    numbers: int
 
 
 class Drift:
@@ -34,8 +44,7 @@ class Drift:
 
     def __init__(self, search: Search) -> None:
         self.search = search
-        self.price = float(np.log(size(search)))
-        self._scores: dict[Key, list[tuple[float, float]]] = {}
+        self._losses: dict[Key, list[tuple[Fall, Fall]]] = {}
 
     def does_as_well(self, key: Key, number: int) -> bool:
         """Whether some members of a set but not this one, and a push that drifts, fit as well,
@@ -54,49 +63,71 @@ class Drift:
         subsets = itertools.chain.from_iterable(
             itertools.combinations(rest, count) for count in range(len(rest) + 1)
         )
-        own = score(search, key)
+        own, numbers = search.tried[key].merit, search.numbers(key)
+        # As the information criterion has it where the noise is not known: what is left counts one.
+        price = float(np.log(size(search))) * max(1.0, own / size(search))
+
+        def behind(k: Key, fall: Fall) -> float:
+            return fall.loss - own + price * (search.numbers(k) + fall.numbers - numbers)
+
         return any(
-            drifting <= own < constant - self.price
+            behind(k, drifting) <= 0.0 < behind(k, constant) - price
             for k in subsets
             if k in search.tried
             for constant, drifting in self._with_push(k)
         )
 
-    def _with_push(self, key: Key) -> list[tuple[float, float]]:
-        """Scores of a set with a constant push on each joint, and with one that grows, too."""
-        if key not in self._scores:
+    def _with_push(self, key: Key) -> list[tuple[Fall, Fall]]:
+        """What a set leaves beside a constant push on each joint, and beside one that grows in each
+        record in its own way, too."""
+        if key not in self._losses:
             search, fitter = self.search, self.search.fitter
             assert isinstance(fitter, SmoothFitter)
             fit, along = search.tried[key], _along_records(search)
-            price = self.price * search.numbers(key)
-            self._scores[key] = []
+            of_record = _records(fitter.blocks.windows.run)
+            self._losses[key] = []
             for joint in search.simulator.joints:
                 load = candidates(search.simulator, [ConstantLoad(joint.name)], fitter.samples)
                 pushes = [beside_starts(fit, fitter.columns(fit, load, s)) for s in (None, along)]
-                losses = [
-                    _least_loss(fit, np.concatenate([fit.by_knob, *some], axis=2), fitter.cap)
+                pushes[1] = pushes[1] * of_record
+                constant, drifting = (
+                    Fall(
+                        _least_loss(fit, np.concatenate([fit.by_knob, *some], axis=2), fitter.cap),
+                        sum(columns.shape[2] for columns in some),
+                    )
                     for some in (pushes[:1], pushes)
-                ]
-                own = (losses[0] + price + self.price, losses[1] + price + 2 * self.price)
-                self._scores[key].append(own)
-        return self._scores[key]
+                )
+                self._losses[key].append((constant, drifting))
+        return self._losses[key]
 
 
 def _least_loss(fit: Fit, columns: Array, cap: float) -> float:
     """Loss that columns (W, R, c) leave of a fit, in the linear picture; what weighed little before
     them may count in full beside them, so weights follow."""
+    size = np.sqrt(np.maximum((columns**2).sum(axis=(0, 1)), 1e-300))
+    columns = columns / size
+    grams = columns.transpose(0, 2, 1) @ columns
+    rights = np.einsum("wrc,wr->wc", columns, fit.projected)
+    costs = (fit.projected**2).sum(axis=1)
     weights, least = fit.weights, fit.merit
-    rows = columns.reshape(-1, columns.shape[2])
-    size = np.sqrt(np.maximum((rows**2).sum(axis=0), 1e-300))
-    rows = rows / size
     for _ in range(TURNS):
-        root = np.repeat(np.sqrt(weights), columns.shape[1])
-        step = np.linalg.lstsq(rows * root[:, None], fit.projected.ravel() * root, rcond=1e-9)[0]
-        left = fit.projected - (rows @ step).reshape(fit.projected.shape)
-        costs = (left**2).sum(axis=1)
-        weights = np.minimum(1.0, cap / np.maximum(costs, 1e-300))
-        least = min(least, float(capped(costs, cap).sum()))
+        matrix = np.einsum("wij,w->ij", grams, weights)
+        step = np.linalg.pinv(matrix, rcond=1e-12) @ (weights @ rights)
+        left = np.maximum(costs - 2 * rights @ step + grams @ step @ step, 0.0)
+        weights = np.minimum(1.0, cap / np.maximum(left, 1e-300))
+        least = min(least, float(capped(left, cap).sum()))
     return least
+
+
+def _records(run: NDArray[np.int64]) -> Array:
+    """How much each of some courses has to do with every window, (W, 1, r): one for each record; of
+    three and more what differs between them, since what is the same in all hangs on the motion,
+    and not on time."""
+    own = (run[:, None] == np.unique(run)).astype(float)
+    count = own.shape[1]
+    if count >= ALIKE:
+        own = own[:, :-1] - own[:, -1:]
+    return own[:, None, :]
 
 
 def _along_records(search: Search) -> Array:

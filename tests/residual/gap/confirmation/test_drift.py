@@ -1,12 +1,17 @@
 """What grows steadily along a record, as a room that warms, passes for an effect no longer."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from oven import SLOW, Oven, steps
 
 from residual.gap import find_gap
+from residual.gap.confirmation.drift import _records
+from residual.trajectories import Trajectory
+from sims.equations import FirstOrderSystem
+from sims.simulator import Channel, Parameter
 
 DUTIES = [float(duty) for duty in np.random.default_rng(3).integers(0, 2, 25)]
 
@@ -48,3 +53,39 @@ def test_no_number_of_what_is_certain_lies_at_its_bound():
     found = named(warmed(steps(0, DUTIES, 0.0, lag=0.0), 1.0))
     bound = [v for v in found if any(n.at_bound for n in v.parameters.values())]
     assert all("at_bound" in verdict.doubts for verdict in bound)
+
+
+class Falling(FirstOrderSystem):
+    """A body that falls in a vacuum."""
+
+    dt = 0.02
+    state_channels = (Channel("speed", "m/s", "rate", scale=5.0),)
+    action_channels = ()
+    parameters: ClassVar = {"gravity": Parameter(9.81, "m/s^2", "free fall")}
+
+    def derivative(self, x, u, p):
+        return (p.gravity + 0.0 * x[:, 0])[:, None]
+
+
+def test_what_grows_alike_in_every_record_is_no_drift():
+    """Drag on falling bodies that tumble, in closed form, each let go at a speed of its own."""
+    rng = np.random.default_rng(0)
+    times = 0.02 * np.arange(40)
+    drops = []
+    for number, start in enumerate(rng.uniform(0.0, 2.0, 8)):
+        drag = 0.04 * rng.uniform(0.5, 1.5)
+        last = np.sqrt(9.81 / drag)
+        speed = last * np.tanh(np.sqrt(9.81 * drag) * times + np.arctanh(start / last))
+        seen = speed + rng.normal(0, 0.02, len(times))
+        drops.append(Trajectory(f"drop {number}", times, seen[:, None], np.zeros((39, 0))))
+    (named,) = [v for v in find_gap(Falling(), drops).verdicts if v.parameters]
+    assert (named.kind, named.doubts) == ("confirmed", ())
+    assert "quadratic_drag" in (named.effect, *(form.split("@")[0] for form in named.form))
+
+
+@pytest.mark.parametrize(("records", "left"), [(1, 0.0), (2, 0.0), (3, 1.0), (5, 1.0)])
+def test_of_three_records_what_grows_alike_in_all_is_left(records, left):
+    columns = _records(np.arange(records))[:, 0]
+    alike = np.ones(records)
+    by_columns = columns @ np.linalg.lstsq(columns, alike, rcond=None)[0]
+    np.testing.assert_allclose(alike - by_columns, left, atol=1e-12)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from residual.gap.fitting.screening import Gain
-from residual.gap.search.beam import _best, improves, partners, plainer, together
+from residual.gap.search.beam import _best, boldly, improves, partners, plainer, together
 
 LAW, CASE, OTHER = 0, 1, 2
 
@@ -76,3 +76,21 @@ def test_nothing_larger_is_tried_once_the_error_is_small_enough(reached, goes_on
     effort = SimpleNamespace(stale=0.05, enough=0.05)
     search = SimpleNamespace(error=lambda key: 0.5 * reached, effort=effort)
     assert improves(search, (0, 1), reached) is goes_on
+
+
+@pytest.mark.parametrize("each", [False, True])
+def test_every_parameter_is_fitted_alone_where_the_screen_tells_little(each):
+    trial = SimpleNamespace(values=np.array([[2.0]]))
+    candidates = [
+        SimpleNamespace(effect=SimpleNamespace(enters=enters), bold=bold, trials=(trial,))
+        for enters, bold in (("parameter", None), ("joint", None), ("parameter", np.array([5.0])))
+    ]
+    tried = {}
+    search = SimpleNamespace(
+        candidates=candidates, screened=3, late=False, fits_in=lambda key: True,
+        effort=SimpleNamespace(parameters=each), add=lambda new: tried.update(new) or list(new),
+        tried=tried, sound=lambda key: True,
+    )  # fmt: skip
+    assert boldly(search, parameters=True) == ([(0,), (2,)] if each else [(2,)])
+    assert tried[(2,)] == 5.0
+    assert boldly(search, parameters=False) == []
