@@ -102,7 +102,8 @@ def rounded(value: float, half: float) -> str:
     if places > 7 or places < -4:
         digits = max(2, places + 1 + math.floor(math.log10(abs(value))))
         return f"{value:.{min(digits, 8)}g}"
-    return f"{round(value, places):.{max(places, 0)}f}"
+    # Adding zero takes the sign off a zero.
+    return f"{round(value, places) + 0.0:.{max(places, 0)}f}"
 
 
 def six_digits(value: float) -> str:

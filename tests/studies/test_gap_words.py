@@ -33,6 +33,7 @@ def test_an_interval_is_written_with_its_unit():
     assert number_text(Number(-0.5, -0.6, -0.4, "1")) == "−0.50 (−0.60 to −0.40)"
     # Of a lopsided interval the near side tells how well the value is known.
     assert number_text(Number(-0.3, -32.7, 1.3, "%")) == "−0.3 % (−32.7 to 1.3)"
+    assert number_text(Number(-0.34, -0.84, -0.001, "1")) == "−0.34 (−0.84 to 0.00)"
     assert number_text(Number(2.0, 1.9, 2.1, "kg"), sign=True) == "+2.00 kg (1.90 to 2.10)"
 
 
