@@ -15,6 +15,7 @@ from residual.gap.answer.confirmed import matters
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.records import stands_for, unlike
 from residual.gap.clock import Clock
+from residual.gap.fitting.contract import Fitter
 from residual.gap.inquiry import Inquiry
 from residual.gap.log import look, settle
 from residual.gap.model.workers import workers
@@ -31,6 +32,9 @@ from sims.contract import refuse_unsound
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.simulator import Hold
+
+#: Part of the rows that an answer rests on, below which that is told.
+ENOUGH = 0.5
 
 
 def find_gap(
@@ -142,7 +146,7 @@ def find_gap(
         clock.lap("forecast")
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
     quality = [*log.findings, *log.left_out, *other, *on_hold, *on_rest, *on_more, *known.says]
-    quality += inquiry.untried(answer)
+    quality += [*_searched(answer.found.search.fitter), *inquiry.untried(answer)]
     result = told(answer, table, judged.table, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)
     conventions = conventions or other_sign(simulator, result.effects)
@@ -164,3 +168,14 @@ def _refuse_settings(horizon: Any, parameter_tolerance: Any, minutes: Any) -> No
         least = 0.0 if name == "parameter_tolerance" else np.nextafter(0.0, 1.0)
         if not number or not least <= float(value) <= most:
             raise ValueError(f"{name} is {value!r}, expected {what}")
+
+
+def _searched(fitter: Fitter) -> list[str]:
+    """What is to be said if windows hold less than half of the rows."""
+    held, rows = int(fitter.blocks.windows.inside.sum()), len(fitter.samples)
+    if held >= ENOUGH * rows:
+        return []
+    return [
+        f"the answer rests on {held} of {rows} samples: {len(fitter.blocks)} blocks, spread evenly "
+        "over how hard the records are driven"
+    ]

@@ -36,6 +36,8 @@ _COARSE = 3e-4
 _FEW_VALUES = 8
 # Zeros in a row that are a drop-out rather than a time at which nothing happened.
 _LONGEST_DROP = 50
+# Readings of which a few values are all that the sensor tells.
+MANY = 100
 # Part of the least distance of two values that their common step is at least.
 _PARTS = 0.15
 
@@ -256,12 +258,13 @@ def grain(runs: Sequence[Array]) -> float:
     """
     values = np.concatenate([np.ravel(v) for v in runs] or [np.zeros(0)])
     values = np.unique(values[np.isfinite(values)])
-    if len(values) < 8:
-        return 0.0
     gaps = np.diff(values)
-    gaps = gaps[gaps > 1e-9 * max(abs(values[0]), abs(values[-1]))]
-    if not gaps.size:
-        return 0.0
+    if len(gaps):
+        gaps = gaps[gaps > 1e-9 * max(abs(values[0]), abs(values[-1]))]
+    if len(gaps) < 7:
+        # Of so few values only even steps say that there are none between them.
+        even = len(gaps) > 1 and np.ptp(gaps) < 0.02 * gaps.min()
+        return float(np.median(gaps)) if even and sum(map(np.size, runs)) >= MANY else 0.0
     # Numbers printed with few digits are nearly, not exactly, multiples of their last digit.
     least = step = float(np.median(gaps[gaps < 1.1 * gaps.min()]))
     while step > _PARTS * least:

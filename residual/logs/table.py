@@ -164,6 +164,8 @@ class Table:
                 else:
                     comma = "," in text and decimal == "."
                     fix = "set decimal: ','" if comma else "correct the value or leave it empty"
+                    if comma and "." in text:
+                        fix = "leave out the commas between thousands"
                     if with_unit := _WITH_UNIT.fullmatch(text):
                         unit = with_unit[1]
                         fix = f"leave {unit} out of the cells, and say `unit: {unit}` of the column"

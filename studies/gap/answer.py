@@ -28,6 +28,7 @@ from studies.gap.words import (
     quantity_text,
     rounded,
     six_digits,
+    told,
     unit_text,
 )
 
@@ -75,7 +76,7 @@ def headline(verdict: Verdict, result: GapResult) -> str:
     if verdict.effect == verdict.where and parameter is not None:
         (change,) = verdict.parameters.values()
         half = 0.0 if change.at_bound else 0.5 * (change.high - change.low)
-        total = rounded(float(parameter.value) + change.value, half)
+        total = told(float(parameter.value) + change.value, half)
         return (
             f"{name}: {number_text(change, sign=True)}, so {total}"
             f"{unit_text(change.unit)} in place of {six_digits(float(parameter.value))}."

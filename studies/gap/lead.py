@@ -149,8 +149,9 @@ def _but_worse_apart(result: GapResult) -> str:
         return f" The records set aside cannot tell: there noise alone makes {alone}, and {errors}."
     if not apart.refutes and not any("no_help" in verdict.doubts for verdict in result.verdicts):
         return (
-            f" The records set aside do not show it: what was found hardly acts there, and the "
-            f"{ahead(apart)} is {after} with it and {before} without."
+            " The records set aside do not show it: they have a gap of their own, beside which "
+            f"what was found makes little difference: the {ahead(apart)} is {after} with it and "
+            f"{before} without."
         )
     if not apart.refutes:
         return (

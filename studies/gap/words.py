@@ -106,6 +106,12 @@ def rounded(value: float, half: float) -> str:
     return f"{round(value, places) + 0.0:.{max(places, 0)}f}"
 
 
+def told(value: float, half: float) -> str:
+    """A value to the second digit of its uncertainty, or to its own second if it is less."""
+    text = rounded(value, half)
+    return f"{value:.2g}" if value and not float(text) else text
+
+
 def six_digits(value: float) -> str:
     """A number to six digits, and never as a power of ten where ``rounded`` writes zeros."""
     text = f"{value:g}"

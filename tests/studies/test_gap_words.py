@@ -16,6 +16,7 @@ from studies.gap.words import (
     quantity_text,
     rounded,
     six_digits,
+    told,
     unit_text,
 )
 
@@ -105,3 +106,9 @@ def test_a_nominal_value_is_written_like_what_replaces_it(value, text):
 ])  # fmt: skip
 def test_effects_are_said_with_their_places(labels, text):
     assert by_place([effect_name(label) for label in labels]) == [text]
+
+
+def test_what_is_left_of_a_number_is_no_zero():
+    assert told(10.0, 3500.0) == "10"
+    assert told(9010.0, 3500.0) == rounded(9010.0, 3500.0)
+    assert told(0.0, 1.0) == "0"

@@ -11,6 +11,7 @@ DOUBTS: dict[Doubt, str] = {
     "creeps": "it is no constant: its size changes along the records, or from one to another",
     "drift": "a push that grows steadily along the records, as of a room that warms, would do as "
     "well",
+    "one_way": "motion goes one way only, so that a part of it may be a constant load",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
@@ -49,6 +50,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "unsteady": not claim.steady,
         "creeps": claim.creeps,
         "drift": claim.drifts,
+        "one_way": claim.one_way,
         "numerics": not claim.sound,
         "at_bound": claim.bounded,
         "calibration": claim.calibration and not claim.slight,

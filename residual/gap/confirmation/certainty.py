@@ -12,6 +12,7 @@ from residual.gap.confirmation.claim import Claim, other_than
 from residual.gap.confirmation.constancy import creeps
 from residual.gap.confirmation.drift import Drift
 from residual.gap.confirmation.numerics import STEADY, at_half_step, in_the_limit, survives
+from residual.gap.confirmation.one_way import may_hold_a_load
 from residual.gap.fitting.intervals import bounded, deviations, ended
 from residual.gap.fitting.plausible import doubtful_sensor
 from residual.gap.search.comparisons import AT_ONE, no_match
@@ -90,6 +91,7 @@ def claims(
                 creeps=creeps(search, key, number),
                 drifts=not search.candidates[number].effect.creeps
                 and drift.does_as_well(key, number),
+                one_way=may_hold_a_load(search, key, number, half),
                 extreme=key in search.extreme,
             )
         )

@@ -34,6 +34,7 @@ class Claim:
         steady: Whether its strength is about the same in every fold.
         creeps: Whether it is a constant that changes along the records, or from one to another.
         drifts: Whether a push that grows steadily along the records would do its work as well.
+        one_way: Whether motion goes one way only, so that part of it may be a load.
         sound: Whether it survives other numerics.
         bounded: Whether a number of it lies at its bound.
         share: Part of the nominal squared error that it takes off, with a 95 % interval.
@@ -81,6 +82,7 @@ class Claim:
     there: bool = False
     creeps: bool = False
     drifts: bool = False
+    one_way: bool = False
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
 
@@ -112,6 +114,7 @@ class Claim:
             self.unasked,
             self.creeps,
             self.drifts,
+            self.one_way,
         )
         return self.needed and self.gains and self.steady and self.sound and not any(against)
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from residual.logs.faults import grain
+from residual.logs.faults import grain, rounding
 
 
 @given(
@@ -33,3 +33,11 @@ def test_an_encoder_that_was_never_read_one_step_apart():
 @settings(max_examples=50, deadline=None)
 def test_readings_that_were_not_rounded_have_none(seed, size):
     assert grain([np.random.default_rng(seed).standard_normal(size)]) == 0
+
+
+def test_few_values_in_even_steps_are_all_that_a_sensor_tells():
+    held = np.repeat([20.0, 20.5, 21.0, 20.5, 21.0, 21.5, 21.0, 20.5], 40)
+    assert rounding([held]) == pytest.approx(0.5)
+    assert rounding([held[::40]]) == 0.0  # too few readings
+    assert rounding([np.repeat([0.0, 1.0], 200)]) == 0.0  # a valve
+    assert rounding([np.repeat([0.0, 1.0, 5.0], 200)]) == 0.0

@@ -51,6 +51,13 @@ def test_a_last_row_that_is_no_sample_may_be_deleted(csv):
     assert message.endswith("; if this row is no sample, delete it")
 
 
+def test_commas_between_thousands_are_to_be_left_out(csv):
+    def change(lines):
+        return [*lines[:8], '"1,000.5",1,0,1', *lines[9:]]
+
+    assert error(csv(change)).endswith("leave out the commas between thousands")
+
+
 @pytest.mark.parametrize(("cell", "unit"), [("-100%", "%"), ("2.5 mV", "mV"), ("1e3°C", "°C")])
 def test_a_unit_in_a_cell_belongs_elsewhere(csv, cell, unit):
     def change(lines):

@@ -91,4 +91,4 @@ def test_what_cannot_act_there_is_not_judged():
     (gain,) = (v for v in found.verdicts if v.effect == "actuator_gain")
     assert (gain.kind, gain.doubts) == ("confirmed", ())
     assert found.held_out.denies
-    assert "hardly acts there" in lead(found)
+    assert "makes little difference" in lead(found)
