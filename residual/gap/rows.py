@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,9 @@ from residual.gap.confirmation.aliases import aliases
 from residual.gap.fitting.intervals import deviations
 from residual.gap.model.candidates import candidates
 from residual.gap.preparation.prepare import prepare
-from residual.gap.search.explain import explain
+from residual.gap.search.explain import Explanation, explain
+from residual.gap.search.sets import Key
+from residual.gap.search.significance import pruned
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.effects.library import library, typical
@@ -112,7 +115,7 @@ def look(simulator: HostSimulator, runs: list[Trajectory], exact: bool = True) -
         for effect in library(simulator)
         if len(_hosting(simulator, effect).state_channels) == width
     ]
-    groups, _ = aliases(simulator, offered)
+    groups, sets = aliases(simulator, offered)
     kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
     alone = exact and simulator.has_contacts
     periods = 1 if alone else HORIZON
@@ -124,17 +127,50 @@ def look(simulator: HostSimulator, runs: list[Trajectory], exact: bool = True) -
     found = explain(
         simulator, pool, prepared.fitter, prepared.floor, prepared.weigh, effort, _quiet, np.inf,
     )  # fmt: skip
-    fit = found.search.tried[found.key]
+    key = _in_fewer(found, sets)
+    fit = found.search.tried[key]
     known = len(simulator.effects)
     numbers = zip(fit.model.owner, fit.model.knobs, strict=True)
     spread = deviations(fit, found.search.fitter.blocks)
+    left = found.search.fitter.left(fit, found.floor)
     return Named(
         fit.model.bind(fit.theta).effects[known:],
         tuple((int(i), knob.field) for i, knob in numbers),
         np.diag(spread**2),
-        found.left.ratio,
-        found.left.adequate,
+        left.ratio,
+        left.adequate,
     )
+
+
+def _in_fewer(found: Explanation, sets: Sequence[tuple[str, ...]]) -> Key:
+    """The chosen set, or one in which one effect does the work of several.
+
+    Of effects that depend on each other exactly, such as resistance, supply and friction of a
+    motor, others in one proportion do what one does, and fit no worse. Of what strikes the ground a
+    search may come to those first.
+
+    Args:
+        found: The choice, of a search in which nothing more than chance is named.
+        sets: Labels of effects of which each is made of the others.
+    """
+    search, key = found.search, found.key
+    if not (found.adequate and key):
+        return key
+    labels = [candidate.label for candidate in search.candidates]
+    best = key
+    for one in sets:
+        inside = [n for n in key if labels[n] in one]
+        missing = [labels.index(name) for name in one if name in labels]
+        missing = [n for n in missing if n not in key]
+        if len(missing) != 1 or len(inside) + 1 < len(one):
+            continue
+        start = 0.01 * search.candidates[missing[0]].trials[0].values[0]
+        fresh, theta = search.merged(key, [(missing[0], start)], drop=tuple(inside))
+        search.add({fresh: theta})
+        behind = search.tried[fresh].merit - search.tried[key].merit
+        if search.sound(fresh) and behind < found.needed:
+            best = min(best, fresh, key=lambda k: (search.numbers(k), search.tried[k].merit))
+    return pruned(search, best, found.needed) if best != key else key
 
 
 def _quiet(_: str) -> None:
