@@ -22,7 +22,6 @@ from studies.learning.kept import OnDisk
 from studies.learning.loop import learn_by_difference, run_loop
 from studies.learning.outcome import Learnt
 from studies.learning.steps import Steps
-from studies.learning.trial import trial_label
 from studies.running.progress import Silent
 
 BUDGET = Budget(
@@ -284,17 +283,6 @@ def test_an_argument_of_another_kind_is_one_line(name, given, says):
 def test_without_an_update_there_is_no_model():
     with pytest.raises(ValueError, match="no update was made"):
         Learnt(SYSTEM.description()).model  # noqa: B018
-
-
-def test_systems_of_one_file_have_folders_of_their_own():
-    config = {"estimator": {"class_path": "residual.Linear"}, "budget": {"true_samples": 9}}
-    labels = [
-        trial_label({**config, "seed": 0, "system": name})
-        for name in ("arm.SYSTEM", "robots.arm.LAGGED", "")
-    ]
-    assert labels == ["arm.SYSTEM-Linear-9-seed0", "arm.LAGGED-Linear-9-seed0", "Linear-9-seed0"]
-    other = trial_label({**config, "seed": 0, "learner": "stable_baselines3.SAC"})
-    assert other == "SAC-Linear-9-seed0"
 
 
 def test_a_budget_that_teaches_nothing_is_refused():
