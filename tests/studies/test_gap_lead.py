@@ -37,13 +37,16 @@ def test_what_the_log_may_count_otherwise_comes_first():
 def test_the_first_sentence_says_where_the_corrected_simulator_is_no_better(
     after, spread, worse, helps
 ):
-    found = result(MASS)
+    doubts = () if helps else ("set_aside",) if worse else ("no_help",)
+    found = result(
+        dataclasses.replace(MASS, kind="ambiguous" if doubts else MASS.kind, doubts=doubts)
+    )
     before = Span(1.0, 1 / spread, spread)
     apart = dataclasses.replace(
         found.gap, before=before, after=Span(after, after / spread, after * spread)
     )
     says = lead(dataclasses.replace(found, held_out=apart))
-    assert says.startswith("98 % of the gap is mass.")
+    assert says.startswith("98 % of the gap is")
     assert (
         "does not hold on the records set aside, where the corrected simulator is worse: the 1 s "
         "error of angle is 1.2 rad, the nominal one's 1 rad." in says
@@ -53,6 +56,18 @@ def test_the_first_sentence_says_where_the_corrected_simulator_is_no_better(
         "it and 1 rad without." in says
     ) is not (helps or worse)
     assert ("records set aside" in says) is not helps
+
+
+def test_what_makes_no_difference_on_records_with_a_gap_of_their_own_is_said_so():
+    found = result(MASS)
+    span = Span(1.0, 0.9, 1.1)
+    says = lead(
+        dataclasses.replace(found, held_out=dataclasses.replace(found.gap, before=span, after=span))
+    )
+    assert says.endswith(
+        "The records set aside do not show it: they have a gap of their own, beside which what was "
+        "found makes little difference: the 1 s error of angle is 1 rad with it and 1 rad without."
+    )
 
 
 def test_records_in_which_nothing_shows_are_not_said_to_speak_against_a_name():
