@@ -147,20 +147,20 @@ def _but_worse_apart(result: GapResult) -> str:
         if max(apart.before.value, apart.after.value) > OFF * apart.noise_floor.value:
             return f" The records set aside are too few to tell: there {errors}."
         return f" The records set aside cannot tell: there noise alone makes {alone}, and {errors}."
-    if not apart.refutes and not any("no_help" in verdict.doubts for verdict in result.verdicts):
+    if apart.refutes:
         return (
-            " The records set aside do not show it: they have a gap of their own, beside which "
-            f"what was found makes little difference: the {ahead(apart)} is {after} with it and "
-            f"{before} without."
+            f" But it does not hold on the records set aside, where the corrected simulator is "
+            f"worse: the {ahead(apart)} is {after}, the nominal one's {before}."
         )
-    if not apart.refutes:
+    if any("no_help" in verdict.doubts for verdict in result.verdicts):
         return (
             f" But it does not help on the records set aside, where the {ahead(apart)} is {after} "
             f"with it and {before} without."
         )
     return (
-        f" But it does not hold on the records set aside, where the corrected simulator is worse: "
-        f"the {ahead(apart)} is {after}, the nominal one's {before}."
+        " The records set aside do not show it: they have a gap of their own, beside which what "
+        f"was found makes little difference: the {ahead(apart)} is {after} with it and {before} "
+        "without."
     )
 
 

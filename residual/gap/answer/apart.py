@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.table import AS_GOOD_AS_NOISE, held_out, squares_of
+from residual.gap.answer.table import AS_GOOD_AS_NOISE, forecasts, held_out
 from residual.gap.confirmation.rest import beginning_as, each_as_it_fits
 from residual.gap.data.excerpt import excerpt
 from residual.gap.data.samples import in_order
-from residual.gap.fitting.contract import Fit, Fitter
+from residual.gap.fitting.contract import Fitter, Foretold
 from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.fitting.validation import by_block
 from residual.gap.model.model import Model
 from residual.gap.preparation.numerics import enough_for, own_substeps, stride_for
 from residual.gap.preparation.prepare import Prepared, prepare
@@ -81,16 +82,23 @@ def judged_apart(
     judged = held_out(table, other, fits[0], fits[1], floor)
     if judged.refutes:
         return Apart(judged, True, frozenset())
+    shown = forecasts(other, fits[1])
     useless = (
         number
         for number in answer.key
-        if _useless(search, answer.key, number, other, fits[1], floor, judged.denies)
+        if _useless(search, answer.key, number, other, shown, floor, judged.denies)
     )
     return Apart(judged, False, frozenset(useless))
 
 
 def _useless(
-    search: Search, key: Key, number: int, other: Fitter, found: Fit, floor: Array, denied: bool
+    search: Search,
+    key: Key,
+    number: int,
+    other: Fitter,
+    found: Foretold,
+    floor: Array,
+    denied: bool,
 ) -> bool:
     """Whether an effect does not take off a quarter of what it took off where it was found, at the
     channel that it helped most there, though it could.
@@ -103,7 +111,7 @@ def _useless(
         key: The chosen set.
         number: The effect.
         other: For the records set aside.
-        found: The corrected simulator there.
+        found: What the corrected simulator forecasts there.
         floor: See ``noise_floor``, of these records.
         denied: Whether all effects together help nothing there.
     """
@@ -114,25 +122,17 @@ def _useless(
     took = other.samples.of_these(search.fitter.samples, took)
     place = int(np.argmax(took))
     fit = search.tried[rest]
-    without = other.fit(Model(fit.model.bind(fit.theta)), np.zeros(0))
-    own = _mean(squares_of(other, found))[place]
-    moved = _moved(other, found, without)[place]
-    least = AS_WELL * max(took[place], 0.0)
+    without = forecasts(other, other.fit(Model(fit.model.bind(fit.theta)), np.zeros(0)))
+    own, lacking = (_mean(by_block(one.squares, other.blocks))[place] for one in (found, without))
+    apart = (found.shown - without.shown)[other.blocks.windows.inside][:, place]
+    moved, least = float((apart**2).mean()), AS_WELL * max(took[place], 0.0)
     if moved < least * (moved + own):
         return False
     if denied:
         return True
     if took[place] <= 0 or not own > AS_GOOD_AS_NOISE * _mean(floor)[place]:
         return False
-    return bool(1 - own / _mean(squares_of(other, without))[place] < least)
-
-
-def _moved(fitter: Fitter, one: Fit, other: Fit) -> Array:
-    """Mean squared difference between the forecasts of two fits by channel, (m,)."""
-    windows = fitter.blocks.windows
-    which = np.zeros(len(windows), np.int64)
-    shown = [fitter.foretell(fit.model, fit.theta[None], which, fit).shown for fit in (one, other)]
-    return np.asarray(((shown[0] - shown[1])[windows.inside] ** 2).mean(axis=0), float)
+    return bool(1 - own / lacking < least)
 
 
 def _mean(squares: Array) -> Array:

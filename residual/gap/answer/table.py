@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from residual.gap.answer.calibrated import moved
 from residual.gap.data.blocks import Blocks
-from residual.gap.fitting.contract import Fit, Fitter
+from residual.gap.fitting.contract import Fit, Fitter, Foretold
 from residual.gap.fitting.forecasts import main_channel, span
 from residual.gap.fitting.validation import Validated, by_block
 from residual.gap.result import ChannelGap, Gap, Rollout, Span, Step
@@ -106,9 +106,13 @@ def rollouts(search: Search, before: Validated, after: Validated) -> tuple[Rollo
 
 def squares_of(fitter: Fitter, fit: Fit) -> Array:
     """Squared errors of a fit's forecasts by block and channel, (B, m)."""
+    return by_block(forecasts(fitter, fit).squares, fitter.blocks)
+
+
+def forecasts(fitter: Fitter, fit: Fit) -> Foretold:
+    """Forecasts of a fit over all windows."""
     which = np.zeros(len(fitter.blocks.windows), np.int64)
-    foretold = fitter.foretell(fit.model, fit.theta[None], which, fit)
-    return by_block(foretold.squares, fitter.blocks)
+    return fitter.foretell(fit.model, fit.theta[None], which, fit)
 
 
 def held_out(gap: Gap, fitter: Fitter, before: Fit, after: Fit, floor: Array) -> Gap:

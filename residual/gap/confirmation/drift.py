@@ -13,19 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.confirmation.constancy import FEW
+from residual.gap.confirmation.push import pushed
 from residual.gap.fitting.contract import Fit
-from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.shooting import capped
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.model.candidates import candidates
 from residual.gap.search.sets import Key, Search
 from residual.gap.search.significance import size
-from sims.effects.joint import ConstantLoad
 
 Array = NDArray[np.float64]
 
-#: Blocks of data below which nothing is said: what lasts for a moment is no drift.
-FEW = 6
 #: Records of which it is no chance that a push grows alike in all.
 ALIKE = 3
 #: Rounds of weighing windows by what is left of them.
@@ -87,8 +84,7 @@ class Drift:
             of_record = _records(fitter.blocks.windows.run)
             self._losses[key] = []
             for joint in search.simulator.joints:
-                load = candidates(search.simulator, [ConstantLoad(joint.name)], fitter.samples)
-                pushes = [beside_starts(fit, fitter.columns(fit, load, s)) for s in (None, along)]
+                pushes = [pushed(fitter, fit, joint.name, share) for share in (None, along)]
                 pushes[1] = pushes[1] * of_record
                 constant, drifting = (
                     Fall(

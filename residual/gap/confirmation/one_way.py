@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.fitting.screening import beside_starts, flatten
+from residual.gap.confirmation.push import pushed
+from residual.gap.fitting.screening import flatten
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.model.candidates import candidates
 from residual.gap.search.sets import SAME_MOTION, Key, Search
-from sims.effects.joint import ConstantLoad
 
 Array = NDArray[np.float64]
 
@@ -32,14 +31,13 @@ def may_hold_a_load(search: Search, key: Key, number: int, half: Array) -> bool:
         return False
     if joint not in {one.name for one in search.simulator.joints}:
         return False
-    load = candidates(search.simulator, [ConstantLoad(joint)], search.fitter.samples)
-    pushed = flatten(beside_starts(fit, search.fitter.columns(fit, load)), fit.weights)[:, 0]
+    load = flatten(pushed(search.fitter, fit, joint), fit.weights)[:, 0]
     knobs = fit.model.knobs
     own = [j for j in np.flatnonzero(fit.model.owner == key.index(number)) if knobs[j].strength]
     more = flatten(fit.by_knob[..., own], fit.weights)
     known = [float(fit.theta[j]) > half[j] for j in own]
-    return any(_alike(pushed, more[:, [i]]) for i in range(len(own))) or (
-        not all(known) and _alike(pushed, more)
+    return any(_alike(load, more[:, [i]]) for i in range(len(own))) or (
+        not all(known) and _alike(load, more)
     )
 
 

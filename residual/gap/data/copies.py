@@ -41,13 +41,14 @@ def copies(
 def shared(
     trajectories: Sequence[Trajectory], among: Sequence[Trajectory]
 ) -> list[tuple[Trajectory, Trajectory]]:
-    """Records that share a stretch of samples with one of the others: copies, parts, overlaps.
+    """Records that share samples with one of the others: copies, parts, overlaps.
 
     Returns:
         Each with the first record that it shares some with.
     """
-    found = []
-    for run in trajectories:
+    found = copies(trajectories, among)
+    known = {id(run) for run, _ in found}
+    for run in [run for run in trajectories if id(run) not in known]:
         other = next((other for other in among if _overlap(run, other)), None)
         if other is not None:
             found.append((run, other))

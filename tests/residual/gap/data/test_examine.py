@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from swing import changed, kinds, noisy
 
 from residual.gap import find_gap
-from residual.gap.data.copies import shared
 from residual.gap.data.examine import examine, findings
 from residual.gap.data.kinematics import kinematics
 from residual.trajectories import Trajectory
@@ -232,25 +231,6 @@ def test_records_at_rest_are_alike_and_no_copies():
     rest = Trajectory("rest", 0.1 * np.arange(30), np.zeros((30, 2)), np.zeros((29, 1)))
     logs = [*swings(1.0), rest, dataclasses.replace(rest, name="rest again")]
     assert len(examine(PendulumEquation(), logs).trajectories) == 3
-
-
-@pytest.mark.parametrize("part", [slice(None), slice(0, 100), slice(60, None), slice(21, 90)])
-def test_a_record_set_aside_that_is_fitted_too_is_told(part):
-    """As a whole, and in part, whatever its times count from."""
-    logs = make_logs(Truth(), 4, "strong", "A", 5)
-    times, states = logs[0].times[part], logs[0].states[part]
-    actions = logs[0].actions[part][: len(times) - 1]
-    copy = Trajectory("test.csv", times - times[0], states, actions)
-    found = find_gap(PendulumEquation(), logs, held_out=[copy], effects=["mass"], minutes=0.2)
-    assert any("test.csv" in says and "is no test" in says for says in found.quality)
-
-
-def test_measured_again_under_the_same_commands_is_a_test():
-    logs = make_logs(Truth(), 4, "strong", "A", 5)
-    rng = np.random.default_rng(0)
-    states = logs[0].states + 1e-3 * rng.standard_normal(logs[0].states.shape)
-    assert not shared([dataclasses.replace(logs[0], states=states)], logs)
-    assert not shared(logs[:1], logs[1:])
 
 
 def spoilt(value, rows=(100,)):
