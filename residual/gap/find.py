@@ -136,6 +136,7 @@ def find_gap(
                 replace(
                     claim,
                     counted=conventions is not None,
+                    cut_off=bool(log.cut_off),
                     unlike=stands_for(answer, claim, differ),
                     refuted=judged.refuted,
                     helpless=claim.number in judged.helpless,
@@ -150,7 +151,9 @@ def find_gap(
     result = told(answer, table, judged.table, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)
     conventions = conventions or other_sign(simulator, result.effects)
-    return replace(result, conventions=conventions, unlike=differ, nearly_late=late)
+    return replace(
+        result, conventions=conventions, cut_off=log.cut_off, unlike=differ, nearly_late=late
+    )
 
 
 def _refuse_settings(horizon: Any, parameter_tolerance: Any, minutes: Any) -> None:

@@ -32,6 +32,7 @@ class Log:
         apart: Runs that are set aside, without what is faulty in them or measured there only.
         findings: What was found about the data, in words.
         left_out: What of the data is not searched, in words.
+        cut_off: Channels that the simulator cuts off within what was recorded of them.
     """
 
     simulator: HostSimulator
@@ -42,6 +43,7 @@ class Log:
     apart: Sequence[Trajectory]
     findings: list[str]
     left_out: list[str]
+    cut_off: tuple[str, ...] = ()
 
     def at(self, horizon: float) -> Log:
         """The same for forecasts of another length, which want other rows."""
@@ -71,7 +73,9 @@ def look(
     length = (
         held_by_records(simulator, every, horizon) if horizon else usual_horizon(simulator, every)
     )
-    log = Log(simulator, every, every, length, horizon is not None, apart, findings, []).at(length)
+    cut = tuple(found.where for found in examined.findings if found.kind == "unanswered")
+    log = Log(simulator, every, every, length, horizon is not None, apart, findings, [], cut)
+    log = log.at(length)
     for says in [*findings, *log.left_out]:
         tell(says)
     return log

@@ -21,14 +21,14 @@ Kind = Literal[
 #: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
 #: between folds or with the numerics, a push that drifts does as well, a load may be a part of it,
 #: it lies at its bound, parameters within their tolerance do as well, or there was no time to ask
-#: that, it is a time shorter than half a sample, a number is out of all proportion, one effect that
-#: differs between records does better, records that were set aside are foretold worse, or no
-#: better, its interval holds zero, few blocks of data leave much without a name, or an effect of
-#: another kind does as well.
+#: that, it is a time shorter than half a sample, the simulator may cut off what is there, a number
+#: is out of all proportion, one effect that differs between records does better, records that were
+#: set aside are foretold worse, or no better, its interval holds zero, few blocks of data leave
+#: much without a name, or an effect of another kind does as well.
 Doubt = Literal[
     "not_needed", "unsteady", "creeps", "drift", "one_way", "numerics", "at_bound", "calibration",
-    "slight", "no_time", "clock", "sensor", "conventions", "extreme", "records", "set_aside",
-    "no_help", "may_be_zero", "share_may_be_zero", "few_blocks", "rivals",
+    "slight", "no_time", "clock", "sensor", "conventions", "cut_off", "extreme", "records",
+    "set_aside", "no_help", "may_be_zero", "share_may_be_zero", "few_blocks", "rivals",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.
 WORSE = 1.05
@@ -257,6 +257,7 @@ class GapResult:
         seconds: Time spent, by stage.
         substeps: Sub-steps per control period of ``corrected``, if it needs more than it had.
         conventions: What to look at first, None where nothing is counted otherwise.
+        cut_off: Channels that the simulator cuts off within what was recorded of them.
         unlike: Effects that would take much of what is left off with a size of their own in each
             record, best first.
         nearly_late: Labels of delays and lags of some inputs that late, or filtering, sensors would
@@ -279,6 +280,7 @@ class GapResult:
     seconds: dict[str, float]
     substeps: int | None = None
     conventions: Conventions | None = None
+    cut_off: tuple[str, ...] = ()
     unlike: tuple[Unlike, ...] = ()
     nearly_late: tuple[str, ...] = ()
 

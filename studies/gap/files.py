@@ -147,6 +147,7 @@ def gap_record(
     total = sum(result.seconds.values()) if seconds is None else seconds
     return {
         "says": lead(result, config.get("tolerance")),
+        "cut_off": list(result.cut_off),
         "conventions": dataclasses.asdict(result.conventions) if result.conventions else None,
         "unlike": [dataclasses.asdict(one) for one in result.unlike],
         "verdicts": [dataclasses.asdict(verdict) for verdict in result.verdicts],

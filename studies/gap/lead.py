@@ -35,13 +35,15 @@ UNLIKE, FEW_CHANNELS = 0.2, 3
 def lead(result: GapResult, tolerance: float | None = None) -> str:
     """The first sentence: the share of the gap that has a name.
 
-    Before it, what the log may count otherwise than the simulator: no effect undoes that.
+    Before it, what the log may count otherwise than the simulator, and what the simulator may cut
+    off by mistake: no effect undoes that.
 
     Args:
         result: What was found.
         tolerance: Forecast error that does not matter.
     """
-    return _conventions(result) + _named_share(result, tolerance) + beside_lead(result)
+    first = _conventions(result) or _cut_off(result)
+    return first + _named_share(result, tolerance) + beside_lead(result)
 
 
 def _conventions(result: GapResult) -> str:
@@ -56,6 +58,17 @@ def _conventions(result: GapResult) -> str:
         f"without {changes}",
     }[other.reason]
     return f"First see whether the log counts as the simulator does: {why}. If that is not it: "
+
+
+def _cut_off(result: GapResult) -> str:
+    """What the simulator does not answer to, where something was found that may make up for it."""
+    if not result.cut_off or not result.effects:
+        return ""
+    names = listed(list(dict.fromkeys(result.cut_off)))
+    return (
+        f"First see whether the simulator is meant to cut {names} off where it does (below): what "
+        "was found may make up for it. If it is: "
+    )
 
 
 def _named_share(result: GapResult, tolerance: float | None) -> str:

@@ -41,7 +41,8 @@ def banners(result: GapResult, tolerance: float | None) -> list[Section]:
     """The first sentence, one banner per verdict, and what is too small for one."""
     worst = {verdict.kind for verdict in result.verdicts if not is_footnote(verdict)}
     tone: Tone = "good"
-    if result.conventions is not None or (not result.effects and "unexplained" in worst):
+    first = result.conventions is not None or (result.cut_off and result.effects)
+    if first or (not result.effects and "unexplained" in worst):
         tone = "bad"
     elif result.effects and worst & {"ambiguous", "unexplained"}:
         tone = "warning"

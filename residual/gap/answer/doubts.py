@@ -16,6 +16,8 @@ DOUBTS: dict[Doubt, str] = {
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps or a filter in a sensor, of half a sample or less, would do as well",
     "conventions": "it has to be seen first whether the log counts as the simulator does",
+    "cut_off": "it has to be seen first whether the simulator is meant to cut an input or a state "
+    "off where it does",
     "extreme": "a parameter or an input would be more than ten times off, or act the other way, so "
     "see first whether the simulator has it right",
     "records": "an effect with its own size in each record does better, or may be what this one "
@@ -59,6 +61,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "clock": claim.brief,
         "sensor": claim.sensor,
         "conventions": claim.counted,
+        "cut_off": claim.cut_off,
         "extreme": claim.extreme,
         "records": claim.unlike,
         "set_aside": claim.refuted,

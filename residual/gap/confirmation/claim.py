@@ -44,6 +44,7 @@ class Claim:
         unasked: Whether there was no time to ask that.
         brief: Whether it is a time too short for the log's own clock.
         counted: Whether the log may count otherwise than the simulator does.
+        cut_off: Whether the simulator stays the same beyond a value that was recorded.
         extreme: Whether a number of its set is out of all proportion to the simulator's.
         unlike: Whether it may stand for one effect in a size of its own in each record.
         refuted: Whether the corrected simulator forecasts records that were set aside worse.
@@ -74,6 +75,7 @@ class Claim:
     brief: bool = False
     sensor: bool = False
     counted: bool = False
+    cut_off: bool = False
     extreme: bool = False
     unlike: bool = False
     refuted: bool = False
@@ -105,6 +107,7 @@ class Claim:
             self.brief,
             self.sensor,
             self.counted,
+            self.cut_off,
             self.extreme,
             self.unlike,
             self.refuted,

@@ -30,6 +30,7 @@ from residual.gap.data.kinematics import kinematics
 from residual.gap.data.nominal import nominal
 from residual.gap.data.onset import begun_late
 from residual.gap.data.sizes import sizes, wrapped
+from residual.gap.data.unanswered import unanswered
 from residual.gap.data.wild_inputs import without_wild_inputs
 from residual.logs.checks import Finding
 from residual.trajectories import Trajectory
@@ -110,7 +111,7 @@ def findings(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
     found = _refusals(simulator, trajectories)
     if not found:
         checks = (sampling, bounds, speeds, sizes, wrapped, still, faults, clipped, rounded, sums,
-                  nominal)  # fmt: skip
+                  nominal, unanswered)  # fmt: skip
         found = [one for check in checks for one in check(simulator, trajectories)]
     ranks = {"refuse": 0, "warning": 1, "note": 2}
     return sorted(found, key=lambda one: ranks[one.severity])

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 def nominal(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
     """A simulator that breaks down on recorded states."""
     for run in trajectories:
-        states = _filled(simulator, run)
+        states = filled(simulator, run)
         if states is None:
             continue
         rows = np.unique(np.linspace(0, len(run) - 1, 500).astype(int))
@@ -51,7 +51,7 @@ def _listed(simulator: HostSimulator, state: Array) -> str:
     )
 
 
-def _filled(simulator: HostSimulator, run: Trajectory) -> Array | None:
+def filled(simulator: HostSimulator, run: Trajectory) -> Array | None:
     """Physical states of a run, rates that were not measured from their positions."""
     channels = simulator.physical_channels
     names = [channel.name for channel in channels]
