@@ -46,19 +46,23 @@ def creeps(search: Search, key: Key, number: int) -> bool:
     )
 
 
+def along_records(search: Search) -> Array:
+    """Where every sample lies in its record, from -1/2 to 1/2, (n,)."""
+    samples = search.fitter.samples
+    along = np.zeros(len(samples))
+    for start, stop in samples.runs:
+        times = samples.times[start:stop]
+        along[start:stop] = (times - times[0]) / max(float(np.ptp(times)), 1e-300) - 0.5
+    return along
+
+
 def _courses(search: Search) -> Iterator[Array]:
     """How a number may go over the windows, each (W,): along every record from -1/2 to 1/2, and
     otherwise in one of the records."""
-    samples, blocks = search.fitter.samples, search.fitter.blocks
+    blocks = search.fitter.blocks
     windows = blocks.windows
-    begins = samples.times[windows.index[:, 0]]
-    along = np.zeros(len(windows))
+    yield along_records(search)[windows.index[:, 0]]
     records = np.unique(windows.run)
-    for run in records:
-        own = windows.run == run
-        span = float(np.ptp(begins[own]))
-        along[own] = (begins[own] - begins[own].min()) / span - 0.5 if span > 0 else 0.0
-    yield along
     for run in records if len(records) > 1 else ():
         own = windows.run == run
         if len(np.unique(blocks.block[own])) >= FEW_OF_ONE:

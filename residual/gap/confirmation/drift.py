@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.confirmation.constancy import FEW
+from residual.gap.confirmation.constancy import FEW, along_records
 from residual.gap.confirmation.push import pushed
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.shooting import capped
@@ -80,7 +80,7 @@ class Drift:
         if key not in self._losses:
             search, fitter = self.search, self.search.fitter
             assert isinstance(fitter, SmoothFitter)
-            fit, along = search.tried[key], _along_records(search)
+            fit, along = search.tried[key], along_records(search)
             of_record = _records(fitter.blocks.windows.run)
             self._losses[key] = []
             for joint in search.simulator.joints:
@@ -124,13 +124,3 @@ def _records(run: NDArray[np.int64]) -> Array:
     if count >= ALIKE:
         own = own[:, :-1] - own[:, -1:]
     return own[:, None, :]
-
-
-def _along_records(search: Search) -> Array:
-    """Where every sample lies in its record, from -1/2 to 1/2, (n,)."""
-    samples = search.fitter.samples
-    along = np.zeros(len(samples))
-    for start, stop in samples.runs:
-        times = samples.times[start:stop]
-        along[start:stop] = (times - times[0]) / max(float(np.ptp(times)), 1e-300) - 0.5
-    return along
