@@ -177,6 +177,16 @@ def _but_worse_apart(result: GapResult) -> str:
     )
 
 
+def unborne(result: GapResult) -> bool:
+    """Whether the records that were set aside do not bear the answer out, although they could."""
+    apart = result.held_out
+    if apart is None:
+        return False
+    if not result.effects:
+        return apart.exceeds_noise(OFF)
+    return (apart.tells and not apart.helps) or bool(_but_worse_elsewhere(result, apart))
+
+
 def _but_worse_elsewhere(result: GapResult, apart: Gap) -> str:
     """The channel that the corrected simulator makes clearly worse on the records set aside, while
     the main one is better there."""

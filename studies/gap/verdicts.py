@@ -17,7 +17,7 @@ from studies.gap.answer import (
     rivals,
     sentence,
 )
-from studies.gap.lead import lead
+from studies.gap.lead import lead, unborne
 from studies.gap.words import capitalized, effect_name, names_of, set_name, unit_text
 from studies.reporting.sections import Cell, Prose, Section, Table, Verdict
 
@@ -44,7 +44,7 @@ def banners(result: GapResult, tolerance: float | None) -> list[Section]:
     first = result.conventions is not None or (result.cut_off and result.effects)
     if first or (not result.effects and "unexplained" in worst):
         tone = "bad"
-    elif result.effects and worst & {"ambiguous", "unexplained"}:
+    elif (result.effects and worst & {"ambiguous", "unexplained"}) or unborne(result):
         tone = "warning"
     sections: list[Section] = [Verdict(lead(result, tolerance), tone=tone, label="answer")]
     small = []

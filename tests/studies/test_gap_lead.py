@@ -15,6 +15,15 @@ from sims import Channel
 from studies.gap.answer import headline
 from studies.gap.lead import lead
 from studies.gap.summary import summary
+from studies.gap.verdicts import banners
+
+
+def test_what_the_simulator_may_cut_off_by_mistake_comes_first():
+    found = dataclasses.replace(result(MASS), cut_off=("torque", "torque"))
+    first, rest = lead(found).split(" If it is: ")
+    assert first.startswith("First see whether the simulator is meant to cut torque off where")
+    assert rest == lead(result(MASS))
+    assert banners(found, None)[0].tone == "bad"
 
 
 def test_what_the_log_may_count_otherwise_comes_first():
@@ -60,10 +69,12 @@ def test_the_first_sentence_says_where_the_corrected_simulator_is_no_better(
 
 def test_what_makes_no_difference_on_records_with_a_gap_of_their_own_is_said_so():
     found = result(MASS)
+    assert banners(found, None)[0].tone == "good"
     span = Span(1.0, 0.9, 1.1)
-    says = lead(
-        dataclasses.replace(found, held_out=dataclasses.replace(found.gap, before=span, after=span))
-    )
+    apart = dataclasses.replace(found.gap, before=span, after=span)
+    found = dataclasses.replace(found, held_out=apart)
+    assert banners(found, None)[0].tone == "warning"
+    says = lead(found)
     assert says.endswith(
         "The records set aside do not show it: they have a gap of their own, beside which what was "
         "found makes little difference: the 1 s error of angle is 1 rad with it and 1 rad without."
@@ -76,6 +87,7 @@ def test_records_in_which_nothing_shows_are_not_said_to_speak_against_a_name():
     before, after = Span(1.0, 0.9, 1.1), Span(1.02, 0.9, 1.1)
     apart = dataclasses.replace(found.gap, before=before, after=after, noise_floor=noise)
     says = lead(dataclasses.replace(found, held_out=apart))
+    assert banners(dataclasses.replace(found, held_out=apart), None)[0].tone == "good"
     assert "The records set aside cannot tell: there noise alone makes 1.3 rad, and" in says
     assert "not help" not in says
 
