@@ -18,10 +18,15 @@ from sims.contract import (
 )
 from sims.effects.base import Effect
 from sims.effects.library import library, typical
+from sims.effects.parameter import ParameterChange
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.findings import Finding, Findings, draw, example
 from sims.host import HostSimulator
 from sims.simulator import Array, Simulator
+
+#: Shares of a usual change of a parameter that are tried, until one stays finite: of one that is
+#: zero nobody knows what is much.
+_SHARES = (1.0, 1e-2, 1e-4)
 
 
 def check_simulator(
@@ -140,14 +145,18 @@ def _linear(simulator: EquationOfMotion, states: Array, actions: Array) -> Findi
 def _parameters(simulator: Simulator, states: Array, actions: Array) -> Iterator[Finding]:
     before = simulator.step(states, actions)
     for name, parameter in (getattr(simulator, "parameters", None) or {}).items():
-        size = np.max(np.abs(parameter.value)) or 1.0
-        value = parameter.value + 0.05 * size
-        if np.any(value > parameter.high):
-            value = parameter.value - 0.05 * size
-        try:
-            after = simulator.with_parameters(**{name: value}).step(states, actions)
-        except NotImplementedError:
-            return
+        size = np.max(np.abs(parameter.value)) or parameter.scale
+        for share in _SHARES:
+            value = parameter.value + 0.05 * share * size
+            if np.any(value > parameter.high):
+                value = parameter.value - 0.05 * share * size
+            try:
+                with np.errstate(all="ignore"):
+                    after = simulator.with_parameters(**{name: value}).step(states, actions)
+            except NotImplementedError:
+                return
+            if np.isfinite(after).all():
+                break
         yield _reaches(f"parameter {name}", before, after, f"from {parameter.value} to {value}")
 
 
@@ -161,10 +170,14 @@ def _effects(simulator: HostSimulator, rng: np.random.Generator) -> Iterator[Fin
         if not np.array_equal(absent, before):
             yield Finding(check, False, "at zero strength it changes the result")
             continue
-        some = typical(effect, plain)
-        host = plain.with_effects([some])
-        # A command that has just changed its sign shows what delays, lags and plays do.
-        after = host.step(host.augment(states, -actions), actions)[:, : states.shape[1]]
+        for share in _SHARES if isinstance(effect, ParameterChange) else (1.0,):
+            some = typical(effect, plain, share)
+            host = plain.with_effects([some])
+            # A command that has just changed its sign shows what delays, lags and plays do.
+            with np.errstate(all="ignore"):
+                after = host.step(host.augment(states, -actions), actions)[:, : states.shape[1]]
+            if np.isfinite(after).all():
+                break
         finding = _reaches(check, before, after, f"to {_strength(some)}")
         by_row = host.take(slice(None)).with_effects([_per_row(some, len(states))])
         rows = by_row.step(by_row.augment(states, -actions), actions)[:, : states.shape[1]]

@@ -223,6 +223,30 @@ def test_broken_promises_beyond_the_contract_are_named(broken, check):
     assert [finding.check for finding in findings if not finding.ok][:1] == [check]
 
 
+class SmallRotor(EquationOfMotion):
+    """Of 0.2 kg mm^2, so that a damping of 1 N m s/rad stops it in nanoseconds."""
+
+    dt = 0.05
+    state_channels = (
+        Channel("rotor", "rad", "position", angle=True),
+        Channel("rotor rate", "rad/s", "rate", rate_of="rotor", scale=10.0),
+    )
+    action_channels = (Channel("torque", "N m", "input", scale=1e-4, low=-1e-4, high=1e-4),)
+    parameters: ClassVar = {
+        "inertia": Parameter(2e-7, "kg m^2", "inertia", low=1e-9),
+        "damping": Parameter(0.0, "N m s/rad", "bearing", low=0.0),
+    }
+
+    def acceleration(self, q, v, u, force, p):
+        return (u + force - p.damping * v) / p.inertia
+
+
+def test_a_parameter_of_zero_is_tried_with_what_the_system_bears():
+    findings = check_simulator(SmallRotor())
+    assert [f.says for f in findings if not f.ok and "damping" in f.check] == []
+    assert any("parameter damping" in f.check and "moves" in f.says for f in findings)
+
+
 def test_findings_print_as_a_table():
     findings = check_simulator(Bounded())
     lines = str(findings).splitlines()
