@@ -224,16 +224,16 @@ def test_broken_promises_beyond_the_contract_are_named(broken, check):
 
 
 class SmallRotor(EquationOfMotion):
-    """Of 0.2 kg mm^2, so that a damping of 1 N m s/rad stops it in nanoseconds."""
+    """So light that a damping of 1 N m s/rad is beyond any integration step."""
 
     dt = 0.05
     state_channels = (
         Channel("rotor", "rad", "position", angle=True),
         Channel("rotor rate", "rad/s", "rate", rate_of="rotor", scale=10.0),
     )
-    action_channels = (Channel("torque", "N m", "input", scale=1e-4, low=-1e-4, high=1e-4),)
+    action_channels = (Channel("torque", "N m", "input", scale=1e-11, low=-1e-11, high=1e-11),)
     parameters: ClassVar = {
-        "inertia": Parameter(2e-7, "kg m^2", "inertia", low=1e-9),
+        "inertia": Parameter(2e-14, "kg m^2", "inertia", low=1e-16),
         "damping": Parameter(0.0, "N m s/rad", "bearing", low=0.0),
     }
 
