@@ -31,7 +31,8 @@ def check_same_channels(
 ) -> None:
     """Raise ``ValueError`` unless both have one period and the same channels.
 
-    The same: names in order, units, which are angles, and bounds of actions.
+    The same: names in order, units (of actions as far as they have one), which are angles, and
+    bounds of actions.
 
     Args:
         nominal, other: The two.
@@ -52,7 +53,9 @@ def check_same_channels(
         for expected, found in zip(own, others, strict=True):
             for field in fields:
                 wanted, given = getattr(expected, field), getattr(found, field)
-                if wanted != given:
+                # A command without a unit, as that of a gear of 0.85 in MuJoCo, is one of any.
+                unknown = kind == "action_channels" and field == "unit" and "1" in (wanted, given)
+                if wanted != given and not unknown:
                     raise ValueError(
                         f"{what} has channel {found.name!r} with {field}={given!r}, expected "
                         f"{wanted!r} as {nominal.name}"

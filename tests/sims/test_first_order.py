@@ -32,6 +32,14 @@ class Heater(FirstOrderSystem):
         return ((u[:, 0] - p.loss * x[:, 0]) / p.capacity)[:, None]
 
 
+def test_a_state_of_ones_own_is_not_declared_as_what_effects_remember():
+    class Walled(Heater):
+        state_channels = (*Heater.state_channels, Channel("wall", "K", "memory"))
+
+    with pytest.raises(ValueError, match="channel 'wall' is of kind 'memory', which effects"):
+        Walled()
+
+
 def test_first_order_system_follows_its_closed_form():
     heater = Heater(effects=[ConstantLoad("temperature", 0.1)])
     after = heater.step([[0.0], [30.0]], [[10.0], [0.0]])

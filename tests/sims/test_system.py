@@ -1,5 +1,7 @@
 """A system says what fits together."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from foreign import Foreign
@@ -100,6 +102,18 @@ def test_a_true_simulator_in_other_units_is_refused(channel, says):
     true.action_channels = (Channel("voltage", "V", "input", low=-6.0, high=6.0),)
     with pytest.raises(ValueError, match=r"'voltage' with low=-6.0, expected -3.0 as pendulum"):
         System("mine", Pendulum(), true, SwingUp())
+
+
+@pytest.mark.parametrize(("unit", "refused"), [("1", False), ("mV", True)])
+def test_a_command_without_a_unit_is_one_of_any(unit, refused):
+    true = Pendulum.true()
+    (action,) = true.action_channels
+    true.action_channels = (dataclasses.replace(action, unit=unit),)
+    if refused:
+        with pytest.raises(ValueError, match="'voltage' with unit='mV', expected 'V'"):
+            System("mine", Pendulum(), true, SwingUp())
+    else:
+        System("mine", Pendulum(), true, SwingUp()).check()
 
 
 def test_policies_see_a_true_simulator_in_the_scales_that_they_learnt_on():
