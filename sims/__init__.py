@@ -17,14 +17,15 @@ if TYPE_CHECKING:
     from sims.leo import Leo, Walking
     from sims.loading import load_simulator
     from sims.pendulum import Pendulum
+    from sims.protocol import EvaluationProtocol
     from sims.simulator import Channel, Parameter, Simulator
-    from sims.system import EvaluationProtocol, System
+    from sims.system import System
     from sims.tasks import SwingUp, Task
 
 _HOMES = {
     "Channel": "simulator",
     "EquationOfMotion": "equations",
-    "EvaluationProtocol": "system",
+    "EvaluationProtocol": "protocol",
     "FirstOrderSystem": "equations",
     "Leo": "leo",
     "Parameter": "simulator",

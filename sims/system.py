@@ -12,6 +12,7 @@ import numpy as np
 from sims.contract import refuse_unsound
 from sims.environment import SimulatorEnv
 from sims.measured import MeasuredEnv, Measurement
+from sims.protocol import EvaluationProtocol
 from sims.same_channels import check_same_channels, seen_as
 from sims.sampled import SampledEnv, StateOf
 from sims.simulator import Array, Simulator, physical
@@ -21,64 +22,8 @@ from sims.unsound import Unsound, answered, cannot_call
 
 # Up to so many state channels are reported one by one, more by their kind.
 _FEW = 6
-# Of a protocol, what may be left out.
-_MAY_BE_NONE = ("noisy", "final_episodes")
 #: Starts of a test on the true system where they differ.
 USUAL_STARTS = 5
-
-
-@dataclasses.dataclass(frozen=True)
-class EvaluationProtocol:
-    """How policies are tested while they learn and afterwards, and where accuracy is measured.
-
-    Tests on a simulator are free. Tests on the true system are not counted as samples, as in the
-    paper.
-
-    Args:
-        every: Steps of learning on a simulator between tests.
-        every_true: The same on the true system.
-        episodes: Rollouts without noise per test, each from its own start state.
-        noisy: Rollouts with a little noise per test on a model; they keep a policy from being
-            chosen for one lucky path through the model's errors.
-        finalists: How many of the best policies of a training are tested once more at its end.
-        final_episodes: Rollouts of each of them, from other starts; 0 for no final.
-        true_episodes: Rollouts of the policy kept on the true system: the result. All policies of
-            a seed begin in the same states. None: 5, or 1 where every reset gives the same state.
-        visited_seconds: Accuracy is measured over this many first seconds of fresh rollouts, at
-            least 20 control periods.
-        visited_rollouts: How many of those.
-        visited_stride: Open-loop predictions start at every n-th state of them, this being n.
-    """
-
-    every: int = 500
-    every_true: int = 250
-    episodes: int = 1
-    noisy: int = 3
-    finalists: int = 1
-    final_episodes: int = 0
-    true_episodes: int | None = None
-    # Later a good policy balances, where there is next to nothing to predict.
-    visited_seconds: float = 2.0
-    visited_rollouts: int = 5
-    visited_stride: int = 1
-
-    def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            value, least = getattr(self, field.name), 0 if field.name in _MAY_BE_NONE else 1
-            if field.name == "visited_seconds" or (value is None and field.default is None):
-                continue
-            whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-            if not whole or value < least:
-                raise ValueError(
-                    f"EvaluationProtocol: {field.name} is {value!r}, expected a whole number from "
-                    f"{least}"
-                )
-
-    def __repr__(self) -> str:
-        # What is as by default tells nothing.
-        values = ((f.name, getattr(self, f.name), f.default) for f in dataclasses.fields(self))
-        changed = ", ".join(f"{name}={now!r}" for name, now, usual in values if now != usual)
-        return f"{type(self).__name__}({changed})"
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -118,7 +63,7 @@ class System:
     nominal: Simulator
     true: Simulator | gymnasium.Env[Any, Any] | Callable[[], Any]
     task: Task
-    evaluation: EvaluationProtocol = EvaluationProtocol()
+    evaluation: EvaluationProtocol = dataclasses.field(default_factory=EvaluationProtocol)
     state_of: StateOf | None = None
     measures: Callable[[Array, Array], Mapping[str, float]] | None = None
     groups: Mapping[str, tuple[str, ...]] | None = None
@@ -267,6 +212,7 @@ class System:
             "groups": {name: list(part) for name, part in self.channel_groups().items()},
             "shown": list(self.shown or [channel.name for channel in channels[:3]]),
             "path": list(self.path or []),
+            "visited_seconds": self.evaluation.visited_seconds,
             "target": self.target,
             "best": self.best,
             "published": dict(self.published),

@@ -24,8 +24,9 @@ from sklearn.base import BaseEstimator
 from policy.config import DDPGConfig
 from policy.learner import OURS, Algorithm
 from residual.estimator import check_regressor
+from sims.protocol import EvaluationProtocol
 from sims.simulator import Simulator
-from sims.system import EvaluationProtocol, System
+from sims.system import System
 from sims.tasks import Task
 from studies.learning.budget import Budget
 from studies.learning.kept import OnDisk

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from policy.evaluate import Policy, rollout
 from policy.learner import Algorithm
@@ -11,6 +15,11 @@ from residual.corrected import CorrectedSimulator
 from sims.simulator import Simulator
 from sims.system import System
 from studies.learning.training import exploration, visited
+
+Array = NDArray[np.float64]
+
+#: States at most that open-loop predictions start at, unless a system says otherwise.
+STARTS = 1000
 
 
 def where_it_goes(
@@ -27,8 +36,10 @@ def where_it_goes(
     """
     protocol = system.evaluation
     env = system.true_environment(corrected)
-    # Long enough for the longest of the usual horizons.
-    steps = max(*LEAST_STEPS, round(protocol.visited_seconds / corrected.dt))
+    steps = None
+    if protocol.visited_seconds is not None:
+        # Long enough for the longest of the usual horizons.
+        steps = max(*LEAST_STEPS, round(protocol.visited_seconds / corrected.dt))
     runs = [rollout(policy, env, seed, max_steps=steps)]
     runs += [
         rollout(policy, env, seed + k, exploration(system, algorithm, seed + k), steps)
@@ -36,7 +47,7 @@ def where_it_goes(
     ]
     # One that fell ends early, and is as long as it is.
     states, actions = [visited(system, run) for run in runs], [run.actions for run in runs]
-    return accuracy_along(corrected, states, actions, stride=protocol.visited_stride)
+    return accuracy_along(corrected, states, actions, stride=_stride(system, actions))
 
 
 def anywhere(system: System, corrected: CorrectedSimulator, seed: int) -> Accuracy | None:
@@ -55,4 +66,10 @@ def anywhere(system: System, corrected: CorrectedSimulator, seed: int) -> Accura
     else:
         return None
     states = states[..., : len(system.nominal.state_channels)]
-    return accuracy_along(corrected, states, actions, stride=system.evaluation.visited_stride)
+    return accuracy_along(corrected, states, actions, stride=_stride(system, actions))
+
+
+def _stride(system: System, actions: Array | Sequence[Array]) -> int:
+    """Every how manieth state predictions start at."""
+    most = system.evaluation.visited_stride
+    return most or math.ceil(sum(map(len, actions)) / STARTS)

@@ -130,6 +130,8 @@ def accuracy_section(errors: pd.DataFrame, about: About) -> list[Section]:
     found = (re.match(r"([\d.e+-]+s)_", str(name)) for name in errors.columns)
     horizons = list(dict.fromkeys(match[1] for match in found if match))
     groups, table = list(about["groups"]), []
+    seconds = about.get("visited_seconds")
+    first = "" if seconds is None else f"the first {seconds:g} s of "
     keys = ["estimator", "true_samples", "iteration", "where"]
     for _, part in errors.groupby(keys, sort=False):
         estimator, samples, update, where = part.iloc[0][keys]
@@ -148,9 +150,9 @@ def accuracy_section(errors: pd.DataFrame, about: About) -> list[Section]:
              *(f"all, {h.replace('s', ' s')}" for h in horizons), "90 % coverage", "fit s"],
             table,
             "Errors as shares of the gap without the model (1 is as bad as no model), with several "
-            "seeds their mean and its 95 % interval: along the first seconds of fresh rollouts of "
-            "the policy that was trained on the model, and from states drawn anywhere where the "
-            "true system can be set; coverage of the predicted 90 % interval.",
+            f"seeds their mean and its 95 % interval: along {first}fresh rollouts of the policy "
+            "that was trained on the model, and from states drawn anywhere where the true system "
+            "can be set; coverage of the predicted 90 % interval.",
             heading="Where the difference model is right",
         )
     ]  # fmt: skip

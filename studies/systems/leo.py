@@ -6,8 +6,9 @@ import numpy as np
 
 from sims.leo import Leo, Walking, measure_walk
 from sims.leo.body import MOTORS, clearance
+from sims.protocol import EvaluationProtocol
 from sims.simulator import Array
-from sims.system import EvaluationProtocol, System
+from sims.system import System
 
 # Learning curves jump by hundreds between tests, so every test is several walks, and of the three
 # policies that walked best on their own model the one is kept that walks best from other starts.

@@ -10,8 +10,9 @@ import sims
 from sims.equations import EquationOfMotion
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
+from sims.protocol import EvaluationProtocol
 from sims.simulator import Channel
-from sims.system import EvaluationProtocol, System
+from sims.system import System
 from sims.tasks import SwingUp, Task
 
 
@@ -161,9 +162,10 @@ def test_a_class_in_place_of_an_object_is_told():
 
 @pytest.mark.parametrize("wrong", [
     {"every": 0}, {"true_episodes": 0}, {"episodes": 1.5}, {"noisy": -1}, {"finalists": True},
+    {"visited_stride": 0}, {"visited_seconds": 0.0}, {"visited_seconds": "2 s"},
 ])  # fmt: skip
 def test_a_protocol_that_tests_nothing_is_refused(wrong):
     (name,) = wrong
-    with pytest.raises(ValueError, match=f"EvaluationProtocol: {name} is .*expected a whole"):
+    with pytest.raises(ValueError, match=f"EvaluationProtocol: {name} is .*expected (a whole|sec)"):
         EvaluationProtocol(**wrong)
     assert EvaluationProtocol(noisy=0, true_episodes=None).noisy == 0

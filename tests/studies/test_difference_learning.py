@@ -13,7 +13,8 @@ from sims import Channel, FirstOrderSystem, Parameter
 from sims.effects import ActuatorLag
 from sims.environment import SimulatorEnv
 from sims.pendulum_equation import PendulumEquation
-from sims.system import EvaluationProtocol, System
+from sims.protocol import EvaluationProtocol
+from sims.system import System
 from sims.tasks import SwingUp, Task
 from studies.learning import steps as steps_module
 from studies.learning import streams, training

@@ -5,7 +5,7 @@ import pytest
 from policy import DDPGConfig
 from residual import Linear
 from sims.pendulum import Pendulum
-from sims.system import EvaluationProtocol
+from sims.protocol import EvaluationProtocol
 from sims.tasks import SwingUp
 from studies.learning.budget import Budget
 from studies.learning.loop import learn_by_difference
