@@ -25,6 +25,7 @@ from residual.gap.fitting.smooth import LEAD, SmoothFitter
 from residual.gap.model import paths
 from residual.gap.model.candidates import Candidate
 from residual.gap.model.model import Model
+from residual.gap.preparation.between_rows import read_closer
 from residual.gap.preparation.effort import Effort
 from residual.gap.preparation.numerics import (
     enough_for,
@@ -144,6 +145,8 @@ def smooth_fitter(
     nodes = paths.measured(model, samples, np.zeros(0))
     scale = _scales(simulator, samples, nodes)
     floor = noise.estimate(model, samples, nodes, np.zeros(0), noise.local_noise(samples), scale)
+    closer = read_closer(simulator, trajectories, floor, stride, scale)
+    floor = dataclasses.replace(floor, sigma=closer.sigma, error=closer.error)
     seconds = horizon / (1 - LEAD)
     sigma = np.maximum(floor.sigma, _least(samples, scale))
     sigma = noise.with_walks(simulator, samples, sigma, seconds)

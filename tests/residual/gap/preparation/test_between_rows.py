@@ -1,0 +1,68 @@
+"""Noise of thinned logs: a vibration between their rows is none, and a slow sensor has no less."""
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from residual.gap import find_gap
+from residual.trajectories import Trajectory
+from sims import Channel, EquationOfMotion, Parameter
+
+NOISE = 2e-5
+
+
+class Gantry(EquationOfMotion):
+    dt = 0.01
+    state_channels = (
+        Channel("x", "m", "position", scale=0.3),
+        Channel("x rate", "m/s", "rate", rate_of="x", scale=0.5),
+    )
+    action_channels = (Channel("force", "N", "input", scale=30.0, low=-80.0, high=80.0),)
+    parameters = {
+        "mass": Parameter(9.0, "kg", "moving mass", low=0.1),
+        "damping": Parameter(20.0, "N s/m", "bearings", low=0.0),
+    }
+
+    def acceleration(self, q, v, u, force, p):
+        return ((u[:, 0] + force[:, 0] - p.damping * v[:, 0]) / p.mass)[:, None]
+
+
+def forces(seed, n):
+    """Steps of 0.2 to 0.9 s."""
+    rng = np.random.default_rng(seed)
+    held = rng.integers(20, 90, n // 20)
+    return np.repeat(rng.uniform(-45, 45, len(held)), held)[:n]
+
+
+def run(seed, coupling=None, noise=NOISE, hold=1, n=1500):
+    """A log of a gantry by SciPy; with a coupling (stiffness, damping) 4 of its 9 kg hang on it."""
+    force = forces(seed, n)
+    rng = np.random.default_rng(100 + seed)
+    k, c = coupling or (0.0, 0.0)
+    own, load = (5.0, 4.0) if coupling else (9.0, 1.0)
+
+    def slope(t, y):
+        x, v, z, w = y
+        f = force[min(int(t / 0.01 + 1e-9), n - 1)]
+        pull = k * (z - x) + c * (w - v)
+        return [v, (f - 20.0 * v + pull) / own, w, -pull / load]
+
+    times = 0.01 * np.arange(n + 1)
+    found = solve_ivp(slope, (0, times[-1]), np.zeros(4), t_eval=times, rtol=1e-7, atol=1e-10,
+                      max_step=0.01)  # fmt: skip
+    x = found.y[0] + noise * rng.standard_normal(n + 1)
+    x = np.repeat(x[::hold], hold)[: n + 1]
+    states = np.stack([x, np.full(n + 1, np.nan)], axis=1)
+    return Trajectory(f"run {seed}", times, states, force[:, None])
+
+
+def test_a_vibration_between_the_rows_is_no_noise():
+    found = find_gap(Gantry(), [run(seed, (1600.0, 6.0)) for seed in (0, 1)])
+    (sigma, _) = found.noise["x"]
+    assert NOISE / 2 < sigma < 3 * NOISE
+    assert found.gap.before.value > 10 * sigma
+    assert not [v for v in found.verdicts if v.kind in ("no_gap", "confirmed")]
+
+
+def test_noise_of_a_slow_sensor_is_not_read_between_its_readings():
+    (sigma, _) = find_gap(Gantry(), [run(seed, noise=0.01, hold=16) for seed in (0, 1)]).noise["x"]
+    assert sigma > 0.005
