@@ -8,6 +8,7 @@ percent off, a store so slow that it never fills.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,9 @@ from residual.gap.search.significance import size
 
 Array = NDArray[np.float64]
 
+#: Part of what is left beside a constant push that one which drifts may leave, from which on sizes
+#: have to hold beside it, too.
+MUCH = 0.5
 #: Records of which it is no chance that a push grows alike in all.
 ALIKE = 3
 #: Rounds of weighing windows by what is left of them.
@@ -30,10 +34,11 @@ TURNS = 8
 
 
 class Fall(NamedTuple):
-    """What a set leaves beside a push, and the numbers of that."""
+    """What a set leaves beside a push, the numbers of that, and the set's own there, (p,)."""
 
     loss: float
     numbers: int
+    theta: Array
 
 
 class Drift:
@@ -74,6 +79,20 @@ class Drift:
             for constant, drifting in self._with_push(k)
         )
 
+    def sizes(self, key: Key) -> list[Array]:
+        """The numbers of a set beside pushes that drift, (p,) each, where these take much off.
+
+        What grows along a record moves sizes, too, that nothing else would replace.
+        """
+        search = self.search
+        if not isinstance(search.fitter, SmoothFitter) or len(search.fitter.blocks) < FEW:
+            return []
+        return [
+            drifting.theta
+            for constant, drifting in self._with_push(key)
+            if drifting.loss < MUCH * constant.loss
+        ]
+
     def _with_push(self, key: Key) -> list[tuple[Fall, Fall]]:
         """What a set leaves beside a constant push on each joint, and beside one that grows in each
         record in its own way, too."""
@@ -87,32 +106,32 @@ class Drift:
                 pushes = [pushed(fitter, fit, joint.name, share) for share in (None, along)]
                 pushes[1] = pushes[1] * of_record
                 constant, drifting = (
-                    Fall(
-                        _least_loss(fit, np.concatenate([fit.by_knob, *some], axis=2), fitter.cap),
-                        sum(columns.shape[2] for columns in some),
-                    )
-                    for some in (pushes[:1], pushes)
+                    _beside(fit, some, fitter.cap) for some in (pushes[:1], pushes)
                 )
                 self._losses[key].append((constant, drifting))
         return self._losses[key]
 
 
-def _least_loss(fit: Fit, columns: Array, cap: float) -> float:
-    """Loss that columns (W, R, c) leave of a fit, in the linear picture; what weighed little before
-    them may count in full beside them, so weights follow."""
+def _beside(fit: Fit, pushes: Sequence[Array], cap: float) -> Fall:
+    """A fit beside pushes (W, R, c), in the linear picture; what weighed little without them may
+    count in full beside them, so weights follow."""
+    columns = np.concatenate([fit.by_knob, *pushes], axis=2)
     size = np.sqrt(np.maximum((columns**2).sum(axis=(0, 1)), 1e-300))
     columns = columns / size
     grams = columns.transpose(0, 2, 1) @ columns
     rights = np.einsum("wrc,wr->wc", columns, fit.projected)
     costs = (fit.projected**2).sum(axis=1)
-    weights, least = fit.weights, fit.merit
+    weights, least, best = fit.weights, fit.merit, np.zeros(columns.shape[2])
     for _ in range(TURNS):
         matrix = np.einsum("wij,w->ij", grams, weights)
         step = np.linalg.pinv(matrix, rcond=1e-12) @ (weights @ rights)
         left = np.maximum(costs - 2 * rights @ step + grams @ step @ step, 0.0)
         weights = np.minimum(1.0, cap / np.maximum(left, 1e-300))
-        least = min(least, float(capped(left, cap).sum()))
-    return least
+        loss = float(capped(left, cap).sum())
+        if loss < least:
+            least, best = loss, step / size
+    own = fit.by_knob.shape[2]
+    return Fall(least, columns.shape[2] - own, fit.theta + best[:own])
 
 
 def _records(run: NDArray[np.int64]) -> Array:

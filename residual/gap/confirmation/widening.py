@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from residual.gap.confirmation.certainty import CLEARLY, HOPELESS, ratio, where_it_matters
 from residual.gap.confirmation.claim import Claim
+from residual.gap.confirmation.drift import Drift
 from residual.gap.fitting.bounded import bounded_step
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.intervals import deviations
@@ -56,6 +57,7 @@ def widened(
         half = np.hypot(own[: len(middle)], by_parameters(beside, len(middle)))
     freed = np.stack([middle - half, middle + half], axis=1)
     forecast_best = functools.cache(lambda smaller: best_forecasts(search, smaller))
+    drifts = [] if adequate else Drift(search).sizes(key)
     told = []
     for claim in claims:
         smaller, theta = search.merged(
@@ -65,6 +67,7 @@ def widened(
         best = forecast_best(smaller) if search.sound(smaller) else None
         claim = _widened(search, key, claim, freed, smaller, best)
         claim = _beside_rivals(search, key, claim, claims)
+        claim = _beside_drifts(search, key, claim, drifts)
         told.append(claim if adequate else _of_a_misfit(search, key, claim))
     return told
 
@@ -108,6 +111,22 @@ def _beside_rivals(search: Search, key: Key, claim: Claim, claims: Sequence[Clai
                 low=min(n.low, max(value - reach, knob.low)),
                 high=max(n.high, min(value + reach, knob.high)),
             )
+    return dataclasses.replace(claim, numbers=numbers)
+
+
+def _beside_drifts(search: Search, key: Key, claim: Claim, drifts: Sequence[Array]) -> Claim:
+    """A claim with intervals that hold the numbers of the set beside pushes that drift, (p,)."""
+    fit, numbers = search.tried[key], dict(claim.numbers)
+    half = 1.96 * deviations(fit, search.fitter.blocks)
+    for j in np.flatnonzero(fit.model.owner == key.index(claim.number)):
+        knob = fit.model.knobs[j]
+        n = numbers[knob.field]
+        ends = [
+            float(np.clip(t[j] + s * half[j], knob.low, knob.high)) for t in drifts for s in (-1, 1)
+        ]
+        numbers[knob.field] = dataclasses.replace(
+            n, low=min([n.low, *ends]), high=max([n.high, *ends])
+        )
     return dataclasses.replace(claim, numbers=numbers)
 
 

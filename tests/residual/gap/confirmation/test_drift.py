@@ -89,3 +89,49 @@ def test_of_three_records_what_grows_alike_in_all_is_left(records, left):
     alike = np.ones(records)
     by_columns = columns @ np.linalg.lstsq(columns, alike, rcond=None)[0]
     np.testing.assert_allclose(alike - by_columns, left, atol=1e-12)
+
+
+class Car(FirstOrderSystem):
+    """Speed by traction, without the drag of the air."""
+
+    dt = 0.1
+    state_channels = (Channel("speed", "m/s", "rate", scale=15.0),)
+    action_channels = (Channel("traction", "N", "input", scale=2000.0),)
+    parameters: ClassVar = {
+        "mass": Parameter(1200.0, "kg", "mass", low=10.0),
+        "roll": Parameter(0.12, "m/s^2", "rolling resistance", low=0.0),
+    }
+
+    def derivative(self, x, u, p):
+        return (u[:, 0] / p.mass - p.roll)[:, None]
+
+
+def driven(seed, wind, n=1800, drag=3.5e-4):
+    """A drive against a head wind that rises steadily from none, by Euler in 10 ms."""
+    rng = np.random.default_rng(seed)
+    traction = np.repeat(rng.uniform(-300, 2500, n // 60), 60)
+    speed, seen = 8.0, []
+    for k in range(n):
+        seen.append(speed)
+        for part in range(10):
+            air = speed + wind * (k + part / 10) / n
+            speed += 0.01 * (traction[k] / 1200 - 0.12 - drag * air * abs(air))
+    times = 0.1 * np.arange(n)
+    states = np.array(seen)[:, None] + 0.05 * rng.standard_normal((n, 1))
+    return Trajectory(f"drive {seed}", times, states, traction[:-1, None])
+
+
+def test_the_size_of_drag_holds_beside_a_wind_that_rises():
+    found = find_gap(Car(), [driven(seed, wind=8.0) for seed in (0, 1)])
+    drags = [v for v in found.verdicts if v.effect == "quadratic_drag"]
+    assert drags
+    for verdict in drags:
+        (size,) = verdict.parameters.values()
+        assert size.low < 3.5e-4 < size.high
+    (calm,) = [
+        v
+        for v in find_gap(Car(), [driven(seed, wind=0.0) for seed in (0, 1)]).verdicts
+        if v.effect == "quadratic_drag"
+    ]
+    (size,) = calm.parameters.values()
+    assert calm.kind == "confirmed" and size.low < 3.5e-4 < size.high < 4.2e-4
