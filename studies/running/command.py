@@ -9,7 +9,7 @@ import re
 import sys
 import typing
 from argparse import RawDescriptionHelpFormatter
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -21,14 +21,18 @@ from simgap_files import safe_yaml
 from sims.loading import in_file, not_found
 from sims.model_files import located, model_settings, names_model
 from sims.trust import check_file, named_packages, trusting
+from studies.running.classes import (
+    CLASSES,
+    IMPORT_PATH,
+    SIMULATORS,
+    class_of_word,
+    without_replaced,
+)
 from studies.running.ending import DEBUG, DEBUG_VARIABLE, TRUST, typed
 
-_SIMULATORS = ("--simulator", "--corrected")
-_CLASSES = (*_SIMULATORS, "--estimator")
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 # How jsonargparse begins a list of all classes that it knows.
 _LISTED = ", known subclasses: "
-_IMPORT_PATH = re.compile(r"\w+(\.\w+)+")
 # What numbers of these types are, in words.
 _NUMBERS: dict[Any, str] = {
     PositiveFloat: "a number above 0",
@@ -83,10 +87,12 @@ class Parser(jsonargparse.ArgumentParser):
                     value = "".join(given[i + 1 : i + 2])
                 _check_given(name, value)
                 _check_number(name, value, kinds.get(name))
-                if name in _SIMULATORS and equals:
+                if name in SIMULATORS and equals:
                     given[i] = f"{name}={_simulator(value)}"
-                elif name in _SIMULATORS and i + 1 < len(given):
+                elif name in SIMULATORS and i + 1 < len(given):
                     given[i + 1] = _simulator(given[i + 1])
+            contents = [inside for option, inside in _READ.values() if option == "config"]
+            self._without_usual([*map(class_of_word, given), *contents])
             return super().parse_args(given, *rest, **options)
         except ValueError as error:
             self.error(str(error), error)
@@ -95,6 +101,7 @@ class Parser(jsonargparse.ArgumentParser):
         """As usual; a robot's model file may stand where a simulator is expected."""
         given = _with_models(cfg_obj) if isinstance(cfg_obj, Mapping) else cfg_obj
         self._given = given
+        self._without_usual([given])
         return super().parse_object(given, *rest, **options)
 
     def parse_string(self, content: str, path: Any = "", *rest: Any, **options: Any) -> Any:
@@ -108,8 +115,18 @@ class Parser(jsonargparse.ArgumentParser):
             found = located(given, str(path)) if path and names_model(given) else given
             if isinstance(found, dict):
                 found = _with_models(found, Path(str(path)).parent if path else None)
+                found = without_replaced(found, self._words)
         content = content if found == given else yaml.safe_dump(found)
         return super().parse_string(content, path, *rest, **options)
+
+    def _without_usual(self, contents: Iterable[Any]) -> None:
+        """Forget the usual class of an option for which one was given; see ``classes``."""
+        for content in contents:
+            for option in CLASSES:
+                name = option.removeprefix("--")
+                chosen = content.get(name) if isinstance(content, Mapping) else None
+                if chosen is not None and self.get_defaults().get(name) is not None:
+                    self.set_defaults(**{name: None})
 
     def plain(self, given: Any) -> dict[str, Any]:
         """What was parsed as plain values, every default filled in: as a config file would say."""
@@ -207,7 +224,7 @@ def _with_lists(arguments: Sequence[str], lists: Container[str]) -> list[str]:
 def _with_models(given: Mapping[str, Any], folder: Path | None = None) -> dict[str, Any]:
     """Settings with a simulator where a robot's model file, maybe in a folder, stood for one."""
     found = dict(given)
-    for option in _SIMULATORS:
+    for option in SIMULATORS:
         key = option.removeprefix("--")
         value = found.get(key)
         if isinstance(value, str):
@@ -235,8 +252,8 @@ def _check_given(name: str, value: str) -> None:
             _READ[value] = (name.removeprefix("--"), safe_yaml.read(value))
         except ValueError as error:
             raise ValueError(f"{name} {error}") from None
-    elif name in _CLASSES:
-        path = _IMPORT_PATH.fullmatch(value) and not Path(value).exists()
+    elif name in CLASSES:
+        path = IMPORT_PATH.fullmatch(value) and not Path(value).exists()
         lacking = in_file(value) or (not_found(value) if path else "")
     if lacking:
         raise ValueError(f"{name}: {lacking}")
