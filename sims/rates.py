@@ -14,7 +14,9 @@ SPAN = 20
 #: Mean way over so long, in scales of the channel, that is motion and not noise.
 MOTION = 0.05
 #: Part of the way that positions may miss, and that the simulator's own steps may.
-TRUE, OWN = 0.5, 0.1
+TRUE, OWN = 0.4, 0.1
+#: Part of the way that is still missed with rates multiplied, up to which only their scale is off.
+SCALED = 0.1
 
 
 def refuse_unrelated_rates(
@@ -58,7 +60,7 @@ def refuse_unrelated_rates(
                 f"{what}: {names[position]!r} does not move as {names[rate]!r} says, {missed:.0%} "
                 f"of the way is missed (by {nominal.name} {own:.0%}): the columns of the state are "
                 f"in another order or unit than {', '.join(names)}, or the control period is not "
-                f"{nominal.dt:g} s"
+                f"{nominal.dt:g} s{_perhaps(ways, nominal.dt)}"
             )
 
 
@@ -69,6 +71,15 @@ def _ways(states: Array, position: int, rate: int, dt: float) -> Array:
     summed = np.concatenate([[0.0], by_rate])
     ends = [values[span:] - values[:-span] for values in (states[:, position], summed)]
     return np.stack(ends, axis=1) if span else np.zeros((0, 2))
+
+
+def _perhaps(ways: Sequence[Array], dt: float) -> str:
+    """By how much rates or the period would be off, if that were all."""
+    moved, by_rate = np.concatenate(ways).T
+    times = float(moved @ by_rate / (by_rate @ by_rate))
+    if times <= 0 or _missed([np.stack([moved, times * by_rate], axis=1)])[0] > SCALED:
+        return ""
+    return f" (it moves {times:.3g} times as far, as in periods of {times * dt:.3g} s)"
 
 
 def _missed(ways: Sequence[Array]) -> tuple[float, float]:

@@ -77,6 +77,7 @@ class System:
     measurement: Measurement = dataclasses.field(default_factory=Measurement)
 
     def __post_init__(self) -> None:
+        self._refuse_kinds()
         if not isinstance(self.nominal, Simulator):
             raise ValueError(
                 f"system {self.name}: nominal is {_kind(self.nominal)}, expected a Simulator: "
@@ -99,6 +100,26 @@ class System:
                 f"system {self.name}: no state channel {', '.join(unknown)}, only "
                 f"{', '.join(names)}"
             )
+
+    def _refuse_kinds(self) -> None:
+        """Refuse what is of another kind than it should be."""
+        if not isinstance(self.name, str):
+            raise ValueError(f"system {self.name!r}: name is {_kind(self.name)}, expected a text")
+        if not isinstance(self.evaluation, EvaluationProtocol):
+            raise ValueError(
+                f"system {self.name}: evaluation is {_kind(self.evaluation)}, expected an "
+                "EvaluationProtocol: EvaluationProtocol(every=1000)"
+            )
+        takes = {"state_of": "env, observation", "measures": "states, actions", "elsewhere": "rng"}
+        for name, arguments in takes.items():
+            if (given := getattr(self, name)) is None:
+                continue
+            problem = cannot_call(given, *arguments.split(", ")) if callable(given) else "is none"
+            if problem:
+                raise ValueError(
+                    f"system {self.name}: {name} is {_kind(given)}, expected a function "
+                    f"{name}({arguments})" + (f": {problem}" if callable(given) else "")
+                )
 
     def __repr__(self) -> str:
         true = getattr(self.true, "name", None) or type(self.true).__name__
@@ -165,6 +186,11 @@ class System:
                     f"system {self.name}: action channel {channel.name!r} is bounded by "
                     f"{channel.low:g} and {channel.high:g}, but policies act between bounds: give "
                     "its Channel a finite low= and high="
+                )
+            if not channel.low < channel.high:
+                raise Unsound(
+                    f"system {self.name}: action channel {channel.name!r} can only be "
+                    f"{channel.low:g}: give its Channel a low= below its high="
                 )
         try:
             refuse_unsound_task(self.task, self.nominal)

@@ -39,9 +39,10 @@ class Budget:
         for field in dataclasses.fields(self):
             least = 2 if field.name == "true_samples" else 0
             value = getattr(self, field.name)
-            if not isinstance(value, int) or value < least:
+            whole = isinstance(value, int) and not isinstance(value, bool)
+            if not whole or value < least:
                 raise ValueError(
-                    f"budget.{field.name} is {value}, expected a number of at least {least}"
+                    f"budget.{field.name} is {value!r}, expected a whole number from {least}"
                 )
 
     def check(self, algorithm: Algorithm, replay_is_filled: bool, corrected: bool = False) -> None:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, get_args, runtime_checkable
 
 import numpy as np
 from sklearn.base import BaseEstimator
@@ -34,6 +34,9 @@ from studies.learning.outcome import Learnt
 from studies.learning.steps import Steps
 from studies.learning.warm_start import ReplayRule, WarmStart
 from studies.running.progress import Bars, Progress
+
+#: Samples for an update, updates, and steps of a training, unless a budget says otherwise.
+USUAL = (450, 2, 20_000)
 
 
 def run_loop(steps: Steps, budget: Budget, corrected: Simulator | None = None) -> Learnt:
@@ -82,9 +85,9 @@ def learn_by_difference(
     task: Task,
     *,
     estimator: BaseEstimator | None = None,
-    samples: int = 450,
-    updates: int = 2,
-    steps: int = 20_000,
+    samples: int = USUAL[0],
+    updates: int = USUAL[1],
+    steps: int = USUAL[2],
     seed: int = 0,
     learner: str | type = OURS,
     learner_options: Mapping[str, Any] | None = None,
@@ -119,7 +122,8 @@ def learn_by_difference(
             difference model; 0 learns as in the paper.
         evaluation: How policies are tested.
         state_of: Reads the state of ``true``, see ``System``.
-        budget: In place of ``samples``, ``updates`` and ``steps``, with baselines if wanted.
+        budget: In place of ``samples``, ``updates`` and ``steps``, with baselines if wanted, such
+            as ``Budget(450, 2, 20_000, 20_000, control_steps=20_000)``.
         keep: Folder in which finished steps are kept and found again; by default nothing is.
         progress: Told what is going on; by default bars on stderr or in the notebook.
         name: Of the system, for the report.
@@ -148,7 +152,21 @@ def learn_by_difference(
     algorithm = Algorithm(path, ddpg or DDPGConfig(), learner_options or {})
     if ddpg is not None and path != OURS:
         raise ValueError(f"ddpg has settings of {OURS}, but another learner is given")
-    budget = budget or Budget(samples, updates, steps, steps)
+    if budget is None:
+        budget = Budget(samples, updates, steps, steps)
+    elif (samples, updates, steps) != USUAL:
+        raise ValueError(
+            f"samples={samples}, updates={updates} and steps={steps} are given beside a budget, "
+            f"which has its own ({budget.true_samples}, {budget.iterations}, "
+            f"{budget.idealised_steps}): say them there"
+        )
+    if replay not in get_args(ReplayRule):
+        raise ValueError(f"replay is {replay!r}, expected one of {get_args(ReplayRule)}")
+    penalty = uncertainty_penalty
+    if not isinstance(penalty, int | float | np.number) or not 0 <= penalty < np.inf:
+        raise ValueError(f"uncertainty_penalty is {penalty!r}, expected a number from 0")
+    if keep is not None and Path(keep).exists() and not Path(keep).is_dir():
+        raise ValueError(f"keep is {keep}, which is a file: give a folder, or a name for one")
     budget.check(algorithm, replay == "all")
     system.check()
     loop = Steps(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -23,6 +24,7 @@ from simgap_files.npz import read_npz, write_npz
 from sims.environment import observed_channels
 from sims.simulator import Array, Channel, Simulator
 from sims.system import USUAL_STARTS, System
+from sims.unsound import Unsound, answered
 from studies.learning.streams import stream
 from studies.learning.warm_start import Recorder, Simulated, WarmStart
 
@@ -221,12 +223,11 @@ def test_on_truth(
     """
     env = system.true_environment(believed)
     runs = [rollout(policy, env, seed + k) for k in range(_starts(system, env, seed))]
-    measure = system.measures or (lambda states, actions: {})
     tests = []
     for run in runs:
         states = visited(system, run)
         test: dict[str, Any] = {"start": states[0].tolist(), "return": run.total}
-        tests.append(test | dict(measure(states, run.actions)))
+        tests.append(test | _measures(system, states, run.actions))
     result: dict[str, Any] = {
         "return_true": float(np.mean([run.total for run in runs])),
         "tests": tests,
@@ -234,6 +235,25 @@ def test_on_truth(
     first = runs[0]
     episode = {"states": visited(system, first), "actions": first.actions}
     return result, episode | {"rewards": first.rewards}
+
+
+def _measures(system: System, states: Array, actions: Array) -> dict[str, Any]:
+    """What a system reports of a rollout beside its return.
+
+    Raises:
+        Unsound: It raised, or reports something else than numbers by name.
+    """
+    if system.measures is None:
+        return {}
+    what = f"system {system.name}: measures"
+    found = answered(what, system.measures, states, actions)
+    plain = isinstance(found, Mapping) and all(
+        isinstance(name, str) and np.ndim(value) == 0 and np.isreal(value)
+        for name, value in found.items()
+    )
+    if not plain:
+        raise Unsound(f"{what} returned {found!r:.80}, expected one number for each name")
+    return dict(found)
 
 
 def _starts(system: System, env: gymnasium.Env, seed: int) -> int:

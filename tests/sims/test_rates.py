@@ -1,5 +1,7 @@
 """A true system whose columns are in another order or unit is refused, and no other."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,27 @@ def test_other_columns_units_and_periods_are_one_line(rollouts, change):
     wrong = [(change(states), actions[: len(change(states)) - 1]) for states, actions in rollouts]
     with pytest.raises(Unsound, match=r"'angle' does not move as 'rate' says, \d+% .* angle, rate"):
         refuse_unrelated_rates("it", PendulumEquation(), wrong)
+
+
+@pytest.mark.parametrize("times", [0.5, 0.55, 2.0])
+def test_a_period_that_is_another_one_is_told(rollouts, times):
+    """Rates as they are, and positions that move in another period than the simulator's."""
+    wrong = []
+    for states, actions in rollouts:
+        moved = states.copy()
+        moved[:, 0] = states[0, 0] + times * (states[:, 0] - states[0, 0])
+        wrong.append((moved, actions))
+    with pytest.raises(
+        Unsound, match=r"moves (\S+) times as far, as in periods of (\S+) s"
+    ) as told:
+        refuse_unrelated_rates("it", PendulumEquation(), wrong)
+    found = re.search(r"moves (\S+) times .* periods of (\S+) s", str(told.value))
+    assert [float(x) for x in found.groups()] == pytest.approx([times, 0.05 * times], rel=0.06)
+
+
+def test_a_rate_sensor_that_is_a_fifth_off_is_a_gap_to_be_learnt(rollouts):
+    off = [(states * [1.0, 1.2], actions) for states, actions in rollouts]
+    refuse_unrelated_rates("it", PendulumEquation(), off)
 
 
 def test_one_step_or_none_is_too_few_to_say():
