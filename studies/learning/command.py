@@ -13,6 +13,7 @@ from typing import Any
 import yaml
 
 from simgap_files.atomic import atomic_write_text, read_sealed, remove_partial_files, write_sealed
+from studies.learning.output import keep_only, refuse_other_run
 from studies.learning.study import Study
 from studies.learning.trial import (
     ALIASES,
@@ -71,10 +72,12 @@ def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
     if grid:
         name = Path(str(given.config[0])).stem if given.config else "grid"
         target = Path(output) if output else home / name
+        refuse_other_run(target, study.name, settings, grid=True)
         run_grid(study, settings, grid, target, kept, execution)
     else:
         folder = trial_folder(home, trial_label(settings), settings)
         target = Path(output) if output else folder
+        refuse_other_run(target, study.name, settings, grid=False)
         run_single(study, settings, target, kept, execution)
 
 
@@ -94,6 +97,8 @@ def run_single(
     results = run_trial(study, kept, settings, output, Several(Bars(), *curves))
     results["seconds"] = time.perf_counter() - begin
     atomic_write_text(output / "config.yaml", yaml.safe_dump(settings, sort_keys=False))
+    for pictures in ("films", "figures"):
+        keep_only(output / pictures, ())
     write_films(results, output, study.system_of(instantiate(study, settings)).nominal)
     write_sealed(output / "results.json", results)
     report_single(results, output)

@@ -20,6 +20,7 @@ from studies.learning.described import modules_in, settings_of
 from studies.learning.fingerprint import fingerprint
 from studies.learning.kept import OnDisk
 from studies.learning.loop import run_loop
+from studies.learning.output import keep_only
 from studies.learning.sources import code_of
 from studies.learning.steps import Steps
 from studies.learning.study import Config, Study, Trial
@@ -129,10 +130,15 @@ def run_trial(
     for name, training in learnt.trainings.items():
         training.learner.save(folder / "policies" / f"{name}.safetensors")
         write_npz(folder / "rollouts" / f"{name}.npz", training.episode)
+    saved = []
     for number, model in enumerate(learnt.models, start=1):
         # Another library's estimator needs skops, which may not be there.
         if is_ours(model.fitted()) or importlib.util.find_spec("skops"):
-            save(model, folder / "models" / f"difference-{number}.safetensors")
+            saved.append(f"difference-{number}")
+            save(model, folder / "models" / f"{saved[-1]}.safetensors")
+    for kind in ("policies", "rollouts"):
+        keep_only(folder / kind, learnt.trainings)
+    keep_only(folder / "models", saved)
     return {
         "study": study.name,
         **learnt.results(),
