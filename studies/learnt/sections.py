@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from studies.learnt.errors import by_group, model_errors
-from studies.learnt.statistics import Mean, above, mean, starts
+from studies.learnt.statistics import Mean, above, common_starts, mean, starts
 from studies.learnt.words import POLICY_WORDS, duration
 from studies.reporting.sections import Section, Table
 
@@ -85,7 +85,12 @@ def legend(summary: pd.DataFrame, once: pd.DataFrame) -> list[str]:
     """
     several, tested = "seeds" in summary, starts(once)
     seeds = "mean over seeds with its 95 % interval" if several else "of one seed"
-    each = f", each the mean of {tested} starts, the same for all policies" if tested > 1 else ""
+    same = (
+        "the same for all policies"
+        if common_starts(once)
+        else "others for every policy, since the true system begins elsewhere under the same seed"
+    )
+    each = f", each the mean of {tested} starts, {same}" if tested > 1 else ""
     says = [f"Returns: {seeds}{each}."]
     if "above control" in summary:
         pairs = "seed by seed" if several else "start by start" if tested > 1 else "the return"

@@ -109,3 +109,10 @@ def above(one: pd.DataFrame, other: pd.DataFrame) -> list[float]:
 def starts(rows: pd.DataFrame) -> int:
     """From how many starts each policy was tested on the true system."""
     return max([1, *rows[BY_START].map(len)])
+
+
+def common_starts(rows: pd.DataFrame) -> bool:
+    """Whether all policies of a seed were tested on the true system from the same starts."""
+    tested = rows[rows[BY_START].map(len) > 0]
+    begun = tested[BY_START].map(lambda found: frozenset(start for start, _ in found))
+    return all(begun.groupby(tested["seed"]).nunique() <= 1)

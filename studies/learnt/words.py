@@ -53,7 +53,9 @@ def returns_by_start(record: Record) -> dict[Start, float]:
 
 def duration(seconds: float) -> str:
     """A time that a reader can grasp."""
-    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.1f} min"
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.1f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
 def shown(results: Results) -> dict[str, str]:

@@ -1,6 +1,12 @@
 """Tables keep apart what differs."""
 
+import pandas as pd
+import pytest
+
+from studies.learnt.sections import legend
+from studies.learnt.statistics import common_starts
 from studies.learnt.tables import apart, policy_rows
+from studies.learnt.words import duration
 
 
 def trial(seed, label="Linear", **settings):
@@ -38,3 +44,19 @@ def test_settings_that_older_trials_lack_keep_them_apart():
         "Linear, uncertainty_penalty=None",
         "Linear, uncertainty_penalty=0.0",
     ]
+
+
+@pytest.mark.parametrize(("other", "same"), [((0.1, 0.0), True), ((0.7, 0.0), False)])
+def test_the_legend_says_whether_policies_had_common_starts(other, same):
+    first = {((0.1, 0.0), 0): 1.0, ((0.2, 0.0), 0): 2.0}
+    second = {(other, 0): 3.0, ((0.2, 0.0), 0): 4.0, ((0.2, 0.0), 1): 4.5}
+    rows = pd.DataFrame({"seed": [0, 0, 1], "by_start": [first, second, {((5.0, 0.0), 0): 1.0}]})
+    assert common_starts(rows) is same
+    (says,) = legend(pd.DataFrame(), rows)
+    assert ("the same for all policies" in says) is same
+    assert ("begins elsewhere under the same seed" in says) is not same
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(119, "119 s"), (180, "3.0 min"), (21600, "6.0 h")])
+def test_durations_are_told_in_units_of_their_size(seconds, text):
+    assert duration(seconds) == text
