@@ -70,6 +70,7 @@ class Parser(jsonargparse.ArgumentParser):
         super().__init__(*given, **options)
         self._given: Any = None
         self._words: list[str] = []
+        self._lists: set[str] = set()
 
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, *rest: Any, **options: Any
@@ -78,6 +79,7 @@ class Parser(jsonargparse.ArgumentParser):
         _READ.clear()
         kinds = {o: getattr(a, "_typehint", None) for a in self._actions for o in a.option_strings}
         lists = {name for name, kind in kinds.items() if typing.get_origin(kind) in (list, tuple)}
+        self._lists = {action.dest for action in self._actions if action.nargs == "+"}
         given = _with_lists(list(sys.argv[1:] if args is None else args), lists)
         self._words = given
         try:
@@ -116,6 +118,10 @@ class Parser(jsonargparse.ArgumentParser):
             if isinstance(found, dict):
                 found = _with_models(found, Path(str(path)).parent if path else None)
                 found = without_replaced(found, self._words)
+                # One file, `logs: log.csv`, is a list of one, as on the command line.
+                found |= {
+                    key: [found[key]] for key in self._lists & set(found) if _is_single(found[key])
+                }
         content = content if found == given else yaml.safe_dump(found)
         return super().parse_string(content, path, *rest, **options)
 
@@ -179,6 +185,10 @@ class Parser(jsonargparse.ArgumentParser):
         names = [action.dest for action in self._actions if action.dest.startswith(group)]
         tops = dict.fromkeys(n.removeprefix(group).partition(".")[0] for n in names)
         return [name for name in tops if name != "help"]
+
+
+def _is_single(value: Any) -> bool:
+    return isinstance(value, str | int | float)
 
 
 def _not_among(given: Any, known: Sequence[str]) -> str:

@@ -141,3 +141,12 @@ def test_a_file_is_used_or_set_aside_but_not_both(logs, tmp_path, capsys):
               "--held-out", *logs])  # fmt: skip
     assert stopped.value.code == 2 and "run-01.csv is in --logs" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_one_log_of_a_config_needs_no_list(tmp_path, capsys):
+    config = tmp_path / "mine.yaml"
+    config.write_text("simulator: sims.pendulum.Pendulum\nlogs: nowhere.csv\n")
+    with pytest.raises(SystemExit) as end:
+        main(["--config", str(config), "--output", str(tmp_path / "out")])
+    assert end.value.code == 2
+    assert "nowhere.csv" in capsys.readouterr().err
