@@ -41,7 +41,8 @@ class Number:
     """A fitted number with its 95 % interval and unit; at a bound it has none that means much.
 
     ``if_exact`` is the interval if everything else in the simulator were exactly right; None if
-    the simulator was taken for exact anyway.
+    the simulator was taken for exact anyway. ``along`` is what it is at the beginning of the
+    records and at their end if it clearly changes on the way.
     """
 
     value: float
@@ -50,6 +51,7 @@ class Number:
     unit: str
     at_bound: bool = False
     if_exact: tuple[float, float] | None = None
+    along: tuple[float, float] | None = None
 
 
 @dataclasses.dataclass(frozen=True)

@@ -153,6 +153,13 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         single = len(verdict.parameters) == 1
         spans = [("" if single else f"{_spelt(f)} ") + span(n) for f, n in surer.items()]
         found.append(f"{', '.join(spans)} if all else in the simulator is exact")
+    for field, n in verdict.parameters.items():
+        if n.along is not None:
+            begin, end = (quantity_text(value, n.unit) for value in n.along)
+            name = f"{_spelt(field)} " if len(verdict.parameters) > 1 else ""
+            found.append(
+                f"{name}no constant: about {begin} where records begin and {end} where they end"
+            )
     doubts = [DOUBTS[doubt] for doubt in verdict.doubts if doubt != "rivals"]
     own = verdict.label
     if own in rivals(verdict):

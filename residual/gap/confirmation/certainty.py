@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from residual.gap.confirmation.claim import Claim, other_than
-from residual.gap.confirmation.constancy import creeps
+from residual.gap.confirmation.constancy import creeps, on_the_way
 from residual.gap.confirmation.drift import Drift
 from residual.gap.confirmation.numerics import STEADY, at_half_step, in_the_limit, survives
 from residual.gap.confirmation.one_way import may_hold_a_load
@@ -68,11 +69,15 @@ def claims(
         # A point of a curve may well lie near zero.
         curved = isinstance(search.candidates[number].effect, Curve)
         least = float(np.abs(fit.theta[strengths]).max()) if curved else 0.0
+        numbers = {fit.model.knobs[j].field: bounded(fit, j, half[j], numerics) for j in own}
+        for j, ends in on_the_way(search, key, number).items():
+            field = fit.model.knobs[j].field
+            numbers[field] = dataclasses.replace(numbers[field], along=ends)
         taken = share(search, key, number)
         found.append(
             Claim(
                 number,
-                {fit.model.knobs[j].field: bounded(fit, j, half[j], numerics) for j in own},
+                numbers,
                 other_than(twins, form),
                 other_than(twins, alike),
                 other_than(twins, rivals),

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.search.sets import Key, Search
+from sims.effects.curve import Curve
 
 Array = NDArray[np.float64]
 
@@ -36,14 +38,44 @@ def creeps(search: Search, key: Key, number: int) -> bool:
     fit = search.tried[key]
     if not search.candidates[number].effect.creeps or len(search.fitter.blocks) < FEW:
         return False
-    own = [int(j) for j in np.flatnonzero(fit.model.owner == key.index(number))]
     courses = list(_courses(search))
     return any(
-        _changes(fit, search.fitter.blocks.block, j, course, CHANCE / len(courses))
-        for j in own
-        if fit.model.knobs[j].strength
+        _change(fit, search.fitter.blocks.block, j, course, CHANCE / len(courses))
+        for j in _strengths(fit, key.index(number))
         for course in courses
     )
+
+
+def on_the_way(search: Search, key: Key, number: int) -> dict[int, tuple[float, float]]:
+    """Sizes at the beginning of the records and at their end, of the numbers of a set that clearly
+    change on the way, by place: friction falls as it warms.
+
+    What strikes the ground is not asked, nor are curves, of which each record shows other points.
+
+    Args:
+        search: With the fitted set.
+        key: The set.
+        number: Its member.
+    """
+    fit, fitter = search.tried[key], search.fitter
+    effect = search.candidates[number].effect
+    if not isinstance(fitter, SmoothFitter) or isinstance(effect, Curve):
+        return {}
+    if len(fitter.blocks) < FEW:
+        return {}
+    course, found = along_records(search)[fitter.blocks.windows.index[:, 0]], {}
+    for j in _strengths(fit, key.index(number)):
+        if change := _change(fit, fitter.blocks.block, j, course, CHANCE):
+            knob, size = fit.model.knobs[j], float(fit.theta[j])
+            begin, end = np.clip([size - change / 2, size + change / 2], knob.low, knob.high)
+            found[j] = (float(begin), float(end))
+    return found
+
+
+def _strengths(fit: Fit, place: int) -> list[int]:
+    """Places of the strengths of a member."""
+    own = np.flatnonzero(fit.model.owner == place)
+    return [int(j) for j in own if fit.model.knobs[j].strength]
 
 
 def along_records(search: Search) -> Array:
@@ -69,8 +101,9 @@ def _courses(search: Search) -> Iterator[Array]:
             yield own.astype(float)
 
 
-def _changes(fit: Fit, block: NDArray[np.int64], j: int, course: Array, chance: float) -> bool:
-    """Whether a number clearly follows a course over the windows, by more than a part of itself.
+def _change(fit: Fit, block: NDArray[np.int64], j: int, course: Array, chance: float) -> float:
+    """How much a number changes over a course over the windows; 0 if it does not clearly do so, or
+    by less than a part of itself.
 
     By one Gauss-Newton step with the course as one more unknown, and the sandwich over blocks
     (White, "Maximum likelihood estimation of misspecified models", Econometrica 50, 1982).
@@ -90,6 +123,7 @@ def _changes(fit: Fit, block: NDArray[np.int64], j: int, course: Array, chance: 
     meat = scores.T @ scores * count / freedom
     sandwich = float((inverse @ meat @ inverse)[-1, -1])
     plain = float((left**2).sum() / max((left != 0).sum() - len(step), 1) * inverse[-1, -1])
-    change, error = abs(float(step[-1])), np.sqrt(max(sandwich, plain, 0.0))
-    clear = change > error * t.ppf(1 - chance / 2, freedom)
-    return bool(clear and change / scale[-1] > SAME * abs(float(fit.theta[j])))
+    change, error = float(step[-1]), np.sqrt(max(sandwich, plain, 0.0))
+    clear = abs(change) > error * t.ppf(1 - chance / 2, freedom)
+    change /= float(scale[-1])
+    return change if clear and abs(change) > SAME * abs(float(fit.theta[j])) else 0.0

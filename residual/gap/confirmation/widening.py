@@ -67,7 +67,7 @@ def widened(
         best = forecast_best(smaller) if search.sound(smaller) else None
         claim = _widened(search, key, claim, freed, smaller, best)
         claim = _beside_rivals(search, key, claim, claims)
-        claim = _beside_drifts(search, key, claim, drifts)
+        claim = _on_the_way(_beside_drifts(search, key, claim, drifts))
         told.append(claim if adequate else _of_a_misfit(search, key, claim))
     return told
 
@@ -127,6 +127,17 @@ def _beside_drifts(search: Search, key: Key, claim: Claim, drifts: Sequence[Arra
         numbers[knob.field] = dataclasses.replace(
             n, low=min([n.low, *ends]), high=max([n.high, *ends])
         )
+    return dataclasses.replace(claim, numbers=numbers)
+
+
+def _on_the_way(claim: Claim) -> Claim:
+    """A claim with intervals that hold what its numbers are on the way along the records."""
+    numbers = {
+        field: n
+        if n.along is None
+        else dataclasses.replace(n, low=min(n.low, *n.along), high=max(n.high, *n.along))
+        for field, n in claim.numbers.items()
+    }
     return dataclasses.replace(claim, numbers=numbers)
 
 

@@ -1,12 +1,17 @@
 """Constants that are none: zeros that creep, and loads that differ from record to record."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from oven import Oven, steps
 
 from residual.gap import find_gap
+from residual.trajectories import Trajectory
+from sims.equations import FirstOrderSystem
+from sims.simulator import Channel, Parameter
+from studies.gap.answer import notes
 
 DUTIES = [np.random.default_rng(seed).uniform(0.1, 1.0, 12) for seed in (0, 1)]
 RUNS = [steps(seed, list(duties), 0.3, lag=0.0) for seed, duties in enumerate(DUTIES)]
@@ -30,3 +35,51 @@ def test_a_push_is_certain_only_while_it_is_a_constant(zeros, creeps):
     assert named.effect in ("constant_load", "sensor_offset")
     assert ("creeps" in named.doubts) == creeps
     assert (named.kind == "confirmed") == (not creeps)
+
+
+class Wheel(FirstOrderSystem):
+    """A wheel on a motor, by its voltage, without friction."""
+
+    dt = 0.02
+    state_channels = (Channel("speed", "rad/s", "rate", scale=20.0),)
+    action_channels = (Channel("voltage", "V", "input", scale=6.0, low=-12.0, high=12.0),)
+    parameters: ClassVar = {
+        "k": Parameter(3.0, "rad/s/V", "speed per volt", low=0.1),
+        "tau": Parameter(0.15, "s", "time constant", low=0.01),
+    }
+
+    def derivative(self, x, u, p):
+        return ((p.k * u[:, 0] - x[:, 0]) / p.tau)[:, None]
+
+
+def rubbed(seed, begin, end, n=1200):
+    """A record in which dry friction goes from one level to another, by Euler in 1 ms."""
+    rng = np.random.default_rng(seed)
+    volts = np.repeat(rng.uniform(-9, 9, n // 30), 30)
+    speed, seen = 0.0, []
+    for k in range(n):
+        seen.append(speed)
+        level = begin + (end - begin) * k / n
+        for _ in range(20):
+            pull = (3.0 * volts[k] - speed) / 0.15
+            if speed == 0.0 and abs(pull) <= level:
+                continue
+            after = speed + 0.001 * (pull - level * np.sign(speed or pull))
+            speed = 0.0 if speed * after < 0 else after
+    times = 0.02 * np.arange(n)
+    states = np.array(seen)[:, None] + 0.15 * rng.standard_normal((n, 1))
+    return Trajectory(f"record {seed}", times, states, volts[:-1, None])
+
+
+@pytest.mark.parametrize(("begin", "end"), [(40.0, 14.0), (25.0, 25.0)])
+def test_friction_that_falls_as_it_warms_is_told_with_where_it_begins_and_ends(begin, end):
+    found = find_gap(Wheel(), [rubbed(seed, begin, end) for seed in (0, 1)])
+    (friction,) = [v for v in found.verdicts if v.effect == "coulomb_friction"]
+    (level,) = friction.parameters.values()
+    if begin == end:
+        assert friction.kind == "confirmed" and level.along is None
+        assert level.low < begin < level.high and level.high - level.low < 6.0
+    else:
+        assert level.along == pytest.approx((begin, end), abs=6.0)
+        assert level.low < end + 6.0 and level.high > begin - 6.0
+        assert any("no constant: about" in line for line in notes(friction, found))
