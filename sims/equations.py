@@ -53,7 +53,7 @@ class _Equations(HostSimulator):
         if problem := cannot_call(getattr(self, cls.written), *cls.takes):
             wanted = f"{cls.written}(self, {', '.join(cls.takes)})"
             raise ValueError(f"{cls.__name__}.{cls.written}: {problem}; expected {wanted}")
-        if own := [c.name for c in cls.state_channels if c.kind == "memory"]:
+        if own := [c.name for c in self.state_channels if c.kind == "memory"]:
             raise ValueError(
                 f"{cls.__name__}: channel {own[0]!r} is of kind 'memory', which effects append; a "
                 "state of its own is of kind 'other', 'position' or 'rate', logged or not"

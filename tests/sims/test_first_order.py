@@ -125,3 +125,23 @@ def test_effects_can_be_given_when_the_system_is_made():
     heater = Heater(effects=[ActuatorLag("power", 5.0)])
     assert [channel.name for channel in heater.state_channels] == ["temperature", "power lagged"]
     assert heater.with_effects([]).state_channels == Heater.state_channels
+
+
+def test_channels_may_be_those_of_an_object():
+    """A class for any number of tanks."""
+
+    class Row(FirstOrderSystem):
+        dt = 1.0
+        action_channels = ()
+
+        def __init__(self, count):
+            self.state_channels = tuple(Channel(f"tank {i}", "m", "other") for i in range(count))
+            super().__init__()
+
+        def derivative(self, x, u, p):
+            return -0.1 * x
+
+    assert [c.name for c in Row(2).state_channels] == ["tank 0", "tank 1"]
+    assert Row(2).step([[1.0, 2.0]], np.zeros((1, 0))) == pytest.approx(
+        np.array([[1.0, 2.0]]) * np.exp(-0.1), abs=1e-6
+    )
