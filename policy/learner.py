@@ -201,7 +201,13 @@ def load_policy(path: str | Path) -> Policy:
     """
     from policy.mlp import MlpPolicy
 
-    if not Path(path).exists() and not str(path).endswith(".safetensors") and "/" not in str(path):
+    by_name = not str(path).endswith(".safetensors") and "/" not in str(path)
+    if by_name and "." not in str(path) and not Path(path).exists():
+        raise FileNotFoundError(
+            f"there is no file {path}: give a policy's .safetensors file, or an import path such "
+            "as my_file.POLICY"
+        )
+    if by_name and not Path(path).exists():
         found = imported(str(path), "policy")
         return found() if isinstance(found, type) else found
     try:

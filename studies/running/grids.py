@@ -24,12 +24,13 @@ def expand_grid(
         One configuration per trial; duplicates are kept once.
 
     Raises:
-        ValueError: A setting does not exist or a value is not a list; the message names it.
+        ValueError: A setting does not exist, or its values are no list, or an empty one; the
+            message names it.
     """
     trials: list[dict[str, Any]] = []
     for number, block in enumerate(grid, start=1):
         for key, values in block.items():
-            if not isinstance(values, list):
+            if not isinstance(values, list) or not values:
                 raise ValueError(
                     f"grid block {number}: {key!r} needs a list of values, got {values!r}"
                 )

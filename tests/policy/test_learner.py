@@ -150,3 +150,8 @@ def test_the_same_agent_gives_the_same_bytes(tmp_path):
     for name in ("a", "b"):
         agent.save(tmp_path / name)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_a_policy_of_a_file_that_is_not_there():
+    with pytest.raises(FileNotFoundError, match="there is no file nosuch: give a policy's .safet"):
+        load_policy("nosuch")

@@ -36,6 +36,7 @@ def test_the_shared_settings_are_not_changed():
         ({"budget.samples": [1]}, "no setting 'budget.samples'"),
         ({"sed": [1]}, "no setting 'sed'"),
         ({"seed": 1}, "'seed' needs a list"),
+        ({"seed": []}, r"'seed' needs a list of values, got \[\]"),
     ],
 )
 def test_a_wrong_grid_names_the_block_and_the_setting(block, message):
