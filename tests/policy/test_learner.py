@@ -153,5 +153,5 @@ def test_the_same_agent_gives_the_same_bytes(tmp_path):
 
 
 def test_a_policy_of_a_file_that_is_not_there():
-    with pytest.raises(FileNotFoundError, match="there is no file nosuch: give a policy's .safet"):
+    with pytest.raises(FileNotFoundError, match=r"there is no file nosuch: give a policy"):
         load_policy("nosuch")
