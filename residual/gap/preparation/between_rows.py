@@ -26,6 +26,8 @@ Mask = NDArray[np.bool_]
 SMOOTH = 5.0
 #: Part of successive readings that are equal, beyond which a sensor may be slower than its log.
 HELD = 0.4
+#: Part of rows with a reading, below which it is.
+MOSTLY = 0.8
 #: Readings of a stretch, and of all stretches where rows advance at once and where they do not.
 STRETCH, AT_ONCE, BY_ROW = 8 * noise.READINGS, 6000, 1000
 
@@ -52,7 +54,7 @@ def read_closer(
     most = AT_ONCE if simulator.advances_rows_at_once else BY_ROW
     samples = Samples.join(_stretches(trajectories, most), simulator.substeps)
     scatter = noise.local_noise(samples)
-    doubtful = (floor.sigma > SMOOTH * scatter) & ~_held(samples)
+    doubtful = (floor.sigma > SMOOTH * scatter) & _reads_each_row(samples)
     if not doubtful.any():
         return floor
     model, none = Model(simulator), np.zeros(0)
@@ -64,11 +66,12 @@ def read_closer(
     )
 
 
-def _held(samples: Samples) -> Mask:
-    """Measured channels whose readings mostly repeat, as of a sensor that is slower than the log:
-    between those there is nothing to read, (m,)."""
+def _reads_each_row(samples: Samples) -> Mask:
+    """Measured channels with a fresh reading in most rows, (m,): between those of a sensor that is
+    slower than its log, left out or repeated, there is nothing to read."""
     seen = samples.seen[:, samples.measured]
-    return np.asarray((np.diff(seen, axis=0) == 0).mean(axis=0) > HELD)
+    there = np.isfinite(seen).mean(axis=0) > MOSTLY
+    return np.asarray(there & ((np.diff(seen, axis=0) == 0).mean(axis=0) < HELD))
 
 
 def _stretches(trajectories: Sequence[Trajectory], most: int) -> list[Trajectory]:
