@@ -152,14 +152,16 @@ def _unused(
 
 
 def _answers(values: Array, response: Response, carried: int | None, step: float) -> Mask:
-    """Which samples come out otherwise if the channel is moved by a step, either way."""
+    """Which samples come out otherwise if the channel is moved by a step, either way, within what
+    was recorded of it: beyond that a simulator may not be asked."""
     answers = np.zeros(len(values), bool)
     now = response(values)
     for move in (step, -step):
-        change = response(values + move) - now
+        shifted = np.clip(values + move, values.min(), values.max())
+        change = response(shifted) - now
         moved = np.abs(change).max(axis=1) > _ANSWERS * step
         if carried is not None:
-            change[:, carried] -= move
+            change[:, carried] -= shifted - values
             moved &= np.abs(change).max(axis=1) > _ANSWERS * step
         answers |= moved
     return answers

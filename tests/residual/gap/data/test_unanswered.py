@@ -85,6 +85,22 @@ def test_what_answers_everywhere_or_around_zero_only_is_not_told():
     assert told(PendulumEquation(), Trajectory("swing", times, states, torque)) == []
 
 
+class Strict(Heater):
+    """Says so of a command that there cannot be."""
+
+    def power(self, u):
+        if u.min() < 0.0 or u.max() > 0.97:
+            raise ValueError("no such command")
+        return u[:, 0]
+
+
+def test_a_simulator_is_asked_within_what_was_recorded_only():
+    run = heated()
+    run.actions[:] = np.clip(run.actions, 0.0, 0.97)
+    assert run.actions.max() == 0.97
+    assert told(Strict(), run) == []
+
+
 def test_an_input_that_makes_no_difference_is_told():
     (finding,) = told(Deaf(), heated())
     assert (finding.kind, finding.where) == ("unused", "power")
