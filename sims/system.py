@@ -114,11 +114,11 @@ class System:
         for name, arguments in takes.items():
             if (given := getattr(self, name)) is None:
                 continue
-            problem = cannot_call(given, *arguments.split(", ")) if callable(given) else "is none"
-            if problem:
+            why = cannot_call(given, *arguments.split(", ")) if callable(given) else None
+            if why != "":
                 raise ValueError(
                     f"system {self.name}: {name} is {_kind(given)}, expected a function "
-                    f"{name}({arguments})" + (f": {problem}" if callable(given) else "")
+                    f"{name}({arguments})" + (f": {why}" if why else "")
                 )
 
     def __repr__(self) -> str:

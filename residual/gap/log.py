@@ -73,8 +73,8 @@ def look(
     length = (
         held_by_records(simulator, every, horizon) if horizon else usual_horizon(simulator, every)
     )
-    cut = tuple(found.where for found in examined.findings if found.kind == "unanswered")
-    log = Log(simulator, every, every, length, horizon is not None, apart, findings, [], cut)
+    cut = dict.fromkeys(one.where for one in examined.findings if one.kind == "unanswered")
+    log = Log(simulator, every, every, length, horizon is not None, apart, findings, [], tuple(cut))
     log = log.at(length)
     for says in [*findings, *log.left_out]:
         tell(says)

@@ -64,10 +64,9 @@ def _cut_off(result: GapResult) -> str:
     """What the simulator does not answer to, where something was found that may make up for it."""
     if not result.cut_off or not result.effects:
         return ""
-    names = listed(list(dict.fromkeys(result.cut_off)))
     return (
-        f"First see whether the simulator is meant to cut {names} off where it does (below): what "
-        "was found may make up for it. If it is: "
+        f"First see whether the simulator is meant to cut {listed(list(result.cut_off))} off where "
+        "it does (below): what was found may make up for it. If it is: "
     )
 
 

@@ -135,8 +135,10 @@ def accuracy_section(errors: pd.DataFrame, about: About) -> list[Section]:
     found = (re.match(r"([\d.e+-]+s)_", str(name)) for name in errors.columns)
     horizons = list(dict.fromkeys(match[1] for match in found if match))
     groups, table = list(about["groups"]), []
-    seconds = about.get("visited_seconds")
-    first = "" if seconds is None else f"the first {seconds:g} s of "
+    # An earlier version did not keep how many seconds, and never measured whole rollouts.
+    seconds = about.get("visited_seconds", "")
+    told = f"{seconds:g} s" if seconds else "seconds"
+    first = "" if seconds is None else f"the first {told} of "
     keys = ["estimator", "true_samples", "iteration", "where"]
     for _, part in errors.groupby(keys, sort=False):
         estimator, samples, update, where = part.iloc[0][keys]

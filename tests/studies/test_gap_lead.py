@@ -19,7 +19,7 @@ from studies.gap.verdicts import banners
 
 
 def test_what_the_simulator_may_cut_off_by_mistake_comes_first():
-    found = dataclasses.replace(result(MASS), cut_off=("torque", "torque"))
+    found = dataclasses.replace(result(MASS), cut_off=("torque",))
     first, rest = lead(found).split(" If it is: ")
     assert first.startswith("First see whether the simulator is meant to cut torque off where")
     assert rest == lead(result(MASS))

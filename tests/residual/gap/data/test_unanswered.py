@@ -1,10 +1,13 @@
 """Inputs and states that a simulator cuts off, or makes no use of, are told before the search."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from residual.gap import find_gap
 from residual.gap.data.examine import findings
+from residual.gap.log import look
 from residual.trajectories import Trajectory
 from sims import Channel, FirstOrderSystem, Parameter
 from sims.pendulum_equation import PendulumEquation
@@ -42,6 +45,13 @@ class Cooled(Heater):
 class Threshold(Heater):
     def power(self, u):
         return np.maximum(u[:, 0] - 0.1, 0.0)
+
+
+class Narrow(Heater):
+    """Cut off on both sides, of a power that is counted from its middle."""
+
+    def power(self, u):
+        return np.clip(u[:, 0], -0.3, 0.3)
 
 
 class Deaf(Heater):
@@ -99,6 +109,16 @@ def test_a_simulator_is_asked_within_what_was_recorded_only():
     run.actions[:] = np.clip(run.actions, 0.0, 0.97)
     assert run.actions.max() == 0.97
     assert told(Strict(), run) == []
+
+
+def test_a_channel_that_is_cut_off_on_both_sides_is_told_twice_and_listed_once():
+    run = heated()
+    run = dataclasses.replace(run, actions=run.actions - 0.5, states=run.states - 30.0)
+    free = Narrow()
+    free.action_channels = (Channel("power", "1", "input", low=-1.0, high=1.0),)
+    assert [f.where for f in told(free, run)] == ["power", "power"]
+    log = look(free, [run], [], None, lambda _: None)
+    assert log.cut_off == ("power",)
 
 
 def test_an_input_that_makes_no_difference_is_told():
