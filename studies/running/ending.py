@@ -57,19 +57,28 @@ def fail(message: str) -> NoReturn:
 def passing_on_interrupts() -> Iterator[None]:
     """Within, a Ctrl-C that lands in a library's callback is passed on, not printed and lost.
 
-    Pymunk frees its bodies in callbacks, out of which no exception can come.
+    No exception can come out of the callbacks in which Pymunk frees its bodies and LLVM hands over
+    what it compiled. What fails because a callback was cut short is an interrupt as well.
     """
     usual = sys.unraisablehook
+    passed: list[threading.Timer] = []
 
     def pass_on(told: Any) -> None:
         if told.exc_type is KeyboardInterrupt:
-            threading.Timer(0.05, _thread.interrupt_main).start()
+            passed.append(threading.Timer(0.05, _thread.interrupt_main))
+            passed[-1].start()
         else:
             usual(told)
 
     sys.unraisablehook = pass_on
     try:
         yield
+    except Exception as error:
+        if not passed:
+            raise
+        for timer in passed:
+            timer.cancel()
+        raise KeyboardInterrupt from error
     finally:
         sys.unraisablehook = usual
 

@@ -1,17 +1,13 @@
 """Commands end in one way."""
 
-import contextlib
 import errno
 import importlib
 import os
-import signal
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
-import cffi
 import numpy as np
 import pytest
 
@@ -26,7 +22,6 @@ from studies.running.ending import (
     fail,
     guarded,
     on_purpose,
-    passing_on_interrupts,
 )
 
 
@@ -168,30 +163,6 @@ def test_output_is_checked_before_anything_is_computed(name, output, says, capsy
     assert said.count("\n") == 1 and "--output" in said and says in said
 
 
-def test_control_c_in_a_study(tmp_path):
-    command = [sys.executable, "-m", "studies.pendulum_gap", "--output", str(tmp_path / "out")]
-    root = Path(__file__).parents[2]
-    # A suite in the background ignores interrupts, and so would what it starts.
-    process = subprocess.Popen(
-        command, stderr=subprocess.PIPE, text=True, cwd=root,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )  # fmt: skip
-    end = time.monotonic() + 120
-    while not (tmp_path / "out").exists():
-        assert time.monotonic() < end and process.poll() is None
-        time.sleep(0.1)
-    time.sleep(1)
-    said = None
-    while said is None:
-        # Compiled code may swallow an interrupt; who sees that it goes on presses again.
-        assert time.monotonic() < end + 120
-        process.send_signal(signal.SIGINT)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            said = process.communicate(timeout=10)[1]
-    assert process.returncode == 130
-    assert said.endswith("stopped; the same command goes on\n") and "Traceback" not in said
-
-
 WRONG = {
     "bad.yaml": b"seed: 0\nsimulator: [", "latin.yaml": b"seed: 0 # \xe9",
     "bytes.yaml": b"\x00" * 9,
@@ -245,25 +216,6 @@ def test_a_system_file_that_is_no_python_is_the_users(tmp_path, monkeypatch, cap
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and f"{tmp_path / 'unclosed.py'}, line 3" in said
     assert "never closed" in said and not (tmp_path / "out").exists()
-
-
-def test_control_c_in_a_callback_is_passed_on(capsys):
-    ffi = cffi.FFI()
-
-    def free(_):
-        raise KeyboardInterrupt
-
-    # What a shell starts in the background ignores interrupts.
-    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt), passing_on_interrupts():
-            freed = ffi.gc(ffi.new("int*"), free)
-            del freed
-            for _ in range(200):  # an interrupt of this kind waits for the end of a sleep
-                time.sleep(0.05)
-    finally:
-        signal.signal(signal.SIGINT, usual)
-    assert capsys.readouterr().err == ""
 
 
 def test_a_reader_that_has_read_enough_is_no_error():
