@@ -14,6 +14,9 @@ from sims.effects.library import library
 from sims.host import HostSimulator
 from sims.simulator import Simulator
 
+#: Sets of effects that explain rows as well, of those that are told.
+MOST_TOLD = 3
+
 
 class NamedEffects(Estimator):
     """Grey box: the effects that a simulator lacks, by name, and their numbers.
@@ -36,7 +39,8 @@ class NamedEffects(Estimator):
         covariance_: Of their fitted numbers in the order of ``numbers_``, shape (p, p).
         numbers_: (position in ``effects_``, name of the number) for every fitted number.
         residual_: Root mean square of what the effects leave, for each output.
-        says_: What was found, in words, and what stays unexplained.
+        says_: What was found, in words, what would explain the rows as well, and what stays
+            unexplained.
     """
 
     reads_noise: ClassVar[bool] = True
@@ -100,6 +104,12 @@ class NamedEffects(Estimator):
         else:
             self.residual_ = alone
         self.says_ = self._words(found.ratio, found.adequate and bool(self.effects_))
+        if self.effects_ and found.as_good:
+            sets = [" and ".join(one) for one in found.as_good]
+            more = f", or one of {len(sets) - MOST_TOLD} others" if len(sets) > MOST_TOLD else ""
+            self.says_ += (
+                f"; these rows have it as well from {', or '.join(sets[:MOST_TOLD])}{more}"
+            )
 
     def _predict(self, X: Array, return_std: bool) -> tuple[Array, Array | None]:
         mean = self._change(X, self.effects_)

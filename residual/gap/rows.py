@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.confirmation.aliases import aliases
+from residual.angles import with_whole_turns
+from residual.gap.confirmation.aliases import aliases, representatives
 from residual.gap.fitting.intervals import deviations
 from residual.gap.model.candidates import candidates
 from residual.gap.preparation.prepare import prepare
@@ -45,6 +46,8 @@ class Named:
         covariance: Of the fitted numbers, (p, p).
         ratio: Largest residual of a channel over its noise.
         adequate: Whether no more than noise is left.
+        as_good: Other sets of effects, by label, that explain the rows as well with no more
+            numbers.
     """
 
     effects: tuple[Effect, ...]
@@ -52,6 +55,7 @@ class Named:
     covariance: Array
     ratio: float
     adequate: bool
+    as_good: tuple[tuple[str, ...], ...] = ()
 
 
 def chains(simulator: HostSimulator, X: Array, difference: Array) -> list[Trajectory]:
@@ -82,10 +86,8 @@ def chains(simulator: HostSimulator, X: Array, difference: Array) -> list[Trajec
         if stop - start < SHORTEST:
             continue
         path = np.vstack([states[start:stop, :physical], following[stop - 1 : stop]])
-        for i, channel in enumerate(channels):
-            if channel.angle:
-                path[:, i] = np.unwrap(path[:, i])
         times = simulator.dt * np.arange(len(path), dtype=float)
+        path = with_whole_turns(path, times, channels)
         found.append(Trajectory(f"row {start}", times, path, actions[start:stop]))
     return found
 
@@ -116,14 +118,16 @@ def look(simulator: HostSimulator, runs: list[Trajectory], exact: bool = True) -
         if len(_hosting(simulator, effect).state_channels) == width
     ]
     groups, sets = aliases(simulator, offered)
-    kept = [e for e in offered if groups.get(str(e), (str(e),))[0] == str(e)]
+    kept, less = representatives(simulator, offered, groups)
     alone = exact and simulator.has_contacts
     periods = 1 if alone else HORIZON
     prepared = prepare(simulator, runs, periods * simulator.dt, exact)
     # By number and not by time, so that the same rows have the same answer on every machine.
     most = SETS_AT_IMPACTS if simulator.has_contacts else SETS
     effort = dataclasses.replace(prepared.effort, tried=most, parameters=alone)
-    pool = prepared.pool(candidates(simulator, kept, prepared.fitter.samples))
+    samples = prepared.fitter.samples
+    less_of = [one.taking_away() for one in candidates(simulator, less, samples)]
+    pool = prepared.pool([*candidates(simulator, kept, samples), *less_of])
     found = explain(
         simulator, pool, prepared.fitter, prepared.floor, prepared.weigh, effort, _quiet, np.inf,
     )  # fmt: skip
@@ -139,7 +143,35 @@ def look(simulator: HostSimulator, runs: list[Trajectory], exact: bool = True) -
         np.diag(spread**2),
         left.ratio,
         left.adequate,
+        tuple(_as_good(found, key, groups)),
     )
+
+
+def _as_good(
+    found: Explanation, key: Key, groups: Mapping[str, Sequence[str]]
+) -> Iterator[tuple[str, ...]]:
+    """Other sets that explain the rows as well as the chosen one does, by label.
+
+    Args:
+        found: With all that was tried.
+        key: The chosen set.
+        groups: Labels of exact twins, by label.
+    """
+    search = found.search
+    labels = [candidate.label for candidate in search.candidates]
+    for n in key:
+        rest = tuple(labels[i] for i in key if i != n)
+        yield from (
+            (*rest, twin) for twin in groups.get(labels[n], ())
+            if twin != labels[n] and labels[n] in groups.get(twin, ())
+        )  # fmt: skip
+    if not (found.adequate and key):
+        return
+    most = search.tried[key].merit + found.needed
+    for other in search.tried:
+        wider = set(key) <= set(other) or search.numbers(other) > search.numbers(key)
+        if not wider and search.sound(other) and search.tried[other].merit <= most:
+            yield tuple(labels[i] for i in other)
 
 
 def _in_fewer(found: Explanation, sets: Sequence[tuple[str, ...]]) -> Key:

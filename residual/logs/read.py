@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from residual.angles import with_whole_turns
 from residual.logs.checks import Finding, Signal, check_plausible, check_rate
 from residual.logs.layout import LogFormat, check_layout, named_column
 from residual.logs.overflow import continued
@@ -158,23 +159,16 @@ def _trajectory(
 ) -> Trajectory:
     """A run with its angles unwrapped, one column for every state channel."""
     matrix = np.full((len(run.times), len(states)), np.nan)
-    for values, channel in zip(run.states.T, channels, strict=True):
-        column = list(states).index(channel)
-        matrix[:, column] = values
-        known = np.isfinite(values)
-        if channel.angle and known.any():
-            matrix[known, column] = np.unwrap(values[known])
-            jumps = int((np.abs(np.diff(values[known])) > np.pi).sum())
-            if jumps:
-                findings.append(
-                    Finding(
-                        "unwrapped",
-                        run.name,
-                        f"{channel.name} jumped by whole turns {jumps} times and was unwrapped.",
-                        {"jumps": jumps},
-                    )
-                )
-    return Trajectory(run.name, run.times, matrix, run.actions[:-1])
+    matrix[:, [list(states).index(channel) for channel in channels]] = run.states
+    going_on = with_whole_turns(matrix, run.times, states)
+    for column, channel in enumerate(states):
+        known = np.isfinite(matrix[:, column])
+        turns = np.diff(going_on[known, column] - matrix[known, column])
+        jumps = int((np.abs(turns) > np.pi).sum())
+        if jumps:
+            says = f"{channel.name} jumped by whole turns {jumps} times and was unwrapped."
+            findings.append(Finding("unwrapped", run.name, says, {"jumps": jumps}))
+    return Trajectory(run.name, run.times, going_on, run.actions[:-1])
 
 
 def _unmeasured(channels: Sequence[Channel], runs: Sequence[Run]) -> list[Finding]:

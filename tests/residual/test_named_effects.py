@@ -7,6 +7,7 @@ from residual import CorrectedSimulator, DifferenceModel, NamedEffects, load, sa
 from residual.gap import rows as rows_of_effects
 from residual.gap.rows import SHORTEST
 from residual.trajectories import Transitions
+from sims import Channel, EquationOfMotion, Parameter
 from sims.effects import CoulombFriction, Delay
 from sims.leo import Leo, Walking
 from sims.pendulum import Pendulum
@@ -190,3 +191,36 @@ def test_a_heavier_torso_and_friction_are_found_in_rows_of_a_struggling_leo():
     model = DifferenceModel(NamedEffects(), Leo()).fit(data)
     found = {effect.parameter: effect.change for effect in model.fitted().effects_}
     assert found == pytest.approx({"torso_mass": 1.25 - 0.94226, "friction": 0.03}, rel=2e-3)
+
+
+class Wheel(EquationOfMotion):
+    """A wheel that turns by more than half a turn from row to row."""
+
+    dt = 0.1
+    state_channels = (
+        Channel("angle", "rad", "position", angle=True),
+        Channel("speed", "rad/s", "rate", rate_of="angle", scale=50.0),
+    )
+    action_channels = (Channel("torque", "N m", "input", scale=1.0, low=-1.0, high=1.0),)
+    parameters = {
+        "inertia": Parameter(0.01, "kg m2", "of the wheel", low=1e-4),
+        "damping": Parameter(0.02, "N m s/rad", "of its bearing", low=0.0),
+    }
+
+    def acceleration(self, q, v, u, force, p):
+        return ((force[:, 0] + u[:, 0] - p.damping * v[:, 0]) / p.inertia)[:, None]
+
+
+def test_what_a_simulator_has_too_much_of_is_found_while_angles_turn_fast():
+    true = Wheel().with_parameters(damping=0.005)
+    rng = np.random.default_rng(0)
+    torques = np.repeat(rng.uniform(-1, 1, (15, 1)), 8, axis=0)
+    path = true.rollout(np.zeros(2), torques)
+    assert np.abs(path[:, 1]).max() * true.dt > np.pi
+    rows = Transitions(path[:-1], torques, path[1:], np.zeros(len(torques), int))
+    (effect,) = DifferenceModel(NamedEffects(), Wheel()).fit(rows).fitted().effects_
+    assert (effect.name, effect.change) == ("damping", pytest.approx(-0.015, rel=1e-4))
+
+
+def test_what_explains_rows_as_well_is_told(model):
+    assert "these rows have it as well from length, or gravity" in model.fitted().says_
