@@ -10,6 +10,7 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import stats
 
 from residual.calibration import NINETY_PERCENT
 from residual.corrected import CorrectedSimulator
@@ -18,6 +19,8 @@ from sims.simulator import Array, Simulator, physical, state_difference
 # In s; a slow system is forecast over at least so many periods, as a fast one is over more.
 _HORIZONS = (0.25, 1.0)
 LEAST_STEPS = (5, 20)
+# Of fewer rollouts no interval tells anything.
+_ROLLOUTS = 3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,6 +37,9 @@ class Accuracy:
             together; None if the estimator predicts no spread.
         gap: Per channel, RMS of the true difference over the RMS of what a step of the true
             system changes: 0 where it does what the uncorrected simulator does.
+        one_step_95: Per channel, ends of the 95 % interval of ``one_step`` over rollouts, by the
+            jackknife of its logarithm; without channels that have none, as of fewer than three
+            rollouts. A rollout that fell makes it wide.
     """
 
     one_step: dict[str, float]
@@ -41,6 +47,7 @@ class Accuracy:
     multi_step_error: dict[str, dict[str, float]]
     coverage90: float | None
     gap: dict[str, float]
+    one_step_95: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
 
     def __repr__(self) -> str:
         errors = ", ".join(f"{name} {error:.2g}" for name, error in self.one_step.items())
@@ -91,9 +98,9 @@ def accuracy_along(
     relative, absolute = {}, {}
     dt = corrected.dt
     wanted = usual_steps(dt) if horizons is None else [max(round(h / dt), 1) for h in horizons]
-    longest = max(len(one) for one in actions)
+    lengths = [len(one) for one in actions]
     for steps in wanted:
-        if steps > longest:
+        if steps > max(lengths):
             continue
         with_model = _horizon_error(corrected, states, actions, steps, stride)
         without = _horizon_error(corrected.simulator, states, actions, steps, stride)
@@ -106,6 +113,7 @@ def accuracy_along(
         multi_step_error=absolute,
         coverage90=covered,
         gap=dict(zip(names, _ratio(_rms(truth), _rms(moved)), strict=True)),
+        one_step_95=interval_over_rollouts(names, truth - predicted, truth, lengths),
     )
 
 
@@ -154,6 +162,41 @@ def _horizon_error(
 
 def _rms(rows: Array) -> Array:
     return np.sqrt(np.mean(rows**2, axis=0))
+
+
+def interval_over_rollouts(
+    names: Sequence[str], error: Array, reference: Array, lengths: Sequence[int]
+) -> dict[str, tuple[float, float]]:
+    """95 % interval of the ratio of two RMS values by channel, over rollouts.
+
+    Rollouts are what chance draws: the jackknife of the ratio's logarithm, by Student's t.
+
+    Args:
+        names: Of the channels.
+        error: Rows of all rollouts, one after the other, (n, n_s).
+        reference: The same of what they are compared with.
+        lengths: Rows of each rollout.
+
+    Returns:
+        Both ends by channel, without channels that have none; empty of fewer than three rollouts.
+    """
+    count = len(lengths)
+    if count < _ROLLOUTS:
+        return {}
+    ends = np.cumsum(lengths)[:-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = [[(p**2).sum(axis=0) for p in np.split(rows, ends)] for rows in (error, reference)]
+        above, below = np.array(parts)
+        whole = 0.5 * np.log(above.sum(axis=0) / below.sum(axis=0))
+        without = 0.5 * np.log((above.sum(axis=0) - above) / (below.sum(axis=0) - below))
+        spread = np.sqrt((count - 1) * without.var(axis=0))
+        reach = stats.t.ppf(0.975, count - 1) * spread
+        low, high = np.exp(whole - reach), np.exp(np.minimum(whole + reach, 700.0))
+    return {
+        name: (float(low[i]), float(high[i]))
+        for i, name in enumerate(names)
+        if np.isfinite(whole[i]) and np.isfinite(reach[i])
+    }
 
 
 def _ratio(error: Array, reference: Array) -> list[float]:

@@ -11,6 +11,10 @@ import pandas as pd
 
 # A step of the true system that differs by less, as a share of what the step changes, does not.
 _NO_GAP = 1e-4
+# What is left of a gap of which no interval is worth a word.
+_EXACT = 1e-3
+#: Prefixes of the columns with the ends of the one-step error's interval over rollouts.
+ENDS = ("low95", "high95")
 
 
 def model_errors(errors: pd.DataFrame, estimator: str, samples: int, update: int) -> pd.DataFrame:
@@ -30,13 +34,36 @@ def by_group(errors: pd.DataFrame, prefix: str, about: Mapping[str, Any]) -> pd.
         prefix: ``"one_step"``, of which channels without a gap are left out, or a horizon.
         about: The system.
     """
-    part = _measured(errors, prefix)
-    if prefix == "one_step":
-        gaps = _measured(errors, "gap").reindex(columns=part.columns)
-        part = part.mask(gaps <= _NO_GAP)
+    part = by_channel(errors) if prefix == "one_step" else _measured(errors, prefix)
     part = part.replace([np.inf, -np.inf], np.nan)
     groups = {name: part.reindex(columns=list(own)) for name, own in about["groups"].items()}
     return pd.DataFrame({name: own.mean(axis=1) for name, own in groups.items()})
+
+
+def by_channel(errors: pd.DataFrame) -> pd.DataFrame:
+    """One-step errors by channel, without those of channels that have no gap."""
+    part = _measured(errors, "one_step")
+    gaps = _measured(errors, "gap").reindex(columns=part.columns)
+    return part.mask(gaps <= _NO_GAP).replace([np.inf, -np.inf], np.nan)
+
+
+def over_rollouts(
+    errors: pd.DataFrame, group: str, about: Mapping[str, Any]
+) -> tuple[float, float] | None:
+    """Interval of a group's one-step error over the rollouts of one trial, mean over its channels.
+
+    None of several trials, whose spread tells more, where there is none of a channel, and where
+    next to nothing is left.
+    """
+    if len(errors) != 1:
+        return None
+    there = by_channel(errors).iloc[0].reindex(list(about["groups"][group])).dropna()
+    channels = list(there.index)
+    wanted = [[f"{end}_{channel}" for channel in channels] for end in ENDS]
+    if not channels or not {*wanted[0], *wanted[1]} <= set(errors.columns):
+        return None
+    low, high = (float(errors[names].iloc[0].astype(float).mean(skipna=False)) for names in wanted)
+    return (low, high) if np.isfinite([low, high]).all() and high > _EXACT else None
 
 
 def _measured(errors: pd.DataFrame, prefix: str) -> pd.DataFrame:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from studies.learnt.errors import by_group, model_errors
+from studies.learnt.errors import by_group, model_errors, over_rollouts
 from studies.learnt.statistics import Mean, above, common_starts, mean, starts
 from studies.learnt.words import POLICY_WORDS, duration
 from studies.reporting.sections import Section, Table
@@ -146,7 +146,7 @@ def accuracy_section(errors: pd.DataFrame, about: About) -> list[Section]:
         table.append([
             f"{estimator}, update {update}", int(samples),
             "where it goes" if where == "visited" else "anywhere",
-            *(_finite(one_step[name]).text(3) for name in groups),
+            *(_with_interval(part, one_step[name], about) for name in groups),
             *(_finite(by_group(part, h, about).mean(axis=1)).text(3) or None for h in horizons),
             float(part["coverage90"].astype(float).mean()),
             float(part["fit_seconds"].median()),
@@ -157,12 +157,20 @@ def accuracy_section(errors: pd.DataFrame, about: About) -> list[Section]:
              *(f"all, {h.replace('s', ' s')}" for h in horizons), "90 % coverage", "fit s"],
             table,
             "Errors as shares of the gap without the model (1 is as bad as no model), with several "
-            f"seeds their mean and its 95 % interval: along {first}fresh rollouts of the policy "
+            "seeds their mean and its 95 % interval, of one step by one seed in brackets that over "
+            f"its rollouts: along {first}fresh rollouts of the policy "
             "that was trained on the model, and from states drawn anywhere where the true system "
             "can be set; coverage of the predicted 90 % interval.",
             heading="Where the difference model is right",
         )
     ]  # fmt: skip
+
+
+def _with_interval(part: pd.DataFrame, errors: pd.Series, about: About) -> str:
+    """A group's one-step error with its interval over seeds, or over the rollouts of one."""
+    text = _finite(errors).text(3)
+    ends = over_rollouts(part, str(errors.name), about)
+    return f"{text} ({ends[0]:.2g} to {ends[1]:.2g})" if text and ends else text
 
 
 def _finite(values: pd.Series) -> Mean:

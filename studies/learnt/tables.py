@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from simgap_files.atomic import atomic_path, atomic_write_text, write_sealed
+from studies.learnt.errors import ENDS
 from studies.learnt.words import measures_of, returns_by_start
 
 #: The column with a policy's returns on the true system by where they began.
@@ -112,6 +113,11 @@ def accuracy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
                 "coverage90": record[where]["coverage90"],
                 **{f"one_step_{k}": v for k, v in record[where]["one_step"].items()},
                 **{f"gap_{k}": v for k, v in record[where].get("gap", {}).items()},
+                **{
+                    f"{end}_{k}": ends[i]
+                    for k, ends in record[where].get("one_step_95", {}).items()
+                    for i, end in enumerate(ENDS)
+                },
                 **{
                     f"{horizon.replace(' ', '')}_{k}": v
                     for horizon, errors in record[where]["multi_step"].items()

@@ -92,6 +92,23 @@ def test_a_third_of_the_gap_that_is_left_is_not_called_closed(error, label):
     assert verdict(*several)[0].label == f"{label} closed"
 
 
+@pytest.mark.parametrize(
+    ("high", "label", "tone"),
+    [(0.4, "gap closed, on one seed", "good"), (0.75, "better, gap may remain", "warning")],
+)
+def test_rollouts_that_leave_open_what_is_left_close_no_gap(high, label, tone):
+    one = trial([more(8)], control=more(1), error=0.14)
+    one["accuracy"][0]["visited"]["one_step_95"] = {"upper": (0.05, high), "lower": (0.01, 0.1)}
+    found, tiles = verdict(one)
+    assert (found.label, found.tone) == (label, tone)
+    assert tiles.items[f"one-step error, share of gap (0.05 to {high})"] == "0.14"
+    assert ("cannot tell from 0.75" in found.text) == (high == 0.75)
+    # Of several seeds their spread tells more.
+    several = [trial([more(8)], control=more(1), error=0.14, seed=seed) for seed in range(3)]
+    several[0]["accuracy"] = one["accuracy"]
+    assert verdict(*several)[0].label == "gap closed"
+
+
 def test_an_idealised_policy_that_had_only_begun_to_learn_is_told():
     """As much training again then does what the difference model seems to do."""
     for before, again, told in ((-509.0, -100.0, True), (-60.0, -58.0, False), (3.0, 4.0, False)):
