@@ -37,7 +37,9 @@ def unwrapped(values: Array, times: Array, rates: Array | None = None) -> Array:
     found[known] = np.unwrap(angle)
     if rates is None or not len(went):
         return found
-    rate = rates[known]
+    padded = np.pad(rates[known], 1, mode="edge")
+    # Of three neighbours the middle one: a single wild reading leads nowhere.
+    rate = np.sort(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0)[1]
     ahead = 0.5 * (rate[1:] + rate[:-1]) * np.diff(times[known])
     far = np.abs(ahead) > FAR
     off = wrap(went - ahead)

@@ -36,6 +36,14 @@ def test_a_rate_that_is_none_changes_nothing(fastest, seed, factor):
     np.testing.assert_allclose(np.diff(found), np.diff(angle), atol=1e-9)
 
 
+@given(st.floats(1, 300), st.integers(0, 99), st.integers(1, 198), st.sampled_from([1e3, -80.0]))
+def test_a_single_wild_reading_of_the_rate_leads_nowhere(fastest, seed, row, wild):
+    angle, rate = turning(fastest, seed)
+    rate[row] = wild
+    found = unwrapped(wrap(angle), TIMES, rate)
+    np.testing.assert_allclose(np.diff(found), np.diff(angle), atol=1e-9)
+
+
 def test_rows_without_an_angle_stay_so():
     angle, rate = turning(40.0, 0)
     seen = wrap(angle)

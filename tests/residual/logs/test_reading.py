@@ -120,6 +120,17 @@ def test_angles_are_unwrapped_and_it_is_said(tmp_path):
     assert finding.numbers["jumps"] == 6
 
 
+def test_an_angle_that_turns_by_more_than_half_a_turn_follows_its_rate(tmp_path):
+    columns = swing()
+    times = columns["time"]
+    speed = 1.3 * np.pi / (times[1] - times[0]) * np.sin(0.3 * times)
+    angle = -1.3 * np.pi / (times[1] - times[0]) * np.cos(0.3 * times) / 0.3
+    wrapped = (angle + np.pi) % (2 * np.pi) - np.pi
+    path = write(tmp_path / "log.csv", columns | {"angle": wrapped, "rate": speed})
+    found = read(path).trajectories[0].states[:, 0]
+    np.testing.assert_allclose(found - found[0], angle - angle[0], atol=1e-6)
+
+
 def test_trajectories_are_told_apart_by_columns(tmp_path):
     one = swing(20)
     columns = {name: np.tile(values, 3) for name, values in one.items()}
