@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import difflib
 import importlib
@@ -263,10 +262,13 @@ def not_found(source: str | Mapping[str, Any]) -> str:
                 f"there is no module {module!r} for {path}; start Python in the folder that "
                 "holds it, or name that folder in PYTHONPATH"
             )
-        # What goes wrong while it is imported is told by whoever loads it.
-        with contextlib.suppress(pydoc.ErrorDuringImport):
+        try:
             if inside and pydoc.locate(path) is None:
                 return f"there is no class {path}; expected MODULE.CLASS, as import would find it"
+        except pydoc.ErrorDuringImport as error:
+            # Parsers take these for a value of another kind; all else is told by whoever loads it.
+            if isinstance(error.value, ValueError | TypeError):
+                return f"{error.filename} cannot be imported: {error.value}"
     return ""
 
 

@@ -28,7 +28,7 @@ class Channel:
         kind: ``"position"``, ``"rate"`` (time derivative of ``rate_of``), ``"input"``
             (an action), ``"other"`` (a state of a first-order system), or ``"memory"``
             (hidden state of an effect, such as the previous input of a delay).
-        angle: True if the channel is an angle, known only up to whole turns.
+        angle: True if the channel is an angle in rad, known only up to whole turns.
         rate_of: For ``kind="rate"``, the name of the position it is the rate of.
         scale: A typical magnitude in ``unit``; networks and kernels see the channel
             divided by it (an angle is seen as cosine and sine instead).
@@ -39,6 +39,10 @@ class Channel:
             are, or straight to the next (``"linear"``), as most measured inputs are.
         integrates: Name of the measured channel that this one is the integral of, as a heading
             may be summed up from a yaw rate: its noise is then a random walk.
+
+    Raises:
+        ValueError: A channel with ``angle=True`` that is not in rad, so that its turns are not
+            those of 2 pi.
     """
 
     name: str
@@ -52,6 +56,14 @@ class Channel:
     invariant: bool = False
     hold: Hold = "zero"
     integrates: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.angle and self.unit != "rad":
+            raise ValueError(
+                f"channel {self.name!r} has angle=True and unit={self.unit!r}, expected 'rad': "
+                "write the simulator in rad (a log may stay as it is, see its unit: under states), "
+                "or leave angle=True out and let the channel go on over whole turns"
+            )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -14,6 +14,7 @@ from residual.logs.checks import Finding, Signal, check_plausible, check_rate
 from residual.logs.layout import LogFormat, check_layout, named_column
 from residual.logs.overflow import continued
 from residual.logs.runs import runs_of
+from residual.logs.slower import filled
 from residual.logs.sources import open_log
 from residual.logs.table import LogError
 from residual.logs.timing import Run, report_sampling, tidy
@@ -82,6 +83,7 @@ def read_logs(
             only = len(paths) == 1
             runs += runs_of(table, layout, channels, action_channels, findings, only)
         _refuse_nowhere(runs, channels, columns)
+        runs = [filled(run, action_channels, findings) for run in runs]
         runs = tidy(
             runs, columns.gap, columns.minimum_samples, findings, [c.name for c in channels]
         )

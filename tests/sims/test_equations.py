@@ -279,3 +279,9 @@ def test_a_method_of_other_arguments_is_explained():
 
     with pytest.raises(ValueError, match=r"'p'; expected derivative\(self, x, u, p\)"):
         Heater()
+
+
+def test_an_angle_that_wraps_is_in_rad():
+    with pytest.raises(ValueError, match=r"'sway' has angle=True and unit='deg', expected 'rad'"):
+        Channel("sway", "deg", "position", angle=True)
+    Channel("sway", "deg", "position")

@@ -19,7 +19,13 @@ from sims.effects import (
     library,
     typical,
 )
-from sims.loading import chosen_effects, corrected_settings, load_simulator, simulator_settings
+from sims.loading import (
+    chosen_effects,
+    corrected_settings,
+    load_simulator,
+    not_found,
+    simulator_settings,
+)
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 
@@ -100,6 +106,13 @@ def test_what_cannot_be_loaded_is_said_in_one_line(source, names):
     with pytest.raises(ValueError, match=names) as caught:
         load_simulator(source)
     assert "\n" not in str(caught.value)
+
+
+def test_a_module_that_refuses_itself_is_told_in_its_own_words(tmp_path, monkeypatch):
+    (tmp_path / "crane_of_mine.py").write_text("raise ValueError('sway is in degrees')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    told = not_found("crane_of_mine.Crane")
+    assert told.endswith("cannot be imported: sway is in degrees")
 
 
 def test_effects_are_chosen_by_name():

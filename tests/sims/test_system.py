@@ -88,7 +88,7 @@ def test_a_task_is_a_task_and_actions_have_bounds():
     ("channel", "says"),
     [
         (
-            Channel("angle", "deg", "position", angle=True),
+            Channel("angle", "deg", "position"),
             "'angle' with unit='deg', expected 'rad'",
         ),
         (Channel("angle", "rad", "position"), "'angle' with angle=False, expected True"),

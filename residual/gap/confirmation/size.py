@@ -9,17 +9,22 @@ import numpy as np
 from residual.gap.confirmation.claim import Claim
 from residual.gap.model.candidates import Knob
 from residual.gap.search.sets import Search
+from sims.effects.curves import StateCurve
 
 #: Part of a strength below which an effect hardly acts.
 NEARLY_NONE = 0.1
 
 
 def may_vanish(search: Search, claim: Claim) -> bool:
-    """Whether none of an effect's strengths is known to be other than zero."""
+    """Whether none of an effect's strengths is known to be other than zero.
+
+    Of a curve along a state two of its points have to be: a single one is a place, and may stand
+    for whatever else happens while the state is there, such as the sun at noon.
+    """
     numbers = [claim.numbers[knob.field] for knob in strengths(search, claim)]
-    return bool(numbers) and all(
-        n.low <= 0 <= n.high and (not n.at_bound or n.value == 0) for n in numbers
-    )
+    told = sum(not n.low <= 0 <= n.high or (n.at_bound and n.value != 0) for n in numbers)
+    least = 2 if isinstance(search.candidates[claim.number].effect, StateCurve) else 1
+    return bool(numbers) and told < least
 
 
 def may_be_none(search: Search, claim: Claim) -> bool:

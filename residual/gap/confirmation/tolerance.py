@@ -30,8 +30,10 @@ from residual.gap.search import known
 from residual.gap.search.exchange import add_without_each, exchanged
 from residual.gap.search.sets import Key, Search, all_but
 from residual.gap.search.significance import size
+from sims.effects.actuator import ActuatorGain
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
+from sims.effects.sensor import SensorScale
 
 Array = NDArray[np.float64]
 
@@ -132,7 +134,7 @@ def allow_for_parameters(
         own = np.flatnonzero(beside.fit.model.owner == key.index(claim.number))
         sizes = own[search.candidates[claim.number].linear]
         lost = bool(sizes.size) and not (np.abs(beside.fit.theta) > half)[sizes].any()
-        if (lost and not claim.there) or within(search, claim, tolerance):
+        if (lost and not claim.there) or within(search, claim, tolerance, adequate):
             claim = dataclasses.replace(claim, calibration=True, slight=False)
         final.append(claim)
     return final
@@ -165,14 +167,21 @@ def promised(search: Search, key: Key, parameters: Sequence[Candidate]) -> float
     return float(((fit.projected.ravel() - rows @ step) ** 2).sum())
 
 
-def within(search: Search, claim: Claim, tolerance: float) -> bool:
-    """Whether a claim is of a parameter, and by what may be no more than its tolerance."""
+def within(search: Search, claim: Claim, tolerance: float, adequate: bool) -> bool:
+    """Whether a claim is of what may be off by no more than parameters may be.
+
+    A gain or a scale is a share, as the tolerance is. While a remainder is left, one that is as
+    small may make up for any of that.
+    """
     effect = search.candidates[claim.number].effect
-    if not isinstance(effect, ParameterChange):
+    if isinstance(effect, ParameterChange):
+        size = tolerance * known.size(search, effect.parameter)
+    elif isinstance(effect, ActuatorGain | SensorScale) and not adequate:
+        size = tolerance
+    else:
         return False
-    size = tolerance * known.size(search, effect.parameter)
-    (change,) = claim.numbers.values()
-    return change.low < size and change.high > -size
+    (share,) = claim.numbers.values()
+    return share.low < size and share.high > -size
 
 
 def excluded_rivals(search: Search, key: Key, claim: Claim) -> list[tuple[int, Key]]:

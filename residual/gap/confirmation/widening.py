@@ -18,6 +18,7 @@ from residual.gap.fitting.intervals import deviations
 from residual.gap.result import Number
 from residual.gap.search.exchange import exchanged
 from residual.gap.search.sets import Key, Search, all_but
+from sims.effects.curves import StateCurve
 
 Array = NDArray[np.float64]
 
@@ -86,12 +87,17 @@ def _of_a_misfit(search: Search, key: Key, claim: Claim) -> Claim:
 
 
 def _beside_rivals(search: Search, key: Key, claim: Claim, claims: Sequence[Claim]) -> Claim:
-    """A claim with intervals that hold, too, with rivals in place of its companions, and in larger
-    sets that fit much better."""
+    """A claim with intervals that hold, too, with rivals in place of its companions, in larger sets
+    that fit much better, and without a curve along a state, which is no law and takes up whatever
+    happens while the state is there."""
     others = list(_larger(search, key))
     for companion in claims:
         if companion.number == claim.number:
             continue
+        without = all_but(key, companion.number)
+        curved = isinstance(search.candidates[companion.number].effect, StateCurve)
+        if curved and without in search.tried and search.sound(without):
+            others.append(without)
         instead = {*companion.form, *companion.alike, *companion.rivals}
         others += [
             rival
