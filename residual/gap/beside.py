@@ -41,6 +41,26 @@ class Conventions:
 
 
 @dataclasses.dataclass(frozen=True)
+class Changing:
+    """A parameter or a gain whose change along the records would take most of what is left off.
+
+    Attributes:
+        label: ``name@where``, or the name alone of a parameter.
+        begin, end: Its values where records begin and end.
+        nominal: What it is in the simulator.
+        unit: Of these; ``"1"`` for the share of a gain.
+        taken: Part of the squared residual that this would take off.
+    """
+
+    label: str
+    begin: float
+    end: float
+    nominal: float
+    unit: str
+    taken: float
+
+
+@dataclasses.dataclass(frozen=True)
 class Unlike:
     """An effect that every record wants in a size of its own.
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from residual.gap.answer.answer import summed_up, told
 from residual.gap.answer.apart import NOT_JUDGED, judged_apart
+from residual.gap.answer.changing import changing
 from residual.gap.answer.confirmed import matters
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.records import stands_for, unlike
@@ -124,7 +125,9 @@ def find_gap(
         known = inquiry.confirmed(log, prepared, found, asked, parameter_tolerance)
         answer = known.answer
         tell("do the records differ?")
-        differ = unlike(answer) if asked and conventions is None and not clock.late else ()
+        ask = asked and conventions is None and not clock.late
+        differ = unlike(answer) if ask else ()
+        over_time = changing(answer) if ask else None
         clock.lap("confirm")
 
         table, judged = summed_up(answer), NOT_JUDGED
@@ -152,8 +155,9 @@ def find_gap(
     late = nearly_in_sensors(result.effects, answer.found.search)
     conventions = conventions or other_sign(simulator, result.effects)
     return replace(
-        result, conventions=conventions, cut_off=log.cut_off, unlike=differ, nearly_late=late
-    )
+        result, conventions=conventions, cut_off=log.cut_off, unlike=differ, changing=over_time,
+        nearly_late=late,
+    )  # fmt: skip
 
 
 def _refuse_settings(horizon: Any, parameter_tolerance: Any, minutes: Any) -> None:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.beside import Blind, Conventions, Unlike
+from residual.gap.beside import Blind, Changing, Conventions, Unlike
 from residual.gap.fitting.where import Where
 from sims.effects.base import Effect
 from sims.host import HostSimulator
@@ -262,6 +262,7 @@ class GapResult:
         cut_off: Channels that the simulator cuts off within what was recorded of them.
         unlike: Effects that would take much of what is left off with a size of their own in each
             record, best first.
+        changing: What would take most of what is left off if it changed along the records.
         nearly_late: Labels of delays and lags of some inputs that late, or filtering, sensors would
             nearly imitate, since the other inputs hardly change in that time.
     """
@@ -284,6 +285,7 @@ class GapResult:
     conventions: Conventions | None = None
     cut_off: tuple[str, ...] = ()
     unlike: tuple[Unlike, ...] = ()
+    changing: Changing | None = None
     nearly_late: tuple[str, ...] = ()
 
     def __repr__(self) -> str:

@@ -12,6 +12,7 @@ from sims.effects import Curve
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect
 from sims.host import HostSimulator
+from studies.gap.records import on_the_way
 from studies.gap.words import (
     KINDS,
     ahead,
@@ -229,6 +230,8 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
             f"nothing is named from {gap.blocks} {_blocks(gap)} of data, {TOO_FEW} are needed: "
             f"log some {more} more, or set a shorter --horizon"
         )
+    if result.changing:
+        found.append(on_the_way(result.changing))
     if verdict.follows:
         found.append(f"it looks like something that follows {verdict.follows}")
     if verdict.alternatives:

@@ -150,6 +150,7 @@ def gap_record(
         "cut_off": list(result.cut_off),
         "conventions": dataclasses.asdict(result.conventions) if result.conventions else None,
         "unlike": [dataclasses.asdict(one) for one in result.unlike],
+        "changing": dataclasses.asdict(result.changing) if result.changing else None,
         "verdicts": [dataclasses.asdict(verdict) for verdict in result.verdicts],
         "gap": dataclasses.asdict(result.gap),
         "held_out": dataclasses.asdict(result.held_out) if result.held_out else None,

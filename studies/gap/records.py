@@ -1,12 +1,20 @@
-"""What the records want differently, in words."""
+"""What the records want differently, from one to another or along them, in words."""
 
 from __future__ import annotations
 
 import re
 
 from residual.gap import GapResult
-from residual.gap.beside import Unlike
-from studies.gap.words import capitalized, effect_name, minus, names_of, percent, unit_text
+from residual.gap.beside import Changing, Unlike
+from studies.gap.words import (
+    capitalized,
+    effect_name,
+    minus,
+    names_of,
+    percent,
+    quantity_text,
+    unit_text,
+)
 
 #: What the terminal and the report call it.
 LABEL = "records differ"
@@ -43,6 +51,20 @@ def notes(result: GapResult) -> list[str]:
     if others := [other.label for other in result.unlike[1:]]:
         found.append(f"{names_of(others)} with its own size in each would do nearly as well")
     return found
+
+
+def on_the_way(changing: Changing) -> str:
+    """What would take most of what is left off if it changed along the records, a clause."""
+    begin, end, nominal = (
+        minus(quantity_text(value, changing.unit))
+        for value in (changing.begin, changing.end, changing.nominal)
+    )
+    return (
+        f"it looks as if {effect_name(changing.label)} went from about {begin} where records begin "
+        f"to {end} where they end ({nominal} in the simulator), which would take "
+        f"{percent(changing.taken)} of the squared residual off; no effect depends on time, so it "
+        "is not added: log it as an input, or let the simulator change it"
+    )
 
 
 def _sizes(one: Unlike) -> str:

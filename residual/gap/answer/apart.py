@@ -104,7 +104,7 @@ def _useless(
     channel that it helped most there, though it could.
 
     It could if more than noise is left of that, and it moves forecasts by so much: a gain on an
-    input that is zero does not.
+    input that is zero does not. Where nothing helps, it could if it moves them by more than noise.
 
     Args:
         search: With the chosen set, and that without the effect.
@@ -126,6 +126,8 @@ def _useless(
     own, lacking = (_mean(by_block(one.squares, other.blocks))[place] for one in (found, without))
     apart = (found.shown - without.shown)[other.blocks.windows.inside][:, place]
     moved, least = float((apart**2).mean()), AS_WELL * max(took[place], 0.0)
+    if denied and moved > _mean(floor)[place]:
+        return True
     if moved < least * (moved + own):
         return False
     if denied:

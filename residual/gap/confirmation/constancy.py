@@ -40,7 +40,7 @@ def creeps(search: Search, key: Key, number: int) -> bool:
         return False
     courses = list(_courses(search))
     return any(
-        _change(fit, search.fitter.blocks.block, j, course, CHANCE / len(courses))
+        change_over(fit, search.fitter.blocks.block, j, course, CHANCE / len(courses))
         for j in _strengths(fit, key.index(number))
         for course in courses
     )
@@ -65,7 +65,7 @@ def on_the_way(search: Search, key: Key, number: int) -> dict[int, tuple[float, 
         return {}
     course, found = along_records(search)[fitter.blocks.windows.index[:, 0]], {}
     for j in _strengths(fit, key.index(number)):
-        if change := _change(fit, fitter.blocks.block, j, course, CHANCE):
+        if change := change_over(fit, fitter.blocks.block, j, course, CHANCE):
             knob, size = fit.model.knobs[j], float(fit.theta[j])
             begin, end = np.clip([size - change / 2, size + change / 2], knob.low, knob.high)
             found[j] = (float(begin), float(end))
@@ -101,7 +101,7 @@ def _courses(search: Search) -> Iterator[Array]:
             yield own.astype(float)
 
 
-def _change(fit: Fit, block: NDArray[np.int64], j: int, course: Array, chance: float) -> float:
+def change_over(fit: Fit, block: NDArray[np.int64], j: int, course: Array, chance: float) -> float:
     """How much a number changes over a course over the windows; 0 if it does not clearly do so, or
     by less than a part of itself.
 

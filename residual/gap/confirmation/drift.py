@@ -8,6 +8,7 @@ percent off, a store so slow that it never fills.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -34,10 +35,10 @@ TURNS = 8
 
 
 class Fall(NamedTuple):
-    """What a set leaves beside a push, the numbers of that, and the set's own there, (p,)."""
+    """What a set leaves beside further columns, the numbers of these, and its own there, (p,)."""
 
     loss: float
-    numbers: int
+    numbers: Array
     theta: Array
 
 
@@ -70,7 +71,7 @@ class Drift:
         price = float(np.log(size(search))) * max(1.0, own / size(search))
 
         def behind(k: Key, fall: Fall) -> float:
-            return fall.loss - own + price * (search.numbers(k) + fall.numbers - numbers)
+            return fall.loss - own + price * (search.numbers(k) + len(fall.numbers) - numbers)
 
         return any(
             behind(k, drifting) <= 0.0 < behind(k, constant) - price
@@ -93,6 +94,10 @@ class Drift:
             if drifting.loss < MUCH * constant.loss
         ]
 
+    def least(self, key: Key) -> float:
+        """What a set leaves beside a push that drifts on the joint where that takes off most."""
+        return min((drifting.loss for _, drifting in self._with_push(key)), default=math.inf)
+
     def _with_push(self, key: Key) -> list[tuple[Fall, Fall]]:
         """What a set leaves beside a constant push on each joint, and beside one that grows in each
         record in its own way, too."""
@@ -106,16 +111,16 @@ class Drift:
                 pushes = [pushed(fitter, fit, joint.name, share) for share in (None, along)]
                 pushes[1] = pushes[1] * of_record
                 constant, drifting = (
-                    _beside(fit, some, fitter.cap) for some in (pushes[:1], pushes)
+                    beside(fit, some, fitter.cap) for some in (pushes[:1], pushes)
                 )
                 self._losses[key].append((constant, drifting))
         return self._losses[key]
 
 
-def _beside(fit: Fit, pushes: Sequence[Array], cap: float) -> Fall:
-    """A fit beside pushes (W, R, c), in the linear picture; what weighed little without them may
-    count in full beside them, so weights follow."""
-    columns = np.concatenate([fit.by_knob, *pushes], axis=2)
+def beside(fit: Fit, more: Sequence[Array], cap: float) -> Fall:
+    """A fit beside further columns (W, R, c), in the linear picture; what weighed little without
+    them may count in full beside them, so weights follow."""
+    columns = np.concatenate([fit.by_knob, *more], axis=2)
     size = np.sqrt(np.maximum((columns**2).sum(axis=(0, 1)), 1e-300))
     columns = columns / size
     grams = columns.transpose(0, 2, 1) @ columns
@@ -131,7 +136,7 @@ def _beside(fit: Fit, pushes: Sequence[Array], cap: float) -> Fall:
         if loss < least:
             least, best = loss, step / size
     own = fit.by_knob.shape[2]
-    return Fall(least, columns.shape[2] - own, fit.theta + best[:own])
+    return Fall(least, best[own:], fit.theta + best[:own])
 
 
 def _records(run: NDArray[np.int64]) -> Array:

@@ -35,7 +35,9 @@ def test_a_measured_input_runs_straight_between_its_readings(tmp_path):
     path = write(tmp_path / "log.csv", logged_in(columns, np.arange(0, 200, 4)))
     linear = tuple(dataclasses.replace(channel, hold="linear") for channel in ACTIONS)
     (run,) = read_logs([path], STATES, linear, LogFormat()).trajectories
-    np.testing.assert_allclose(run.actions[:, 0], columns["voltage"][: len(run.actions)], atol=0.025)
+    np.testing.assert_allclose(
+        run.actions[:, 0], columns["voltage"][: len(run.actions)], atol=0.025
+    )
 
 
 @given(seed=st.integers(0, 99))

@@ -1,0 +1,90 @@
+"""A parameter, or a gain, that changes along the records about what the simulator takes it for.
+
+A rope is hauled in, an outlet clogs, a battery sags. No effect of the library depends on time, and
+one whose mean is right does not stand out either: the gap stays, and has no name.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.answer.confirmed import Answer
+from residual.gap.answer.curves import NOTABLE
+from residual.gap.beside import Changing
+from residual.gap.confirmation.constancy import CHANCE, FEW, along_records, change_over
+from residual.gap.confirmation.drift import Drift, Fall, beside
+from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.screening import beside_starts
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.model.candidates import Candidate, candidates
+from residual.gap.search.sets import Key, Search
+from sims.effects.actuator import ActuatorGain
+from sims.effects.library import library
+from sims.effects.parameter import ParameterChange
+
+Array = NDArray[np.float64]
+
+#: Part of what is left, without its change along the records, that it may leave.
+HALF = 0.5
+
+
+def changing(answer: Answer) -> Changing | None:
+    """The parameter or gain whose change along the records would take most of what is left off.
+
+    It has to take off half of what it leaves as a constant, more than chance, and more than a push
+    that drifts.
+    """
+    found, search, key = answer.found, answer.found.search, answer.key
+    fitter, fit = search.fitter, search.tried[answer.key]
+    if not isinstance(fitter, SmoothFitter) or len(fitter.blocks) < FEW or found.adequate:
+        return None
+    if fitter.left(fit, found.floor).ratio < NOTABLE:
+        return None
+    pool = _pool(search, key)
+    along = along_records(search)
+    best: tuple[Fall, Fall, Candidate] | None = None
+    for one in pool:
+        size = float(one.trials[0].values[0, 0])
+        constant, course = (
+            beside_starts(fit, fitter.columns(fit, [one], share)[..., :1]) / size
+            for share in (None, along)
+        )
+        fixed, free = (beside(fit, c, fitter.cap) for c in ([constant], [constant, course]))
+        if free.loss > HALF * fixed.loss or (best and free.loss >= best[1].loss):
+            continue
+        if _clear(search, fit, constant, CHANCE / len(pool)):
+            best = (fixed, free, one)
+    if best is None or best[1].loss >= Drift(search).least(key):
+        return None
+    _, free, one = best
+    mean, change = free.numbers
+    (knob,), nominal, unit = one.knobs, 0.0, "1"
+    if isinstance(one.effect, ParameterChange):
+        nominal, unit = float(search.simulator.parameters[one.effect.parameter].value), knob.unit
+    ends = np.clip([mean - change / 2, mean + change / 2], knob.low, knob.high) + nominal
+    taken = 1 - free.loss / max(fit.merit, 1e-300)
+    return Changing(one.label, float(ends[0]), float(ends[1]), nominal, unit, taken)
+
+
+def _pool(search: Search, key: Key) -> list[Candidate]:
+    """Parameters and gains that are not named already."""
+    named = set(search.labels(key))
+    effects = [
+        effect
+        for effect in library(search.simulator)
+        if isinstance(effect, ParameterChange | ActuatorGain) and str(effect) not in named
+    ]
+    return candidates(search.simulator, effects, search.fitter.samples)
+
+
+def _clear(search: Search, fit: Fit, constant: Array, chance: float) -> bool:
+    """Whether a change along the records is more than chance, by blocks."""
+    blocks = search.fitter.blocks
+    course = along_records(search)[blocks.windows.index[:, 0]]
+    wider = dataclasses.replace(
+        fit, theta=np.append(fit.theta, 0.0), by_knob=np.concatenate([fit.by_knob, constant], 2)
+    )
+    return change_over(wider, blocks.block, len(fit.theta), course, chance) != 0.0
