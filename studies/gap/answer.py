@@ -14,6 +14,7 @@ from sims.effects.base import Effect
 from sims.host import HostSimulator
 from studies.gap.records import on_the_way
 from studies.gap.words import (
+    FOOTNOTE,
     KINDS,
     ahead,
     by_place,
@@ -33,8 +34,6 @@ from studies.gap.words import (
     unit_text,
 )
 
-#: Share of the gap without a name that is a footnote.
-FOOTNOTE = 0.02
 #: Verdicts that name no effect.
 NAMELESS = ("unexplained", "calibrated", "needs_data", "no_gap")
 #: Letters of a parameter's name up to which it is a symbol: l and L are two.
@@ -155,7 +154,7 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         spans = [("" if single else f"{_spelt(f)} ") + span(n) for f, n in surer.items()]
         found.append(f"{', '.join(spans)} if all else in the simulator is exact")
     for field, n in verdict.parameters.items():
-        if n.along is not None:
+        if n.along is not None and not result.changing:
             begin, end = (quantity_text(value, n.unit) for value in n.along)
             name = f"{_spelt(field)} " if len(verdict.parameters) > 1 else ""
             found.append(

@@ -7,6 +7,7 @@ import re
 from residual.gap import GapResult
 from residual.gap.beside import Changing, Unlike
 from studies.gap.words import (
+    FOOTNOTE,
     capitalized,
     effect_name,
     minus,
@@ -23,9 +24,18 @@ FEW = 8
 
 
 def beside_lead(result: GapResult) -> str:
-    """For the first sentence: how much would have a name if records may differ."""
+    """For the first sentence: how much would have a name if records may differ, or what changes
+    along them."""
     if not result.unlike:
-        return ""
+        much = any(v.kind == "unexplained" and v.share.value >= FOOTNOTE for v in result.verdicts)
+        if not result.changing or not much:
+            return ""
+        begin, end, _ = _values(result.changing)
+        name = effect_name(result.changing.label)
+        return (
+            f" The rest looks like {name} that changes along the records, from about {begin} to "
+            f"{end}."
+        )
     first = result.unlike[0]
     name, share = effect_name(first.label), percent(first.share)
     instead = ", and nothing else is added" if first.instead else ""
@@ -55,16 +65,19 @@ def notes(result: GapResult) -> list[str]:
 
 def on_the_way(changing: Changing) -> str:
     """What would take most of what is left off if it changed along the records, a clause."""
-    begin, end, nominal = (
-        minus(quantity_text(value, changing.unit))
-        for value in (changing.begin, changing.end, changing.nominal)
-    )
+    begin, end, nominal = _values(changing)
     return (
         f"it looks as if {effect_name(changing.label)} went from about {begin} where records begin "
         f"to {end} where they end ({nominal} in the simulator), which would take "
         f"{percent(changing.taken)} of the squared residual off; no effect depends on time, so it "
         "is not added: log it as an input, or let the simulator change it"
     )
+
+
+def _values(changing: Changing) -> list[str]:
+    """Where records begin, where they end, and in the simulator."""
+    sizes = (changing.begin, changing.end, changing.nominal)
+    return [minus(quantity_text(value, changing.unit)) for value in sizes]
 
 
 def _sizes(one: Unlike) -> str:

@@ -22,6 +22,8 @@ KINDS = {
     "unexplained": "unexplained",
     "no_gap": "no gap",
 }
+#: Share of the gap without a name that is a footnote.
+FOOTNOTE = 0.02
 #: Row of the shrinking gap that is no step.
 FLOOR = "noise floor"
 #: What the errors are errors of.

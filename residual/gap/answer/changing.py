@@ -7,6 +7,7 @@ one whose mean is right does not stand out either: the gap stays, and has no nam
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,28 +46,38 @@ def changing(answer: Answer) -> Changing | None:
         return None
     pool = _pool(search, key)
     along = along_records(search)
-    best: tuple[Fall, Fall, Candidate] | None = None
+    best: tuple[Fall, Candidate, int | None] | None = None
     for one in pool:
-        size = float(one.trials[0].values[0, 0])
+        size, free = float(one.trials[0].values[0, 0]), _place(fit, one)
         constant, course = (
             beside_starts(fit, fitter.columns(fit, [one], share)[..., :1]) / size
             for share in (None, along)
         )
-        fixed, free = (beside(fit, c, fitter.cap) for c in ([constant], [constant, course]))
-        if free.loss > HALF * fixed.loss or (best and free.loss >= best[1].loss):
+        given = [constant] if free is None else []
+        fixed, moved = (beside(fit, c, fitter.cap) for c in (given, [*given, course]))
+        if moved.loss > HALF * fixed.loss or (best and moved.loss >= best[0].loss):
             continue
-        if _clear(search, fit, constant, CHANCE / len(pool)):
-            best = (fixed, free, one)
-    if best is None or best[1].loss >= Drift(search).least(key):
+        if _clear(search, fit, given, free, CHANCE / len(pool)):
+            best = (moved, one, free)
+    if best is None or best[0].loss >= Drift(search).least(key):
         return None
-    _, free, one = best
-    mean, change = free.numbers
+    moved, one, free = best
+    mean = float(moved.numbers[0] if free is None else moved.theta[free])
+    change = float(moved.numbers[-1])
     (knob,), nominal, unit = one.knobs, 0.0, "1"
     if isinstance(one.effect, ParameterChange):
         nominal, unit = float(search.simulator.parameters[one.effect.parameter].value), knob.unit
     ends = np.clip([mean - change / 2, mean + change / 2], knob.low, knob.high) + nominal
-    taken = 1 - free.loss / max(fit.merit, 1e-300)
+    taken = 1 - moved.loss / max(fit.merit, 1e-300)
     return Changing(one.label, float(ends[0]), float(ends[1]), nominal, unit, taken)
+
+
+def _place(fit: Fit, one: Candidate) -> int | None:
+    """Where the number of a candidate stands among those of a fit; None if it is not free there."""
+    labels = [chosen.label for chosen in fit.model.chosen]
+    if one.label not in labels:
+        return None
+    return int(np.flatnonzero(fit.model.owner == labels.index(one.label))[0])
 
 
 def _pool(search: Search, key: Key) -> list[Candidate]:
@@ -80,11 +91,14 @@ def _pool(search: Search, key: Key) -> list[Candidate]:
     return candidates(search.simulator, effects, search.fitter.samples)
 
 
-def _clear(search: Search, fit: Fit, constant: Array, chance: float) -> bool:
+def _clear(
+    search: Search, fit: Fit, given: Sequence[Array], free: int | None, chance: float
+) -> bool:
     """Whether a change along the records is more than chance, by blocks."""
     blocks = search.fitter.blocks
     course = along_records(search)[blocks.windows.index[:, 0]]
-    wider = dataclasses.replace(
-        fit, theta=np.append(fit.theta, 0.0), by_knob=np.concatenate([fit.by_knob, constant], 2)
-    )
-    return change_over(wider, blocks.block, len(fit.theta), course, chance) != 0.0
+    if free is None:
+        by_knob = np.concatenate([fit.by_knob, *given], axis=2)
+        free = len(fit.theta)
+        fit = dataclasses.replace(fit, theta=np.append(fit.theta, 0.0), by_knob=by_knob)
+    return change_over(fit, blocks.block, free, course, chance) != 0.0
