@@ -112,6 +112,9 @@ class Toy:
     def usable(self):
         return [k for k in self.validated if k not in self.unfit and k not in self.refused]
 
+    def sound(self, key):
+        return key not in self.unfit and key not in self.refused
+
     def from_longer_leads(self, key):
         return self.validated[key].squares
 

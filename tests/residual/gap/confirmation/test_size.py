@@ -1,5 +1,6 @@
 """An effect that must be there has a size, however loosely a ratio of numbers ties it."""
 
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -9,8 +10,11 @@ from hypothesis import strategies as st
 from slides import braked, recorded
 
 from residual.gap import find_gap
-from residual.gap.confirmation.size import by_factors
+from residual.gap.confirmation.claim import Claim
+from residual.gap.confirmation.size import by_factors, may_vanish
 from residual.gap.model.candidates import Knob
+from residual.gap.result import Number
+from sims.effects.curves import InputCurve, StateCurve
 from sims.equations import EquationOfMotion
 from sims.simulator import Channel, Parameter
 
@@ -75,3 +79,20 @@ def test_a_side_that_a_bound_cuts_off_goes_as_far_as_the_other():
     low, high = by_factors(34.0, 0.0, 75.0, knob)
     assert low * high == pytest.approx(34.0**2)
     assert 0 < low < 34.0 - 20.0
+
+
+def told(effect, *spans):
+    """Whether an effect with these intervals may be nothing."""
+    knobs = [Knob(f"n{i}", "K/s", -np.inf, np.inf, 1.0, True) for i in range(len(spans))]
+    numbers = {f"n{i}": Number(0.5 * (a + b), a, b, "K/s") for i, (a, b) in enumerate(spans)}
+    search = SimpleNamespace(candidates=[SimpleNamespace(effect=effect, knobs=knobs)])
+    claim = Claim(0, numbers, (), (), (), (), True, True, True, False, (0.5, 0.4, 0.6))
+    return may_vanish(search, claim)
+
+
+def test_a_curve_along_a_state_needs_two_points_that_are_none_of_zero():
+    nothing, something = (-1.0, 2.0), (1.0, 2.0)
+    assert told(StateCurve("room"), nothing, something, nothing)
+    assert not told(StateCurve("room"), something, something, nothing)
+    assert not told(InputCurve("heat"), nothing, something, nothing)
+    assert told(InputCurve("heat"), nothing, nothing, nothing)

@@ -9,13 +9,15 @@ import pytest
 
 from residual.gap import find_gap
 from residual.gap.confirmation import tolerance
-from residual.gap.confirmation.tolerance import allowed, calibrated, work
+from residual.gap.confirmation.claim import Claim
+from residual.gap.confirmation.tolerance import allowed, calibrated, within, work
 from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
 from residual.gap.preparation.prepare import prepare
+from residual.gap.result import Number
 from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
-from sims.effects import ParameterChange
+from sims.effects import ActuatorGain, ParameterChange, SensorScale
 from sims.effects.library import library
 from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
@@ -158,3 +160,23 @@ def test_what_there_was_no_time_to_ask_is_not_certain(monkeypatch):
     first = find_gap(simulator, logs, effects=offered).verdicts[0]
     assert (first.kind, first.effect) == ("ambiguous", "mass")
     assert "no_time" in first.doubts
+
+
+@pytest.mark.parametrize("effect", [ActuatorGain("voltage"), SensorScale("angle")])
+@pytest.mark.parametrize(
+    ("low", "high", "adequate", "may_be_off"),
+    [
+        (0.003, 0.026, False, True),
+        (0.02, 0.3, False, True),
+        (-0.09, -0.01, False, True),
+        (0.031, 0.06, False, False),
+        (0.003, 0.026, True, False),
+    ],
+)
+def test_a_gain_as_small_as_parameters_may_be_off_is_not_certain_beside_a_remainder(
+    effect, low, high, adequate, may_be_off
+):
+    search = SimpleNamespace(candidates=[SimpleNamespace(effect=effect)])
+    number = Number(0.5 * (low + high), low, high, "1")
+    claim = Claim(0, {"gain": number}, (), (), (), (), True, True, True, False, (0.1, 0.05, 0.2))
+    assert within(search, claim, 0.03, adequate) == may_be_off

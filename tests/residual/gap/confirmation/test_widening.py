@@ -9,6 +9,7 @@ from toy import Toy
 from residual.gap.confirmation import widening
 from residual.gap.confirmation.claim import Claim
 from residual.gap.result import Number
+from sims.effects.curves import StateCurve
 
 
 def told(monkeypatch, merit, error, most=10.0):
@@ -56,3 +57,25 @@ def test_a_remainder_widens_within_the_bounds():
                  (0.9, 0.8, 0.95))  # fmt: skip
     found = widening._of_a_misfit(search, (0,), wide).numbers["change"]
     assert (found.low, found.high) == (0.0, 2.15)
+
+
+@pytest.mark.parametrize("curved", [True, False])
+def test_a_size_holds_without_a_curve_along_a_state_beside_it(monkeypatch, curved):
+    """It takes up whatever happens while the state is there."""
+    search = Toy({(): 1.0, (0,): 0.3, (0, 1): 0.1}, merits={(0,): 300.0, (0, 1): 100.0})
+    if curved:
+        search.candidates[1].effect = StateCurve("room")
+    knob = SimpleNamespace(field="change", low=-10.0, high=10.0)
+    for key, values in (((0,), [1.0]), ((0, 1), [2.0, 5.0])):
+        fit = search.tried[key]
+        fit.theta = np.array(values)
+        fit.model.knobs, fit.model.owner = (knob,) * len(key), np.arange(len(key))
+    monkeypatch.setattr(widening, "deviations", lambda fit, blocks: np.full(len(fit.theta), 0.05))
+    claims = [
+        Claim(n, {"change": Number(size, size - 0.1, size + 0.1, "kg")}, (), (), (), (), True, True,
+              True, False, (0.9, 0.8, 0.95))
+        for n, size in ((0, 2.0), (1, 5.0))
+    ]  # fmt: skip
+    found = widening._beside_rivals(search, (0, 1), claims[0], claims).numbers["change"]
+    assert found.high == pytest.approx(2.1)
+    assert found.low == pytest.approx(1.0 - 1.96 * 0.05 if curved else 1.9)
