@@ -29,15 +29,16 @@ class Conventions:
 
     Attributes:
         changes: Lines of the column map, any of which makes the nominal simulator forecast far
-            better: a sign, a zero or a unit.
-        times: How much smaller its error is then, or how many times its scale an input is.
+            better: a sign, a zero or a unit; of ``"row"`` the inputs.
+        times: How much smaller the error is then, or how many times its scale an input is.
         reason: ``"forecasts"`` are far better so; an input would be turned round by what was found
-            (``"sign"``); or an input is far beyond the ``"scale"`` that its channel declares.
+            (``"sign"``); an input is far beyond the ``"scale"`` that its channel declares; or what
+            is found with every input a ``"row"`` earlier forecasts better.
     """
 
     changes: tuple[str, ...]
     times: float
-    reason: Literal["forecasts", "sign", "scale"] = "forecasts"
+    reason: Literal["forecasts", "sign", "scale", "row"] = "forecasts"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -25,6 +25,7 @@ from residual.gap.preparation.conventions import beyond_scale, other_sign, other
 from residual.gap.preparation.horizon import other_length
 from residual.gap.preparation.numerics import held_as
 from residual.gap.result import GapResult
+from residual.gap.row_late import Read, a_row_earlier
 from residual.gap.search.finals import on_more_windows
 from residual.gap.search.known import KNOWN
 from residual.logs import LogData
@@ -112,9 +113,14 @@ def find_gap(
             tell(f"does the log count otherwise, by {' or '.join(conventions.changes)}?")
 
         found = inquiry.explained(simulator, prepared)
+        read = Read(log, prepared, found)
+        if conventions is None:
+            read = a_row_earlier(read, simulator, inquiry.explained, tell)
+        log, prepared, found = read.log, read.prepared, read.found
         on_hold: list[str] = []
-        if hold is None:
+        if hold is None and not read.says:
             prepared, found, on_hold = inquiry.other_hold(log, prepared, found)
+        conventions = conventions or (None if on_hold else read.conventions)
         log, prepared, found, on_rest = inquiry.begun_from_rest(log, prepared, found)
         with clock.besides():
             prepared, found, on_more = on_more_windows(prepared, found, clock.confirm_until, tell)
@@ -149,7 +155,16 @@ def find_gap(
         )
         clock.lap("forecast")
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
-    quality = [*log.findings, *log.left_out, *other, *on_hold, *on_rest, *on_more, *known.says]
+    quality = [
+        *log.findings,
+        *log.left_out,
+        *other,
+        *on_hold,
+        *read.says,
+        *on_rest,
+        *on_more,
+        *known.says,
+    ]
     quality += [*_searched(answer.found.search.fitter), *inquiry.untried(answer)]
     result = told(answer, table, judged.table, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)

@@ -56,6 +56,8 @@ def _conventions(result: GapResult) -> str:
         "sign": f"what fits acts the other way, as with {changes}",
         "scale": f"an input is {other.times:.0f} times the scale that its channel declares, as "
         f"without {changes}",
+        "row": f"with {' and '.join(other.changes)} a row earlier in the log, what is found errs "
+        f"{other.times:.2g} times less, as where rows hold the command that led to them",
     }[other.reason]
     return f"First see whether the log counts as the simulator does: {why}. If that is not it: "
 

@@ -1,0 +1,113 @@
+"""Inputs that were logged a row late: each row holds the command that led to it.
+
+Data sets of episodes, and loops that log at their end, write a state beside the command before it.
+Everything then happens a row before its cause, which no effect of the library does, so that time
+constants and stores are found that make up for it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from residual.gap.beside import Conventions
+from residual.gap.confirmation.certainty import CLEARLY
+from residual.gap.confirmation.numerics import forecast_error
+from residual.gap.fitting.validation import validate
+from residual.gap.log import Log
+from residual.gap.model.model import Model
+from residual.gap.preparation.prepare import Prepared, prepare
+from residual.gap.search.explain import Explanation
+from residual.trajectories import Trajectory
+from sims.host import HostSimulator
+
+#: Times that forecasts have to be better with inputs a row earlier to ask, and to say so.
+WORTH, BETTER = 1.1, 1.2
+
+
+@dataclasses.dataclass(frozen=True)
+class Read:
+    """A log as it was read, and what was found in it.
+
+    Attributes:
+        log: What was recorded.
+        prepared: Its windows.
+        found: What explains them.
+        says: What is to be said of how it was read.
+        conventions: What is to be looked at first.
+    """
+
+    log: Log
+    prepared: Prepared
+    found: Explanation
+    says: tuple[str, ...] = ()
+    conventions: Conventions | None = None
+
+
+def a_row_earlier(
+    read: Read,
+    nominal: HostSimulator,
+    explained: Callable[[HostSimulator, Prepared], Explanation],
+    tell: Callable[[str], None],
+) -> Read:
+    """The same, or the log with every input a row earlier, if that clearly explains it better.
+
+    Where only noise is left nothing is asked, nor of what strikes the ground.
+
+    Args:
+        read: The log as it is said to be.
+        nominal: The simulator with its inputs held as they are said to be.
+        explained: Searches.
+        tell: Progress.
+    """
+    log, found = read.log, read.found
+    if found.adequate or nominal.has_contacts or not nominal.action_channels:
+        return read
+    earlier = dataclasses.replace(
+        log, recorded=_shifted(log.recorded), runs=_shifted(log.runs), apart=_shifted(log.apart)
+    )
+    if not earlier.runs:
+        return read
+    ready = prepare(nominal, earlier.runs, log.horizon)
+    before = forecast_error(found.search, found.key)
+    if WORTH**2 * _error(ready, nominal, found) > before:
+        return read
+    tell("every input a row earlier fits better: once more so")
+    again = explained(nominal, ready)
+    after = forecast_error(again.search, again.key)
+    if again.adequate or CLEARLY**2 * after < before:
+        says = (
+            "every row was taken to hold the input that led to it, which the data fit better: move "
+            "the inputs' columns a row up, or see whether the simulator acts too late"
+        )
+        return Read(earlier, ready, again, (says,))
+    if BETTER**2 * after < before:
+        names = " and ".join(channel.name for channel in nominal.action_channels)
+        row = Conventions((names,), float(np.sqrt(before / after)), "row")
+        return dataclasses.replace(read, conventions=row)
+    return read
+
+
+def _error(ready: Prepared, nominal: HostSimulator, found: Explanation) -> float:
+    """Squared forecast error with what was found, or none of it, in units of the spread."""
+    fit = found.search.tried[found.key]
+    chosen, own = fit.model.chosen, fit.theta
+    errors = []
+    for members, theta in ((chosen, own), ((), own[:0])):
+        again = ready.fitter.fit(Model(nominal, members), theta)
+        squares = validate(ready.fitter, again).squares
+        samples = ready.fitter.samples
+        spread = np.nanvar(samples.seen[:, samples.measured], axis=0)
+        errors.append(float(np.nanmean(squares / np.maximum(spread, 1e-300))))
+    return min(errors)
+
+
+def _shifted(runs: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
+    """Runs whose inputs act a row earlier, without their last row, of which none is known."""
+    return tuple(
+        Trajectory(run.name, run.times[:-1], run.states[:-1], run.actions[1:], run.before)
+        for run in runs
+        if len(run) > 1
+    )
