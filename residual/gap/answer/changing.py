@@ -30,13 +30,15 @@ Array = NDArray[np.float64]
 
 #: Part of what is left, without its change along the records, that it may leave.
 HALF = 0.5
+#: Times that a change of what is named has to leave more.
+CLEARLY = 1.5
 
 
 def changing(answer: Answer) -> Changing | None:
     """The parameter or gain whose change along the records would take most of what is left off.
 
-    It has to take off half of what it leaves as a constant, more than chance, and more than a push
-    that drifts.
+    It has to take off half of what it leaves as a constant, more than chance, more than a push that
+    drifts, and clearly more than a change of what is named: of that both ends are told anyway.
     """
     found, search, key = answer.found, answer.found.search, answer.key
     fitter, fit = search.fitter, search.tried[answer.key]
@@ -44,22 +46,22 @@ def changing(answer: Answer) -> Changing | None:
         return None
     if fitter.left(fit, found.floor).ratio < NOTABLE:
         return None
-    pool = _pool(search, key)
-    along = along_records(search)
+    pool, named = _pool(search, key), search.numbers(key)
     best: tuple[Fall, Candidate, int | None] | None = None
     for one in pool:
-        size, free = float(one.trials[0].values[0, 0]), _place(fit, one)
-        constant, course = (
-            beside_starts(fit, fitter.columns(fit, [one], share)[..., :1]) / size
-            for share in (None, along)
-        )
-        given = [constant] if free is None else []
-        fixed, moved = (beside(fit, c, fitter.cap) for c in (given, [*given, course]))
+        free = _place(fit, one)
+        constant = [] if free is not None else [_column(fitter, fit, one)]
+        course = _own_course(search, fit, free) if free is not None else _column(
+            fitter, fit, one, along_records(search)
+        )  # fmt: skip
+        fixed, moved = (beside(fit, c, fitter.cap) for c in (constant, [*constant, course]))
         if moved.loss > HALF * fixed.loss or (best and moved.loss >= best[0].loss):
             continue
-        if _clear(search, fit, given, free, CHANCE / len(pool)):
+        if _clear(search, fit, constant, free, CHANCE / len(pool)):
             best = (moved, one, free)
-    if best is None or best[0].loss >= Drift(search).least(key):
+    own = [beside(fit, [_own_course(search, fit, j)], fitter.cap).loss for j in range(named)]
+    least = min([Drift(search).least(key), *(loss / CLEARLY for loss in own)])
+    if best is None or best[0].loss >= least:
         return None
     moved, one, free = best
     mean = float(moved.numbers[0] if free is None else moved.theta[free])
@@ -72,14 +74,6 @@ def changing(answer: Answer) -> Changing | None:
     return Changing(one.label, float(ends[0]), float(ends[1]), nominal, unit, taken)
 
 
-def _place(fit: Fit, one: Candidate) -> int | None:
-    """Where the number of a candidate stands among those of a fit; None if it is not free there."""
-    labels = [chosen.label for chosen in fit.model.chosen]
-    if one.label not in labels:
-        return None
-    return int(np.flatnonzero(fit.model.owner == labels.index(one.label))[0])
-
-
 def _pool(search: Search, key: Key) -> list[Candidate]:
     """Parameters and gains that are not named already."""
     named = set(search.labels(key))
@@ -89,6 +83,26 @@ def _pool(search: Search, key: Key) -> list[Candidate]:
         if isinstance(effect, ParameterChange | ActuatorGain) and str(effect) not in named
     ]
     return candidates(search.simulator, effects, search.fitter.samples)
+
+
+def _column(fitter: SmoothFitter, fit: Fit, one: Candidate, share: Array | None = None) -> Array:
+    """What a candidate does to every window by unit of its number, (W, R, 1)."""
+    size = float(one.trials[0].values[0, 0])
+    return beside_starts(fit, fitter.columns(fit, [one], share)[..., :1]) / size
+
+
+def _own_course(search: Search, fit: Fit, j: int) -> Array:
+    """What a number of a fit does that changes along the records, (W, R, 1)."""
+    course = along_records(search)[search.fitter.blocks.windows.index[:, 0]]
+    return (fit.by_knob[..., j] * course[:, None])[..., None]
+
+
+def _place(fit: Fit, one: Candidate) -> int | None:
+    """Where the number of a candidate stands among those of a fit; None if it is not free there."""
+    labels = [chosen.label for chosen in fit.model.chosen]
+    if one.label not in labels:
+        return None
+    return int(np.flatnonzero(fit.model.owner == labels.index(one.label))[0])
 
 
 def _clear(
