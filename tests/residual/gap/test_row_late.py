@@ -1,0 +1,88 @@
+"""Rows that hold the command that led to them are read so, and others as they are."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from oven import GAIN, SLOW, Oven
+
+from residual.gap import find_gap, row_late
+from residual.gap.beside import Conventions
+from residual.trajectories import Trajectory
+from studies.gap import lead
+
+ROWS, HOLD, STEP = 400, 10, 5.0
+
+
+def record(late, seed=0, weak=0.8, follows=0.0):
+    """A heater in closed form that is too weak; its rows hold the command after them or, late,
+    before. ``follows`` is what each row's duty takes over from the one before."""
+    rng = np.random.default_rng(seed)
+    duty = np.repeat(rng.uniform(0, 1, ROWS // HOLD), HOLD)
+    for k in range(1, ROWS):
+        duty[k] = follows * duty[k - 1] + (1 - follows) * duty[k]
+    kept, path = np.exp(-STEP / SLOW), [20.0]
+    for one in duty:
+        path.append(kept * path[-1] + (1 - kept) * GAIN * weak * one)
+    seen = (np.array(path) + rng.normal(0, 0.05, ROWS + 1))[:, None]
+    duty = duty[:, None]
+    if late:
+        return Trajectory("run", STEP * np.arange(ROWS), seen[1:], duty[:-1])
+    return Trajectory("run", STEP * np.arange(ROWS + 1), seen, duty)
+
+
+def told(result):
+    return any("every row was taken to hold the input that led to it" in n for n in result.quality)
+
+
+@pytest.mark.parametrize("late", [True, False])
+def test_a_weak_heater_is_all_that_is_named(late):
+    """Read a row late, time constant and store made up for it, and were certain."""
+    held = record(late, seed=1)
+    result = find_gap(Oven(), [record(late)], held_out=[held])
+    assert told(result) == late
+    (named,) = (v for v in result.verdicts if v.parameters)
+    assert (named.kind, named.effect) == ("confirmed", "actuator_gain")
+    assert named.parameters["gain"].value == pytest.approx(-0.2, abs=0.005)
+    assert result.held_out.after.value < 1.2 * result.held_out.noise_floor.value
+
+
+def test_another_time_constant_is_no_late_row():
+    fast = record(late=False)
+    result = find_gap(Oven(), [Trajectory("run", 2 * fast.times, fast.states, fast.actions)])
+    assert not told(result) and result.conventions is None
+    assert any(v.effect == "slow" for v in result.verdicts if v.kind == "confirmed")
+
+
+def answers(monkeypatch, before, after):
+    """What is made of errors as the log is said to be and with inputs a row earlier."""
+    found = SimpleNamespace(search="said", key=(), adequate=False)
+    again = SimpleNamespace(search="earlier", key=(), adequate=False)
+    errors = {"said": before, "earlier": after}
+    monkeypatch.setattr(row_late, "forecast_error", lambda search, key: errors[search])
+    monkeypatch.setattr(row_late, "_error", lambda *given: after)
+    monkeypatch.setattr(row_late, "prepare", lambda *given: "ready")
+    log = SimpleNamespace(runs=(record(True),), recorded=(record(True),), apart=(), horizon=1.0)
+    monkeypatch.setattr(row_late.dataclasses, "replace", replaced)
+    read = row_late.Read(log, "as said", found)
+    return row_late.a_row_earlier(read, Oven(), lambda *given: again, lambda says: None)
+
+
+def replaced(one, **fields):
+    return type(one)(**{**vars(one), **fields})
+
+
+def test_clearly_better_is_read_so_a_little_better_is_told_first_and_else_nothing(monkeypatch):
+    assert answers(monkeypatch, 1.0, 0.3).says
+    doubtful = answers(monkeypatch, 1.0, 0.6)
+    assert not doubtful.says
+    assert doubtful.conventions == Conventions(("duty",), pytest.approx(0.6**-0.5), "row")
+    for after in (0.9, 1.2):
+        same = answers(monkeypatch, 1.0, after)
+        assert same.conventions is None and not same.says and same.prepared == "as said"
+
+
+def test_what_is_told_first_names_the_columns():
+    row = Conventions(("duty",), 1.3, "row")
+    told_first = lead._conventions(SimpleNamespace(conventions=row))
+    assert "with duty a row earlier in the log, what is found errs 1.3 times less" in told_first
