@@ -30,6 +30,7 @@ from residual.gap.data.kinematics import kinematics
 from residual.gap.data.nominal import nominal
 from residual.gap.data.onset import begun_late
 from residual.gap.data.repeats import without_repeats
+from residual.gap.data.resets import cut_at_resets
 from residual.gap.data.sizes import sizes, wrapped
 from residual.gap.data.unanswered import unanswered
 from residual.gap.data.wild_inputs import without_wild_inputs
@@ -73,8 +74,9 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
     trajectories = [replace(run, states=run.states[:, physical]) for run in trajectories]
     trajectories, copied = once(trajectories)
     trajectories, wild = without_wild_inputs(simulator, trajectories)
+    trajectories, resets = cut_at_resets(simulator, trajectories)
     trajectories, repeats = without_repeats(simulator, trajectories)
-    found = [*copied, *wild, *repeats, *findings(simulator, trajectories)]
+    found = [*copied, *wild, *resets, *repeats, *findings(simulator, trajectories)]
     for finding in found:
         if finding.severity == "refuse":
             raise ValueError(f"{finding.where}: {finding.says}" if finding.where else finding.says)
