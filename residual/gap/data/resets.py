@@ -65,8 +65,9 @@ def cut_at_resets(
         cut += [run.piece(a, b, f"{run.name} part {n}") for n, (a, b) in enumerate(pieces, start=1)]
         first = moment(float(run.times[np.flatnonzero(own)[0] + 1]))
         count = int(own.sum())
+        often = "once" if count == 1 else f"{count} times"
         says = (
-            f"{run.name} begins anew {count} times without saying so, first at {first}: a position "
+            f"{run.name} begins anew {often} without saying so, first at {first}: a position "
             "leaps there, and no force does that; it was cut there"
         )
         findings.append(Finding("reset", "", says, {"resets": count}, "warning"))
@@ -82,7 +83,7 @@ def leapt(
     Args:
         values: A position in every run, (n,).
         times: Of the rows in s, (n,).
-        rates: Its rate, if that was measured; else the steps beside each one tell the pace.
+        rates: Its rate, if that was measured; steps beside each one tell the pace, too.
         most: Range that counts if the position's is larger.
     """
     found = [np.zeros(max(len(own) - 1, 0), bool) for own in values]
@@ -91,11 +92,17 @@ def leapt(
         return found
     steps = [np.diff(t) for t in times]
     ways = [np.diff(own) for own in values]
-    if rates is None:
-        paces = [_pace(way / step) for way, step in zip(ways, steps, strict=True)]
-    else:
-        paces = [0.5 * (own[1:] + own[:-1]) for own in rates]
-    beyond = [w - p * s for w, p, s in zip(ways, paces, steps, strict=True)]
+    beyond = [way - _pace(way / step) * step for way, step in zip(ways, steps, strict=True)]
+    if rates is not None:
+        # Nearer to either: a rate that is wild tells no pace.
+        by_rate = [
+            w - 0.5 * (v[1:] + v[:-1]) * s for w, v, s in zip(ways, rates, steps, strict=True)
+        ]
+        beyond = [
+            np.where(np.abs(a) < np.abs(b), a, b) for a, b in zip(by_rate, beyond, strict=True)
+        ]
+    if not np.isfinite(np.concatenate(beyond)).any():
+        return found
     usual, sudden = (
         float(np.nanquantile(np.abs(np.concatenate(parts)), USUAL)) for parts in (ways, beyond)
     )

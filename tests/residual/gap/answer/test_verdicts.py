@@ -55,7 +55,8 @@ def test_what_makes_forecasts_worse_is_not_named_where_neither_chance_nor_fits_d
 ):
     knob = SimpleNamespace(field="change", strength=True)
     search = SimpleNamespace(
-        candidates=[SimpleNamespace(label="mass", knobs=(knob,))], family=lambda number: ""
+        candidates=[SimpleNamespace(label="mass", effect=None, knobs=(knob,))],
+        family=lambda number: "",
     )
     claim = SimpleNamespace(
         number=0, share=(share, share - 0.1, share + 0.1), rivals=(), needed=True,

@@ -32,6 +32,7 @@ def test_readings_are_told_from_their_repeats(every, late, seed):
     rng = np.random.default_rng(seed)
     rows = np.arange(0, 1200, every)
     rows[1:] += (rng.random(len(rows) - 1) < late) & (every > 2)
+    rows = rows[rows < 1200]
     seen = repeated(motion(seed) + rng.normal(0, 0.01, 1200), rows)
     assert rhythm([seen]) == every
     np.testing.assert_array_equal(np.flatnonzero(fresh(seen, every)), rows)

@@ -61,7 +61,7 @@ def episodes():
     runs = make_logs(Truth(mass=0.3), 5, "strong", "A", runs=8)
     count, states = len(runs[0].times), np.zeros((0, 2))
     for run in runs:
-        leap = states[-1, 0] + 1.0 - run.states[0, 0] if len(states) else 0.0
+        leap = states[-1, 0] + 2.0 - run.states[0, 0] if len(states) else 0.0
         states = np.concatenate([states, run.states + np.array([leap, 0.0])])
     acted = [np.concatenate([run.actions, run.actions[-1:]]) for run in runs]
     times = np.arange(8 * count) * float(np.median(runs[0].durations))
