@@ -24,7 +24,7 @@ from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
 #: Times that forecasts have to be better with inputs a row earlier to ask, and to say so.
-WORTH, BETTER = 1.1, 1.2
+WORTH, BETTER = 1.1, 1.35
 
 
 @dataclasses.dataclass(frozen=True)
