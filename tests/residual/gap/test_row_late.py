@@ -74,10 +74,10 @@ def replaced(one, **fields):
 
 def test_clearly_better_is_read_so_a_little_better_is_told_first_and_else_nothing(monkeypatch):
     assert answers(monkeypatch, 1.0, 0.3).says
-    doubtful = answers(monkeypatch, 1.0, 0.6)
+    doubtful = answers(monkeypatch, 1.0, 0.5)
     assert not doubtful.says
-    assert doubtful.conventions == Conventions(("duty",), pytest.approx(0.6**-0.5), "row")
-    for after in (0.9, 1.2):
+    assert doubtful.conventions == Conventions(("duty",), pytest.approx(0.5**-0.5), "row")
+    for after in (0.6, 1.2):
         same = answers(monkeypatch, 1.0, after)
         assert same.conventions is None and not same.says and same.prepared == "as said"
 
