@@ -77,17 +77,17 @@ def a_row_earlier(
     tell("every input a row earlier fits better: once more so")
     again = explained(nominal, ready)
     after = forecast_error(again.search, again.key)
+    if BETTER**2 * after >= before:
+        return read
     if again.adequate or CLEARLY**2 * after < before:
         says = (
             "every row was taken to hold the input that led to it, which the data fit better: move "
             "the inputs' columns a row up, or see whether the simulator acts too late"
         )
         return Read(earlier, ready, again, (says,))
-    if BETTER**2 * after < before:
-        names = " and ".join(channel.name for channel in nominal.action_channels)
-        row = Conventions((names,), float(np.sqrt(before / after)), "row")
-        return dataclasses.replace(read, conventions=row)
-    return read
+    names = " and ".join(channel.name for channel in nominal.action_channels)
+    row = Conventions((names,), float(np.sqrt(before / after)), "row")
+    return dataclasses.replace(read, conventions=row)
 
 
 def _error(ready: Prepared, nominal: HostSimulator, found: Explanation) -> float:
