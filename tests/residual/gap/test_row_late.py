@@ -54,10 +54,10 @@ def test_another_time_constant_is_no_late_row():
     assert any(v.effect == "slow" for v in result.verdicts if v.kind == "confirmed")
 
 
-def answers(monkeypatch, before, after):
+def answers(monkeypatch, before, after, adequate=False):
     """What is made of errors as the log is said to be and with inputs a row earlier."""
     found = SimpleNamespace(search="said", key=(), adequate=False)
-    again = SimpleNamespace(search="earlier", key=(), adequate=False)
+    again = SimpleNamespace(search="earlier", key=(), adequate=adequate)
     errors = {"said": before, "earlier": after}
     monkeypatch.setattr(row_late, "forecast_error", lambda search, key: errors[search])
     monkeypatch.setattr(row_late, "_error", lambda *given: after)
@@ -77,8 +77,9 @@ def test_clearly_better_is_read_so_a_little_better_is_told_first_and_else_nothin
     doubtful = answers(monkeypatch, 1.0, 0.5)
     assert not doubtful.says
     assert doubtful.conventions == Conventions(("duty",), pytest.approx(0.5**-0.5), "row")
+    assert answers(monkeypatch, 1.0, 0.5, adequate=True).says
     for after in (0.6, 1.2):
-        same = answers(monkeypatch, 1.0, after)
+        same = answers(monkeypatch, 1.0, after, adequate=True)
         assert same.conventions is None and not same.says and same.prepared == "as said"
 
 
