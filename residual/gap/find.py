@@ -155,17 +155,8 @@ def find_gap(
         )
         clock.lap("forecast")
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
-    quality = [
-        *log.findings,
-        *log.left_out,
-        *other,
-        *on_hold,
-        *read.says,
-        *on_rest,
-        *on_more,
-        *known.says,
-    ]
-    quality += [*_searched(answer.found.search.fitter), *inquiry.untried(answer)]
+    quality = [*log.findings, *log.left_out, *other, *on_hold, *read.says, *on_rest, *on_more]
+    quality += [*known.says, *_searched(answer.found.search.fitter), *inquiry.untried(answer)]
     result = told(answer, table, judged.table, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)
     conventions = conventions or other_sign(simulator, result.effects)

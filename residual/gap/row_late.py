@@ -14,7 +14,7 @@ import numpy as np
 
 from residual.gap.beside import Conventions
 from residual.gap.confirmation.certainty import CLEARLY
-from residual.gap.confirmation.numerics import forecast_error
+from residual.gap.confirmation.numerics import forecast_error, in_spreads
 from residual.gap.fitting.validation import validate
 from residual.gap.log import Log
 from residual.gap.model.model import Model
@@ -98,9 +98,7 @@ def _error(ready: Prepared, nominal: HostSimulator, found: Explanation) -> float
     for members, theta in ((chosen, own), ((), own[:0])):
         again = ready.fitter.fit(Model(nominal, members), theta)
         squares = validate(ready.fitter, again).squares
-        samples = ready.fitter.samples
-        spread = np.nanvar(samples.seen[:, samples.measured], axis=0)
-        errors.append(float(np.nanmean(squares / np.maximum(spread, 1e-300))))
+        errors.append(in_spreads(ready.fitter.samples, squares))
     return min(errors)
 
 

@@ -35,7 +35,6 @@ def by_group(errors: pd.DataFrame, prefix: str, about: Mapping[str, Any]) -> pd.
         about: The system.
     """
     part = by_channel(errors) if prefix == "one_step" else _measured(errors, prefix)
-    part = part.replace([np.inf, -np.inf], np.nan)
     groups = {name: part.reindex(columns=list(own)) for name, own in about["groups"].items()}
     return pd.DataFrame({name: own.mean(axis=1) for name, own in groups.items()})
 
@@ -44,7 +43,7 @@ def by_channel(errors: pd.DataFrame) -> pd.DataFrame:
     """One-step errors by channel, without those of channels that have no gap."""
     part = _measured(errors, "one_step")
     gaps = _measured(errors, "gap").reindex(columns=part.columns)
-    return part.mask(gaps <= _NO_GAP).replace([np.inf, -np.inf], np.nan)
+    return part.mask(gaps <= _NO_GAP)
 
 
 def over_rollouts(
@@ -67,8 +66,9 @@ def over_rollouts(
 
 
 def _measured(errors: pd.DataFrame, prefix: str) -> pd.DataFrame:
-    """One kind of measurement by channel."""
+    """One kind of measurement by channel; what is beyond all bounds is not known."""
     part = errors.filter(regex=f"^{re.escape(prefix)}_").astype(float)
+    part = part.replace([np.inf, -np.inf], np.nan)
     return part.rename(columns=lambda name: name.removeprefix(f"{prefix}_"))
 
 

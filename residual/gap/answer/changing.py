@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import NOTABLE
 from residual.gap.beside import Changing
-from residual.gap.confirmation.constancy import CHANCE, FEW, along_records, change_over
+from residual.gap.confirmation.constancy import (
+    CHANCE,
+    FEW,
+    along_records,
+    along_windows,
+    change_over,
+)
 from residual.gap.confirmation.drift import Drift, Fall, beside
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts
@@ -93,8 +99,7 @@ def _column(fitter: SmoothFitter, fit: Fit, one: Candidate, share: Array | None 
 
 def _own_course(search: Search, fit: Fit, j: int) -> Array:
     """What a number of a fit does that changes along the records, (W, R, 1)."""
-    course = along_records(search)[search.fitter.blocks.windows.index[:, 0]]
-    return (fit.by_knob[..., j] * course[:, None])[..., None]
+    return (fit.by_knob[..., j] * along_windows(search)[:, None])[..., None]
 
 
 def _place(fit: Fit, one: Candidate) -> int | None:
@@ -109,10 +114,9 @@ def _clear(
     search: Search, fit: Fit, given: Sequence[Array], free: int | None, chance: float
 ) -> bool:
     """Whether a change along the records is more than chance, by blocks."""
-    blocks = search.fitter.blocks
-    course = along_records(search)[blocks.windows.index[:, 0]]
     if free is None:
         by_knob = np.concatenate([fit.by_knob, *given], axis=2)
         free = len(fit.theta)
         fit = dataclasses.replace(fit, theta=np.append(fit.theta, 0.0), by_knob=by_knob)
-    return change_over(fit, blocks.block, free, course, chance) != 0.0
+    course = along_windows(search)
+    return change_over(fit, search.fitter.blocks.block, free, course, chance) != 0.0

@@ -63,7 +63,7 @@ def on_the_way(search: Search, key: Key, number: int) -> dict[int, tuple[float, 
         return {}
     if len(fitter.blocks) < FEW:
         return {}
-    course, found = along_records(search)[fitter.blocks.windows.index[:, 0]], {}
+    course, found = along_windows(search), {}
     for j in _strengths(fit, key.index(number)):
         if change := change_over(fit, fitter.blocks.block, j, course, CHANCE):
             knob, size = fit.model.knobs[j], float(fit.theta[j])
@@ -88,12 +88,17 @@ def along_records(search: Search) -> Array:
     return along
 
 
+def along_windows(search: Search) -> Array:
+    """Where every window begins in its record, from -1/2 to 1/2, (W,)."""
+    return along_records(search)[search.fitter.blocks.windows.index[:, 0]]
+
+
 def _courses(search: Search) -> Iterator[Array]:
     """How a number may go over the windows, each (W,): along every record from -1/2 to 1/2, and
     otherwise in one of the records."""
     blocks = search.fitter.blocks
     windows = blocks.windows
-    yield along_records(search)[windows.index[:, 0]]
+    yield along_windows(search)
     records = np.unique(windows.run)
     for run in records if len(records) > 1 else ():
         own = windows.run == run

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.data.samples import Samples
 from residual.gap.fitting.contract import Fit
 from residual.gap.model.model import Model
 from residual.gap.preparation.numerics import FINE, held_otherwise
@@ -69,10 +70,14 @@ def fits_better(search: Search, key: Key, other: HostSimulator) -> bool:
 
 
 def forecast_error(search: Search, key: Key) -> float:
-    """Cross-validated forecast error in units of the spread of each channel, all averaged."""
-    samples = search.fitter.samples
+    """Cross-validated squared forecast error of a set, see ``in_spreads``."""
+    return in_spreads(search.fitter.samples, search.validated[key].squares)
+
+
+def in_spreads(samples: Samples, squares: Array) -> float:
+    """Squared errors (B, m) in units of the spread of each channel, all averaged."""
     spread = np.nanvar(samples.seen[:, samples.measured], axis=0)
-    return float(np.nanmean(search.validated[key].squares / np.maximum(spread, 1e-300)))
+    return float(np.nanmean(squares / np.maximum(spread, 1e-300)))
 
 
 def at_half_step(search: Search, key: Key) -> Fit:

@@ -130,8 +130,8 @@ def _held(values: Array, row: int) -> bool:
 
 def _pace(speeds: Array) -> Array:
     """The middle of the speeds beside every step, (n - 1,)."""
-    padded = np.pad(speeds, BESIDE, mode="reflect") if len(speeds) > BESIDE else speeds
-    if len(padded) < len(speeds) + 2 * BESIDE:
+    if len(speeds) <= BESIDE:
         return speeds
+    padded = np.pad(speeds, BESIDE, mode="reflect")
     beside = [padded[i : i + len(speeds)] for i in range(2 * BESIDE + 1) if i != BESIDE]
     return np.median(np.stack(beside), axis=0)
