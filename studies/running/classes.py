@@ -8,7 +8,8 @@ scikit-learn had the 60 iterations of a Gaussian process.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 SIMULATORS = ("--simulator", "--corrected")
@@ -22,16 +23,35 @@ def class_of_word(word: str) -> dict[str, str]:
     return {name.removeprefix("--"): word} if name in CLASSES else {}
 
 
+def unfinished(words: Sequence[str], contents: Iterable[Any]) -> str:
+    """What a class that words or settings name does not define yet, as an end of a line."""
+    named: list[Any] = [path for i in range(len(words)) for path in _chosen(words, i).values()]
+    for content in contents:
+        if isinstance(content, Mapping):
+            named += [content.get(option.removeprefix("--")) for option in CLASSES]
+    for given in named:
+        path = given.get("class_path") if isinstance(given, Mapping) else given
+        module, _, name = str(path).rpartition(".")
+        kind = getattr(sys.modules.get(module), name, None)
+        if missing := getattr(kind, "__abstractmethods__", None):
+            return f": {name} does not define {', '.join(sorted(missing))}"
+    return ""
+
+
+def _chosen(words: Sequence[str], i: int) -> dict[str, str]:
+    """The import path that a word gives an option for, by that option; empty if it gives none."""
+    name, equals, value = words[i].partition("=")
+    chosen = value if equals else "".join(words[i + 1 : i + 2])
+    return {name: chosen} if name in CLASSES and IMPORT_PATH.fullmatch(chosen) else {}
+
+
 def without_replaced(settings: Mapping[str, Any], words: Sequence[str]) -> dict[str, Any]:
     """Settings of a file without the classes that the command line names another one for."""
     found = dict(settings)
-    for i, word in enumerate(words):
-        name, equals, value = word.partition("=")
-        if name in CLASSES and IMPORT_PATH.fullmatch(
-            chosen := value if equals else "".join(words[i + 1 : i + 2])
-        ):
-            inside = found.get(name.removeprefix("--"))
+    for i in range(len(words)):
+        for option, chosen in _chosen(words, i).items():
+            inside = found.get(option.removeprefix("--"))
             known = inside.get("class_path") if isinstance(inside, Mapping) else inside
             if known != chosen:
-                found.pop(name.removeprefix("--"), None)
+                found.pop(option.removeprefix("--"), None)
     return found

@@ -26,6 +26,7 @@ from studies.running.classes import (
     IMPORT_PATH,
     SIMULATORS,
     class_of_word,
+    unfinished,
     without_replaced,
 )
 from studies.running.ending import DEBUG, DEBUG_VARIABLE, TRUST, typed
@@ -153,6 +154,7 @@ class Parser(jsonargparse.ArgumentParser):
         reason = unknown or re.sub(r"\s*\n\s*-?\s*", " ", str(message).strip())
         if ex is None:  # of the words that were given, not of what one of them means
             reason += self._likely(message)
+        reason += unfinished(self._words, (inside for _, inside in _READ.values()))
         sys.stderr.write(f"error: {reason} (see --help)\n")
         raise SystemExit(2)
 

@@ -3,6 +3,7 @@
 import pytest
 import yaml
 
+from studies import find_gap
 from studies.learn import STUDY
 from studies.learning.trial import build_parser, resolve
 from studies.running.grids import expand_grid
@@ -46,3 +47,20 @@ def test_a_class_of_a_grid_has_its_own_settings():
     block = {"estimator": [{"class_path": MLP}, {"class_path": GP, "init_args": {"max_iter": 5}}]}
     found = [resolve(STUDY, one)["estimator"] for one in expand_grid(settings, [block])]
     assert [(e["class_path"], e["init_args"]["max_iter"]) for e in found] == [(MLP, 200), (GP, 5)]
+
+
+def test_a_class_that_is_not_whole_is_told_what_it_lacks(tmp_path, monkeypatch, capsys):
+    (tmp_path / "half_written.py").write_text(
+        "from sims import FirstOrderSystem\n\n\nclass Half(FirstOrderSystem):\n    dt = 1.0\n"
+    )
+    (tmp_path / "mine.yaml").write_text("simulator: half_written.Half\nlogs: log.csv\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    for given in (
+        ["--simulator", "half_written.Half", "--logs", "log.csv"],
+        ["--config", "mine.yaml"],
+    ):
+        with pytest.raises(SystemExit) as ended:
+            find_gap.main([*given, "--output", "out"])
+        assert ended.value.code == 2
+        assert "Half does not define derivative" in capsys.readouterr().err

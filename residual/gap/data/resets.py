@@ -1,7 +1,8 @@
-"""Episodes that follow each other in one record, times going on: a position leaps from one row to
-the next, and moves on from there.
+"""Episodes that follow each other in one record, times going on: a position or a first-order state
+leaps from one row to the next, and moves on from there.
 
-No force does that. What was begun anew, or moved by hand between two rows, is another record.
+No force does that to a position, and to a state nothing that the simulator knows. What was begun
+anew, or moved by hand between two rows, is another record.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.data.nominal import filled
+from residual.gap.data.sizes import wrapped
 from residual.logs.checks import Finding
 from residual.logs.faults import grain
 from residual.trajectories import Trajectory, moment
@@ -26,6 +29,11 @@ USUAL = 0.9
 FAST, SUDDEN, FAR, ROUGH = 2.5, 12.0, 0.1, 3.0
 #: Rows on either side that tell the pace, in which one that comes back was none, and how nearly.
 BESIDE, BACK, NEARLY = 2, 3, 0.3
+#: Times the most that the simulator moves a state in a row that a leap of it is.
+BEYOND = 5.0
+#: Rows on either side of a leap in which a step of an input may have caused it, part of the input's
+#: range that a step is, and others as large as half of it, without a leap, by which it did not.
+NEAR, STEP, OTHERS = 3, 0.05, 2
 #: Rows below which a piece is no record.
 LEAST = 5
 
@@ -43,15 +51,24 @@ def cut_at_resets(
     rate_of = {channel.rate_of: i for i, channel in enumerate(channels) if channel.kind == "rate"}
     leaps = [np.zeros(len(run.actions), bool) for run in trajectories]
     times = [run.times for run in trajectories]
+    leaping = []
+    turning_over = {finding.where for finding in wrapped(simulator, trajectories)}
     for column, channel in enumerate(channels):
-        if channel.kind != "position" or channel.name not in rate_of:
+        if channel.name in turning_over:
             continue
-        values, rates = (
-            [run.states[:, i] for run in trajectories] for i in (column, rate_of[channel.name])
-        )
-        measured = any(np.isfinite(own).any() for own in rates)
+        values = [run.states[:, column] for run in trajectories]
         turning = 2 * np.pi if channel.angle else np.inf
-        found = leapt(values, times, rates if measured else None, turning)
+        if channel.kind == "position" and channel.name in rate_of:
+            rates = [run.states[:, rate_of[channel.name]] for run in trajectories]
+            measured = any(np.isfinite(own).any() for own in rates)
+            found = leapt(values, times, rates if measured else None, turning)
+        elif channel.rate_of is None and not simulator.has_contacts:
+            found = leapt(values, times, None, turning)
+            if any(own.any() for own in found):
+                found = _unmoved(simulator, trajectories, column, found)
+        else:
+            continue
+        leaping += [channel.name] if any(own.any() for own in found) else []
         for own, mask in zip(leaps, found, strict=True):
             own |= mask
     cut: list[Trajectory] = []
@@ -65,10 +82,11 @@ def cut_at_resets(
         cut += [run.piece(a, b, f"{run.name} part {n}") for n, (a, b) in enumerate(pieces, start=1)]
         first = moment(float(run.times[np.flatnonzero(own)[0] + 1]))
         count = int(own.sum())
-        often = "once" if count == 1 else f"{count} times"
+        when = f"at {first}" if count == 1 else f"{count} times, the first time at {first},"
+        what = " and ".join(leaping) if len(leaping) < 3 else "the state"
         says = (
-            f"{run.name} begins anew {often} without saying so, first at {first}: a position "
-            "leaps there, and no force does that; it was cut there"
+            f"{run.name} begins anew {when} without saying so: {what} leaps there, as nothing "
+            "moves it from one row to the next; it was cut there"
         )
         findings.append(Finding("reset", "", says, {"resets": count}, "warning"))
     return cut, findings
@@ -114,6 +132,55 @@ def leapt(
         for row in np.flatnonzero(np.abs(leap) > least).tolist():
             mask[row] = not (_comes_back(leap, row) or _held(own, row))
     return found
+
+
+def _unmoved(
+    simulator: HostSimulator, trajectories: Sequence[Trajectory], column: int,
+    leaps: Sequence[NDArray[np.bool_]],
+) -> list[NDArray[np.bool_]]:  # fmt: skip
+    """Leaps of a state that neither what the simulator knows nor a step of an input makes."""
+    most, inputs = 0.0, [run.actions for run in trajectories]
+    for run in trajectories:
+        states = filled(simulator, run)
+        if states is None:
+            return [np.zeros_like(own) for own in leaps]
+        rows = np.flatnonzero(np.isfinite(states[:-1]).all(axis=1))
+        actions = run.actions[rows]
+        with np.errstate(all="ignore"):
+            after = simulator.step(simulator.augment(states[rows], actions), actions)[:, column]
+        pace = np.abs(after - states[rows, column]) / simulator.dt * run.durations[rows]
+        most = max(most, float(np.max(pace, initial=0.0, where=np.isfinite(pace))))
+    caused = _caused(inputs, leaps)
+    return [
+        own & (np.abs(np.diff(run.states[:, column])) > BEYOND * most) & ~by
+        for own, by, run in zip(leaps, caused, trajectories, strict=True)
+    ]
+
+
+def _caused(inputs: Sequence[Array], leaps: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
+    """Leaps beside a step of an input, unless other steps as large bring none."""
+    caused = [np.zeros_like(own) for own in leaps]
+    near = [_beside(own) for own in leaps]
+    for column in range(inputs[0].shape[1]):
+        stepped = [np.abs(np.diff(own[:, column], prepend=own[:1, column])) for own in inputs]
+        least = STEP * float(np.ptp(np.concatenate([own[:, column] for own in inputs])))
+        for own, step, by in zip(leaps, stepped, caused, strict=True):
+            for row in np.flatnonzero(own):
+                size = float(step[max(row - NEAR, 0) : row + NEAR + 1].max())
+                others = sum(
+                    int((one[~beside] > size / 2).sum())
+                    for one, beside in zip(stepped, near, strict=True)
+                )
+                by[row] |= size > least and others < OTHERS
+    return caused
+
+
+def _beside(leaps: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Rows near a leap."""
+    near = np.zeros_like(leaps)
+    for row in np.flatnonzero(leaps):
+        near[max(row - NEAR, 0) : row + NEAR + 1] = True
+    return near
 
 
 def _comes_back(leap: Array, row: int) -> bool:

@@ -98,9 +98,10 @@ def wrapped(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
             for row in np.flatnonzero(jump)
         ]
         if rows and (not others.size or others.max() < SMALL * turn):
+            often = "once" if len(rows) == 1 else f"{len(rows)} times"
             fix = "declare it with angle=True" if channel.unit == "rad" else "unwrap the column"
             says = (
-                f"jumps by a whole turn {len(rows)} times (the first at {rows[0]}), as an angle "
+                f"jumps by a whole turn {often} (the first at {rows[0]}), as an angle "
                 f"does that is cut there: {fix} (numpy.unwrap(values, period={turn:.6g}))"
             )
             found.append(refusal("wrapped", channel.name, says))
