@@ -40,6 +40,7 @@ __all__ = sorted(_MODULES)
 COMMANDS = {
     "learn": ("studies.learn", "learn to control a system from few samples of it"),
     "find-gap": ("studies.find_gap", "name the physics that a simulator lacks, from logs"),
+    "log-info": ("studies.log_info", "what a log file holds, and how to read it"),
     "make-log": ("studies.make_log", "measure a system that hides something, to try find-gap"),
     "report": ("studies.report", "rebuild tables and report of a study's folder"),
     "benchmarks": ("studies.benchmarks", "how fast we are beside our peers"),

@@ -62,6 +62,12 @@ def check_regressor(estimator: object, simulator: Simulator | None = None) -> No
 def _refuse_predictions(estimator: Any) -> None:
     """Refuse a regressor that predicts something else than it was asked, once it has learnt a
     plane from few rows; one that cannot learn that from so few is judged by its own data."""
+    name = type(estimator).__name__
+    if hasattr(estimator, "_parameter_constraints"):
+        try:
+            estimator._validate_params()
+        except ValueError as error:  # scikit-learn says which one, and what it takes
+            raise ValueError(f"estimator {name}: {error}") from None
     X = np.random.default_rng(0).normal(size=(_ROWS, 4))
     try:
         with warnings.catch_warnings():
@@ -69,7 +75,6 @@ def _refuse_predictions(estimator: Any) -> None:
             found = np.asarray(clone(estimator, safe=False).fit(X, X.sum(axis=1)).predict(X))
     except Exception:
         return
-    name = type(estimator).__name__
     if found.size != _ROWS or len(found) != _ROWS:
         raise ValueError(
             f"estimator {name} predicts shape {found.shape} for {_ROWS} rows of one output, "

@@ -67,6 +67,7 @@ def save(model: Any, path: str | Path) -> None:
             "mean": model.mean_.tolist(),
             "scale": model.scale_.tolist(),
             "seen": model.seen_.tolist(),
+            "parameters": _parameters(model.simulator),
         }
     name = type(estimator).__name__
     if not is_ours(estimator):
@@ -108,8 +109,8 @@ def load(path: str | Path, simulator: Simulator | None = None, trusted: Sequence
     Raises:
         FileNotFoundError: There is no such file.
         ValueError: The file is damaged, holds types that are not trusted, or is not one that
-            ``save`` wrote, or the difference model in it was fitted for another control period or
-            other channels than ``simulator``.
+            ``save`` wrote, or the difference model in it was fitted for another control period,
+            other channels or other parameters than those of ``simulator``.
     """
     header, arrays = read_arrays(path)
     try:
@@ -128,10 +129,37 @@ def load(path: str | Path, simulator: Simulator | None = None, trusted: Sequence
     if simulator is not None and isinstance(model, DifferenceModel):
         try:
             model.check_fits(simulator)
+            _refuse_other_parameters(header["difference"].get("parameters"), simulator)
         except ValueError as error:
             raise FileError(f"{path}: {error}") from None
         model.simulator = simulator
     return model
+
+
+def _parameters(simulator: Simulator | None) -> dict[str, float]:
+    """The parameters of a simulator that are single numbers, as a difference adds to them."""
+    known = getattr(simulator, "parameters", {})
+    return {n: float(p.value) for n, p in known.items() if np.ndim(p.value) == 0}
+
+
+def _refuse_other_parameters(fitted: Any, simulator: Simulator) -> None:
+    """Refuse a simulator with other parameters than that of the fit: it would be corrected twice.
+
+    Raises:
+        ValueError: The message says which parameter, and what it was.
+    """
+    if not isinstance(fitted, dict):
+        return  # an earlier version did not keep them
+    for name, value in _parameters(simulator).items():
+        was = fitted.get(name, value)
+        if not isinstance(was, int | float):
+            raise ValueError(f"parameter {name} is {was!r:.40}, expected a number")
+        if not np.isclose(value, was, rtol=1e-9, atol=0.0):
+            raise ValueError(
+                f"the difference model was fitted beside {name} {was:g}, and the simulator has "
+                f"{value:g}: what that changes would be added twice; load it with the simulator "
+                "that it was fitted with, or fit again"
+            )
 
 
 def _restore(

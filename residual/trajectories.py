@@ -58,6 +58,18 @@ class Transitions:
             np.concatenate(episodes),
         )
 
+    def runs(self, dt: float, name: str = "run") -> list[Trajectory]:
+        """Every episode as a recorded run, with the control period ``dt`` in s between samples."""
+        found: list[Trajectory] = []
+        for episode in np.unique(self.episodes):
+            rows = np.flatnonzero(self.episodes == episode)
+            states = np.concatenate([self.states[rows], self.next_states[rows[-1:]]])
+            times = np.asarray(dt * np.arange(len(states)), float)
+            found.append(
+                Trajectory(f"{name}-{len(found) + 1:02d}", times, states, self.actions[rows])
+            )
+        return found
+
     def save(self, path: Path) -> None:
         """Write all columns to one ``.npz`` file, whole or not at all.
 

@@ -23,8 +23,8 @@ StateOf = Callable[[Any, Any], ArrayLike]
 _STARTS, _NEARBY = 20, 0.1
 
 _log = logging.getLogger("simgap")
-# What was said of which environment: every training makes a new one.
-_said: set[tuple[str, str]] = set()
+# What was logged of which environment: every training makes a new one.
+_logged: set[tuple[str, str]] = set()
 
 
 class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -40,6 +40,9 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         nominal: Its channels name the columns of the state and the actions.
         task: Reward, termination and horizon; start states are the environment's own.
         state_of: Reads the state from the environment and its observation.
+
+    Attributes:
+        said: The first warning of each kind about it.
 
     Raises:
         Unsound: The actions or the control period are not those of ``nominal``; later, the state
@@ -92,6 +95,7 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._lowest, self._highest = _starts(task, len(self._angles))
         self._state: Array = np.zeros(0)
         self._steps = 0
+        self.said: dict[str, str] = {}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -138,8 +142,7 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._state = reached
         truncated = bool(cut or self._steps >= self.task.horizon)
         if cut and not terminated and self._steps < self.task.horizon:
-            _warn_once(
-                self._name,
+            self._warn(
                 "end",
                 f"ended an episode after {self._steps} of {self.task.horizon} steps "
                 "without terminating it: its returns are sums over fewer steps than those on "
@@ -166,13 +169,20 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if far.any():
             c = int(np.argmax(far))
             name, unit = channels[c].name, channels[c].unit
-            _warn_once(
-                self._name,
+            self._warn(
                 "start",
                 f"begins episodes at {name} {self._state[c]:.3g} {unit}, the task "
                 f"from {low[c]:.3g} to {high[c]:.3g} {unit}: policies learn from other starts "
                 "than they are tested at; let start of the task draw what reset gives",
             )
+
+    def _warn(self, what: str, says: str) -> None:
+        """Warn of something about the environment, and log the same no second time."""
+        warning = f"{self._name} {says}"
+        self.said.setdefault(what, warning)
+        if (self._name, what) not in _logged:
+            _logged.add((self._name, what))
+            _log.warning("%s", warning)
 
     def _read(self, observation: Any, info: dict[str, Any]) -> Array:
         if self._state_of is not None:
@@ -236,10 +246,3 @@ def _starts(task: Task, width: int) -> tuple[Array, Array]:
     """The ends of where episodes of a task start, each (n_s,)."""
     starts = [task.start(np.random.default_rng(seed))[:width] for seed in range(_STARTS)]
     return np.min(starts, axis=0), np.max(starts, axis=0)
-
-
-def _warn_once(name: str, what: str, says: str) -> None:
-    """Warn of something about an environment, and of the same no second time."""
-    if (name, what) not in _said:
-        _said.add((name, what))
-        _log.warning("%s %s", name, says)

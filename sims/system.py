@@ -233,6 +233,7 @@ class System:
             "name": self.name,
             "nominal": self.nominal.name,
             "dt": self.nominal.dt,
+            "sampled": not isinstance(self.true, Simulator),
             "states": [{"name": c.name, "unit": c.unit, "angle": c.angle} for c in channels],
             "actions": [{"name": c.name, "unit": c.unit} for c in self.nominal.action_channels],
             "groups": {name: list(part) for name, part in self.channel_groups().items()},
@@ -257,9 +258,11 @@ def _kind(given: Any) -> str:
 def _refuse_no_maker(true: Any, what: str) -> None:
     """Refuse what is no function without arguments."""
     if not callable(true):
+        like_one = hasattr(true, "reset") and hasattr(true, "step")
+        mend = ": derive its class from gymnasium.Env" if like_one else ""
         raise ValueError(
             f"{what} is {_kind(true)}, expected a Simulator, a Gymnasium environment, or a "
-            "function that makes either"
+            f"function that makes either{mend}"
         )
     if why := cannot_call(true):
         raise ValueError(

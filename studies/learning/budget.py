@@ -20,7 +20,7 @@ class Budget:
         baseline_steps: True steps given to the cold and to the warm start; 0 skips them.
         control_steps: Simulated steps of the control for each update; 0 skips it.
         corrected_steps: Simulated steps on the simulator that was corrected by name, if there is
-            one.
+            one; by default as many as ``difference_steps``.
 
     Raises:
         ValueError: A number is too small.
@@ -33,17 +33,24 @@ class Budget:
     true_steps: int = 0
     baseline_steps: int = 0
     control_steps: int = 0
-    corrected_steps: int = 20_000
+    corrected_steps: int | None = None
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             least = 2 if field.name == "true_samples" else 0
             value = getattr(self, field.name)
+            if value is None:
+                continue
             whole = isinstance(value, int) and not isinstance(value, bool)
             if not whole or value < least:
                 raise ValueError(
                     f"budget.{field.name} is {value!r}, expected a whole number from {least}"
                 )
+
+    @property
+    def steps_on_corrected(self) -> int:
+        """Simulated steps on the simulator that was corrected by name."""
+        return self.difference_steps if self.corrected_steps is None else self.corrected_steps
 
     def check(self, algorithm: Algorithm, replay_is_filled: bool, corrected: bool = False) -> None:
         """Raise ``ValueError`` if a training would end before anything is learnt in it.
@@ -58,7 +65,7 @@ class Budget:
             empty += ["difference_steps"] if self.iterations else []
             empty += ["control_steps"] + ["corrected_steps"] * corrected
         for name in empty:
-            if 0 < getattr(self, name) < algorithm.warm_up:
+            if 0 < (getattr(self, name) or 0) < algorithm.warm_up:
                 raise ValueError(
                     f"budget.{name} is {getattr(self, name)}, but the first {algorithm.warm_up} "
                     "steps only fill the replay and teach nothing: give more steps, or a smaller "

@@ -54,6 +54,7 @@ def run_loop(steps: Steps, budget: Budget, corrected: Simulator | None = None) -
     start = begin = WarmStart.begin(idealised, steps.replay)
     for update in range(1, budget.iterations + 1):
         samples.append(steps.collect(policy, budget.true_samples, update, model))
+        learnt.add_samples(update, samples[-1])
         model = steps.fit(samples)
         policy = steps.train("difference", budget.difference_steps, start, on=model, update=update)
         accuracy = steps.measure(model, policy, update)
@@ -66,7 +67,7 @@ def run_loop(steps: Steps, budget: Budget, corrected: Simulator | None = None) -
         learnt.add_policy("control", control, iteration=update)
         start = start.then(control)
     if corrected is not None:
-        named = steps.train("corrected", budget.corrected_steps, begin, on=corrected)
+        named = steps.train("corrected", budget.steps_on_corrected, begin, on=corrected)
         learnt.add_policy("corrected", named)
     # The reference and the cold start are one experiment, read at two budgets.
     if longest := max(budget.true_steps, budget.baseline_steps):

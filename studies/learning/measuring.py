@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 
@@ -18,13 +19,15 @@ from studies.learning.training import exploration, visited
 
 Array = NDArray[np.float64]
 
+_log = logging.getLogger("simgap")
+
 #: States at most that open-loop predictions start at, unless a system says otherwise.
 STARTS = 1000
 
 
 def where_it_goes(
     system: System, algorithm: Algorithm, policy: Policy, corrected: CorrectedSimulator, seed: int
-) -> Accuracy:
+) -> tuple[Accuracy, int]:
     """Accuracy along fresh true rollouts of a policy, all but the first with exploration noise.
 
     Args:
@@ -33,6 +36,9 @@ def where_it_goes(
         policy: Trained on ``corrected``.
         corrected: The simulator with its difference model.
         seed: Where the random numbers of the rollouts begin.
+
+    Returns:
+        The accuracy, and the steps of the true system that it took.
     """
     protocol = system.evaluation
     env = system.true_environment(corrected)
@@ -47,7 +53,8 @@ def where_it_goes(
     ]
     # One that fell ends early, and is as long as it is.
     states, actions = [visited(system, run) for run in runs], [run.actions for run in runs]
-    return accuracy_along(corrected, states, actions, stride=_stride(system, actions))
+    accuracy = accuracy_along(corrected, states, actions, stride=_stride(system, actions))
+    return accuracy, sum(map(len, actions))
 
 
 def anywhere(system: System, corrected: CorrectedSimulator, seed: int) -> Accuracy | None:
@@ -66,6 +73,16 @@ def anywhere(system: System, corrected: CorrectedSimulator, seed: int) -> Accura
     else:
         return None
     states = states[..., : len(system.nominal.state_channels)]
+    sound = np.asarray(np.isfinite(states).all(axis=(1, 2)))
+    if not sound.all():
+        _log.warning(
+            "the true system returns values that are not finite from %d of %d states anywhere "
+            "within the scales of its channels: these are left out of its accuracy anywhere",
+            (~sound).sum(), len(sound),
+        )  # fmt: skip
+    if not sound.any():
+        return None
+    states, actions = states[sound], actions[sound]
     return accuracy_along(corrected, states, actions, stride=_stride(system, actions))
 
 

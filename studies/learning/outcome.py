@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from policy.evaluate import Policy
 from residual.difference import DifferenceModel
-from studies.learning.results import Measured, Model
+from residual.trajectories import Trajectory
+from studies.learning.results import Measured, Model, Samples
 from studies.learning.training import Training
 from studies.learnt.words import record_key
 
@@ -30,6 +31,8 @@ class Learnt:
         accuracy: One record per update of the difference model.
         trainings: Each policy, by a name such as ``"idealised"``, ``"difference-1"``.
         models: The difference models, one per update.
+        runs: The true samples, every episode of every update as a recorded run, as ``find_gap``
+            takes them.
     """
 
     system: dict[str, Any]
@@ -37,6 +40,7 @@ class Learnt:
     accuracy: list[Record] = dataclasses.field(default_factory=list)
     trainings: dict[str, Training] = dataclasses.field(default_factory=dict)
     models: list[DifferenceModel] = dataclasses.field(default_factory=list)
+    runs: list[Trajectory] = dataclasses.field(default_factory=list)
 
     @property
     def policy(self) -> Policy:
@@ -61,6 +65,10 @@ class Learnt:
         record = policy_record(training, name) | more
         self.policies.append(record)
         self.trainings[record_key(record)] = training
+
+    def add_samples(self, update: int, samples: Samples) -> None:
+        """Keep the true samples of an update, as runs."""
+        self.runs.extend(samples.data.runs(self.system["dt"], f"update-{update}"))
 
     def add_update(
         self, update: int, samples: int, policy: Training, model: Model, measured: Measured

@@ -28,6 +28,7 @@ from studies.learning.fingerprint import fingerprint
 from studies.learning.measuring import anywhere, where_it_goes
 from studies.learning.results import Measured, Model, Samples
 from studies.learning.streams import seeded, stream
+from studies.learning.testing import Tested, tested
 from studies.learning.training import Kind, Training, exploration, train, transitions, visited
 from studies.learning.warm_start import ReplayRule, WarmStart
 
@@ -130,7 +131,7 @@ class Steps:
         on: Model | Simulator | None = None,
         update: int = 0,
     ) -> Training:
-        """A policy that learns on the simulator, on a corrected one or on the true system.
+        """A policy that learns on the simulator, a corrected one or the true system, and its tests.
 
         Args:
             kind: ``"cold"`` and ``"warm"`` learn on the true system.
@@ -155,7 +156,10 @@ class Steps:
             return Training.load(folder, key, self.algorithm, env)
 
         compute = functools.partial(train, self, kind, steps, start, on, update)
-        return self._kept(kind, settings, compute, load)
+        learnt = self._kept(kind, settings, compute, load)
+        # Apart: what a robot in trouble costs is a test, and no training.
+        testing = functools.partial(tested, self, kind, learnt, on)
+        return learnt.tested(self._kept("test", {"policy": learnt.key}, testing, Tested.load))
 
     def measure(self, model: Model, policy: Training, update: int) -> Measured:
         """Accuracy of the model along fresh true rollouts of the policy trained on it."""
@@ -164,9 +168,10 @@ class Steps:
         def compute() -> Measured:
             corrected, acting = self.corrected(model), policy.policy
             seed, elsewhere = (stream(self.seed, name, update) for name in ("measure", "elsewhere"))
-            found = {"visited": where_it_goes(self.system, self.algorithm, acting, corrected, seed)}
-            if accuracy := anywhere(self.system, corrected, elsewhere):
-                found["uniform"] = accuracy
+            accuracy, taken = where_it_goes(self.system, self.algorithm, acting, corrected, seed)
+            found: dict[str, Any] = {"visited": accuracy, "rollout_steps": taken}
+            if accuracy_there := anywhere(self.system, corrected, elsewhere):
+                found["uniform"] = accuracy_there
             return Measured(jsonable(found))
 
         return self._kept("measure", settings, compute, Measured.load)

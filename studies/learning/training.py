@@ -1,18 +1,17 @@
-"""One training: learn, keep the best policy, and test it on the true system."""
+"""One training: learn, and keep the policy that is best where it learnt."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium
 import numpy as np
 
-from policy.evaluate import Policy, Rollout, evaluate, rollout
+from policy.evaluate import Policy, Rollout
 from policy.learner import Algorithm, Learner
 from policy.noise import OrnsteinUhlenbeck
 from policy.observations import Column, StateColumns
@@ -23,20 +22,23 @@ from residual.uncertainty_penalty import PenalisedTask
 from simgap_files.npz import read_npz, write_npz
 from sims.environment import observed_channels
 from sims.simulator import Array, Channel, Simulator
-from sims.system import USUAL_STARTS, System
-from sims.unsound import Unsound, answered
+from sims.system import System
+from sims.tasks import Task
 from studies.learning.streams import stream
 from studies.learning.warm_start import Recorder, Simulated, WarmStart
 
 if TYPE_CHECKING:
     from studies.learning.results import Model
     from studies.learning.steps import Steps
+    from studies.learning.testing import Tested
 
 AGENT, CURVE, SUMMARY = "agent.safetensors", "curve.json", "summary.json"
-EPISODE, SIMULATED = "rollout.npz", "simulated.npz"
+SIMULATED = "simulated.npz"
 # Policies learnt from nothing begin with random actions, the baselines too.
 RANDOM_STEPS = 1000
 
+#: Kinds that learn on the true system.
+ON_TRUTH = ("cold", "warm")
 Kind = Literal["idealised", "difference", "control", "corrected", "cold", "warm"]
 _TITLES = {
     "idealised": "train on the simulator",
@@ -55,19 +57,19 @@ class Training:
     Attributes:
         learner: With the networks of the policy that was kept.
         curve: Tests while it learnt, in the environment that it learnt in.
-        summary: ``simulated_steps``, ``updates``, ``return_model``, ``seconds``, ``return_true``,
-            and ``tests``, every test on the true system with what is measured of it.
-        episode: One episode on the true system: ``states``, ``actions`` and ``rewards``.
+        summary: ``simulated_steps``, ``updates``, ``best_step``, ``return_model``, ``seconds``,
+            ``held``, and, once it was tested, what ``Tested`` has.
         simulated: The transitions it learnt from, if they are to be learnt from again.
         key: Of the step that it was kept as.
+        episode: One episode on the true system, see ``Tested``; empty before it was tested.
     """
 
     learner: Learner
     curve: tuple[Point, ...]
     summary: dict[str, Any]
-    episode: dict[str, Array]
     simulated: Simulated | None = None
     key: str = ""
+    episode: dict[str, Array] = dataclasses.field(default_factory=dict)
 
     def __repr__(self) -> str:
         told = {k: round(v, 3) for k, v in self.summary.items() if isinstance(v, int | float)}
@@ -78,13 +80,18 @@ class Training:
         """The policy kept."""
         return self.learner.policy
 
+    def tested(self, tests: Tested) -> Training:
+        """The same with its tests on the true system."""
+        held = self.summary["held"] + tests.summary["held"]
+        summary = self.summary | tests.summary | {"held": held}
+        return dataclasses.replace(self, summary=summary, episode=tests.episode)
+
     def save(self, folder: Path) -> None:
-        """Write it; no file holds code."""
+        """Write it, without tests; no file holds code."""
         self.learner.save(folder / AGENT, replay=False)
         points = [dataclasses.asdict(point) for point in self.curve]
         (folder / CURVE).write_text(json.dumps(points))
         (folder / SUMMARY).write_text(json.dumps(self.summary))
-        write_npz(folder / EPISODE, self.episode)
         if self.simulated:
             write_npz(folder / SIMULATED, vars(self.simulated), compress=False)
 
@@ -96,7 +103,6 @@ class Training:
             algorithm.load(folder / AGENT, env),
             tuple(Point(**point) for point in json.loads((folder / CURVE).read_text())),
             json.loads((folder / SUMMARY).read_text()),
-            read_npz(folder / EPISODE),
             Simulated(**read_npz(simulated)) if simulated.exists() else None,
             key,
         )
@@ -121,14 +127,9 @@ def train(
         update: Which update it belongs to.
     """
     system, all_again = steps.system, steps.replay == "all"
-    simulator, task, difference = system.nominal, system.task, None
-    if isinstance(on, Simulator):
-        simulator = on
-    elif on is not None:
-        difference, simulator = on.difference, steps.corrected(on)
-        if steps.uncertainty_penalty:
-            task = PenalisedTask.around(task, difference, on.data, steps.uncertainty_penalty)
-    on_true = kind in ("cold", "warm")
+    simulator, task = learnt_on(steps, on)
+    difference = None if isinstance(on, Simulator | None) else on.difference
+    on_true = kind in ON_TRUTH
     env, tested = (
         system.true_environment() if on_true else system.environment(simulator, task)
         for _ in range(2)
@@ -179,20 +180,21 @@ def train(
         "seconds": time.perf_counter() - begin,
     }
     learner.restore(selection.networks)
-    # Of no kind and no update: what differs between policies is not where they began.
-    starts = stream(steps.seed, "test starts")
-    # One of its own: what the filter steps is not what was trained on and held.
-    believed = simulator if isinstance(on, Simulator | None) else steps.corrected(on)
-    tests, episode = test_on_truth(system, learner.policy, starts, believed)
     if selection.final is not None:
         summary["return_model"] = selection.final
-    elif len(tests["tests"]) > protocol.episodes and not on_true:
-        # One start tells little where they differ: from as many as on the true system.
-        again_tested = evaluate(learner.policy, tested, len(tests["tests"]), starts)
-        summary["return_model"] = float(again_tested.mean())
     summary["held"] = simulator.held if isinstance(simulator, CorrectedSimulator) else 0
     taken = recorder.taken(difference if all_again else None) if recorder else None
-    return Training(learner, selection.curve, summary | tests, episode, taken)
+    return Training(learner, selection.curve, summary, taken)
+
+
+def learnt_on(steps: Steps, on: Model | Simulator | None) -> tuple[Simulator, Task]:
+    """The simulator and the task that a training on a simulator learns."""
+    task = steps.system.task
+    if isinstance(on, Simulator | None):
+        return on or steps.system.nominal, task
+    if steps.uncertainty_penalty:
+        task = PenalisedTask.around(task, on.difference, on.data, steps.uncertainty_penalty)
+    return steps.corrected(on), task
 
 
 def state_columns(simulator: Simulator) -> StateColumns:
@@ -204,64 +206,6 @@ def state_columns(simulator: Simulator) -> StateColumns:
         return Column(str(c.name), str(c.unit), scale, bool(c.angle), c in seen, memory)
 
     return StateColumns(tuple(map(column, simulator.state_channels)))
-
-
-def test_on_truth(
-    system: System, policy: Policy, seed: int, believed: Simulator | None = None
-) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Rollouts on the true system, each from a start of its own.
-
-    Args:
-        system: Says how many, and what is measured.
-        policy: Acts without noise.
-        seed: Of the first reset; the others count on from it. Policies tested with one seed begin
-            in the same states.
-        believed: Makes a state of what the true system's sensors show, see ``System``.
-
-    Returns:
-        Their mean return and every test, and the first rollout.
-    """
-    env = system.true_environment(believed)
-    runs = [rollout(policy, env, seed + k) for k in range(_starts(system, env, seed))]
-    tests = []
-    for run in runs:
-        states = visited(system, run)
-        test: dict[str, Any] = {"start": states[0].tolist(), "return": run.total}
-        tests.append(test | _measures(system, states, run.actions))
-    result: dict[str, Any] = {
-        "return_true": float(np.mean([run.total for run in runs])),
-        "tests": tests,
-    }
-    first = runs[0]
-    episode = {"states": visited(system, first), "actions": first.actions}
-    return result, episode | {"rewards": first.rewards}
-
-
-def _measures(system: System, states: Array, actions: Array) -> dict[str, Any]:
-    """What a system reports of a rollout beside its return.
-
-    Raises:
-        Unsound: It raised, or reports something else than numbers by name.
-    """
-    if system.measures is None:
-        return {}
-    what = f"system {system.name}: measures"
-    found = answered(what, system.measures, states, actions)
-    plain = isinstance(found, Mapping) and all(
-        isinstance(name, str) and np.ndim(value) == 0 and np.isreal(value)
-        for name, value in found.items()
-    )
-    if not plain:
-        raise Unsound(f"{what} returned {found!r:.80}, expected one number for each name")
-    return dict(found)
-
-
-def _starts(system: System, env: gymnasium.Env, seed: int) -> int:
-    """How many starts a test on the true system has."""
-    if system.evaluation.true_episodes is not None:
-        return system.evaluation.true_episodes
-    one, other = (env.reset(seed=seed + k)[1]["state"] for k in range(2))
-    return 1 if np.array_equal(one, other) else USUAL_STARTS
 
 
 def exploration(system: System, algorithm: Algorithm, seed: int) -> OrnsteinUhlenbeck:

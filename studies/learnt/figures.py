@@ -20,6 +20,8 @@ Drawn = tuple[Figure, pd.DataFrame]
 
 # So much of an episode is drawn, in s, and of a slow system at least so many control periods.
 _SECONDS, _LEAST_STEPS = 10.0, 100
+#: Actions that are drawn under the states, if there are no more.
+MOST_ACTIONS = 3
 #: Errors below are drawn here, or a model without error would flatten all others.
 LEAST_SHOWN = 1e-5
 _DASHED: Any = {"color": "#6e7781", "linestyle": (0, (4, 3)), "linewidth": 1.2}
@@ -98,8 +100,8 @@ def episodes_figure(
         for column, channel in enumerate(about["states"])
         if channel["name"] == name
     ]
-    if len(about["actions"]) == 1:
-        wanted.append(("actions", 0, about["actions"][0]))
+    if len(about["actions"]) <= MOST_ACTIONS:
+        wanted += [("actions", column, one) for column, one in enumerate(about["actions"])]
     figure, axes = new_figure(len(wanted), 1, height=1.2 + 1.7 * len(wanted), share_x=True)
     data = []
     for axis, (what, column, channel) in zip(axes[:, 0], wanted, strict=True):

@@ -20,6 +20,7 @@ from studies.learnt.figures import (
     path_figure,
     updates_figure,
 )
+from studies.learnt.on_truth import beside_samples, warnings_section
 from studies.learnt.samples_needed import samples_section
 from studies.learnt.sections import (
     accuracy_section,
@@ -77,7 +78,8 @@ def write_report(
     once = policies_once(rows)
     measures = list(dict.fromkeys(m for p in results[0]["policies"] for m in measures_of(p)))
     summary = summarise(once, errors, about, measures)
-    sections: list[Section] = headline(once, errors, about)
+    sections: list[Section] = headline(once, errors, about, beside_samples(results))
+    sections += warnings_section(results)
     if failures:
         text = "\n".join(f"{path}\n{failure}" for path, failure in failures.items())
         count = f"{len(failures)} trials failed and are in no mean"
@@ -170,8 +172,9 @@ def _of_returns(
         drawings.append((
             "curves", curves_figure(results[0]), "Learning curves",
             "Return while learning against steps.",
-            "Tests in what each policy learns in; the best of them is kept. Cold and warm start "
-            "learn on the true system: their steps are true samples.",
+            "Tests in what each policy learns in, of every training from a start of its own: "
+            "compare where a line goes, not two lines. The best policy of a line is kept. Cold and "
+            "warm start learn on the true system: their steps are true samples.",
         ))  # fmt: skip
     return drawings
 

@@ -51,6 +51,7 @@ def summarise(
             else ", ".join(filter(None, [words, estimator])),
             "true samples": int(samples),
             "of truth": duration(samples * about["dt"]),
+            **({"steps": int(part["simulated_steps"].mean())} if "simulated_steps" in part else {}),
             "return on its model": str(mean(part["return_model"].tolist())),
             "return on the truth": str(returned),
         }
@@ -92,6 +93,8 @@ def legend(summary: pd.DataFrame, once: pd.DataFrame) -> list[str]:
     )
     each = f", each the mean of {tested} starts, {same}" if tested > 1 else ""
     says = [f"Returns: {seeds}{each}."]
+    if "steps" in summary:
+        says.append("Steps: of training in simulation for this policy alone.")
     if "above control" in summary:
         pairs = "seed by seed" if several else "start by start" if tested > 1 else "the return"
         says.append(

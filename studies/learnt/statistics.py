@@ -11,6 +11,9 @@ from scipy import stats
 
 from studies.learnt.tables import BY_START
 
+#: Values below which a number is written with its power of ten.
+LEAST = 5e-4
+
 
 @dataclasses.dataclass(frozen=True)
 class Mean:
@@ -47,9 +50,13 @@ class Mean:
         return self._decimals(0 if abs(self.value) >= 100 else int(np.clip(1 - size, 1, 9)))
 
     def text(self, digits: int) -> str:
-        """The mean to so many digits, at most four behind the point, and its interval."""
+        """The mean to so many digits, at most four behind the point, or two and its power of ten,
+        and its interval."""
         if not np.isfinite(self.value):
             return ""
+        if 0 < abs(self.value) < LEAST:
+            interval = "" if self.count == 1 else f"\u00a0±\u00a0{self.half_width:.1e}"
+            return f"{self.value:.1e}{interval}"
         size = np.floor(np.log10(abs(self.value))) if self.value else 0
         return self._decimals(int(np.clip(digits - 1 - size, 0, 4)))
 

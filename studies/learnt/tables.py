@@ -78,6 +78,10 @@ def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
+#: What a policy's record has lists of.
+_LISTS = ("curve", "tests", "warnings")
+
+
 def policy_rows(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """One row per policy of every trial, with its returns by start."""
     return pd.DataFrame(
@@ -96,7 +100,9 @@ def policy_frame(policies: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
 
 def _policy(record: Mapping[str, Any]) -> dict[str, Any]:
     """A policy's record without its curve, and with the means of its tests by measure."""
-    flat = {name: value for name, value in record.items() if name not in ("curve", "tests")}
+    flat = {
+        name: value for name, value in record.items() if name not in ("curve", "tests", "warnings")
+    }
     return flat | measures_of(record)
 
 

@@ -98,13 +98,16 @@ class Evidence:
         return f"{most} closed{', on one seed' if self.seeds == 1 else ''}", "good"
 
 
-def headline(once: pd.DataFrame, errors: pd.DataFrame, about: About) -> list[Section]:
+def headline(
+    once: pd.DataFrame, errors: pd.DataFrame, about: About, beside: str = ""
+) -> list[Section]:
     """Did it work, was it the difference model's doing, and in which numbers?
 
     Args:
         once: Every policy once, as ``policies_once`` gives them.
         errors: One row for each measurement of accuracy.
         about: The system.
+        beside: How long the true system ran beside the samples, in words.
     """
     kinds = {str(name): part for name, part in once.groupby("name")}
     before, target = kinds["idealised"], about["target"]
@@ -145,11 +148,11 @@ def headline(once: pd.DataFrame, errors: pd.DataFrame, about: About) -> list[Sec
     text += [_of_gain(found, starts(chosen)), *_of_target(found, target)]
     text += [*_of_earlier(learnt[learnt["estimator"] == estimator], start, value)]
     text += [*_of_cause(found, alone), *_of_training(before, control)]
-    text += _of_rest(found, true, about.get("best"))
+    text += _of_rest(found, true, about)
     tiles = {
         "idealised policy": return_text(start), f"after update {update}": return_text(value),
-        "gain": str(found.gain), "true interaction": duration(samples * about["dt"]),
-    }  # fmt: skip
+        "gain": str(found.gain), "true samples": duration(samples * about["dt"]),
+    } | ({"beside them, tests and accuracy on the truth": beside} if beside else {})  # fmt: skip
     if found.error is not None and not found.same:
         ends = f" ({told})" if told else ""
         tiles[f"one-step error, share of gap{ends}"] = f"{found.error:.2g}"
@@ -228,9 +231,9 @@ def _of_training(idealised: pd.DataFrame, control: pd.DataFrame) -> list[str]:
     ]
 
 
-def _of_rest(found: Evidence, true: float | None, best: float | None) -> list[str]:
+def _of_rest(found: Evidence, true: float | None, about: About) -> list[str]:
     """What is left, and what would be possible."""
-    text = []
+    text, best = [], about.get("best")
     if found.same:
         text.append("A difference model has nothing to learn there; what differs is training.")
     elif found.error is not None and found.error >= _OPEN:
@@ -238,6 +241,8 @@ def _of_rest(found: Evidence, true: float | None, best: float | None) -> list[st
             f"One step of the corrected simulator still errs by {found.error:.2g} of the gap in "
             f"{found.worst}: the gap is not closed, whatever the return."
         )
+        if about.get("sampled"):
+            text.append("Noise in the state that the environment reports would look the same.")
     elif found.error is not None and found.most >= _OPEN:
         text.append(
             f"One step of the corrected simulator errs by {found.error:.2g} of the gap in "

@@ -128,10 +128,11 @@ def guarded(
                 # One that names a file tells enough.
                 named = isinstance(error, OSError) and error.filename
                 place = "" if named else users_code(error)
+                then = "; the same command goes on with what was finished" if resumes else ""
                 if isinstance(error, OSError | ValueError) and on_purpose(error):
-                    fail(f"{error} ({place})" if place else str(error))
+                    fail(f"{error} ({place}{then})" if place else str(error))
                 if place:
-                    fail(f"{place} raised {typed(error)} (mend it, or see {DEBUG})")
+                    fail(f"{place} raised {typed(error)} (mend it, or see {DEBUG}{then})")
                 sys.stderr.write(_internal(error))
                 raise SystemExit(1) from error
 

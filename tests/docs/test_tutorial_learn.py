@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from policy import load_policy
-from studies import learn
+from studies import find_gap, learn
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial-learn.md"
@@ -104,12 +104,20 @@ def test_the_python_call_runs(here, capsys):
 def test_a_mujoco_environment_is_the_true_system(here, learner):
     pytest.importorskip("mujoco")
     pytest.importorskip("imageio")
-    command = blocks("bash")[1 if learner == "ddpg" else 2]
+    command = blocks("bash")[1 if learner == "ddpg" else 3]
     small = "{policy_kwargs: {net_arch: [16, 16]}, learning_starts: 100}"
     more = SMALL_DDPG if learner == "ddpg" else ["--learner_options", small]
-    _, found = learnt(here, command, more)
+    output, found = learnt(here, command, more)
     _first, second = found["policies"]
     assert second["true_samples"] == 150 and second["updates"] > 0
     # The truth cannot be set to a state, so accuracy is where the policy goes and nowhere else.
     assert "uniform" not in found["accuracy"][0]
     assert max(found["accuracy"][0]["visited"]["one_step"].values()) < 0.5
+    if learner == "ddpg":
+        asked = blocks("bash")[2].split()
+        assert asked[:3] == ["python", "-m", "studies.find_gap"]
+        logs = sorted(map(str, (here / output / "samples").glob("*.csv")))
+        given = [word for word in asked[3:] if "samples" not in word]
+        at = given.index("--logs") + 1
+        find_gap.main([*given[:at], *logs, *given[at:], "--minutes", "0.2"])
+        assert (here / "gap" / "corrected.yaml").exists()

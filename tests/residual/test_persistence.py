@@ -193,3 +193,16 @@ def test_a_damaged_file_never_raises_anything_but_a_value_error(cut, flip, how, 
     else:
         # White space of the header, say: the checksum is of what the file holds.
         assert how == "flip" and np.isfinite(model.predict(np.zeros((1, 3)))).all()
+
+
+def test_a_simulator_with_other_parameters_is_refused(tmp_path):
+    model = DifferenceModel(Linear(), Pendulum()).fit(transitions())
+    save(model, tmp_path / "model.safetensors")
+    assert load(tmp_path / "model.safetensors", Pendulum()).simulator is not None
+    heavier = Pendulum().with_parameters(mass=0.1)
+    with pytest.raises(ValueError, match=r"fitted beside mass .* and the simulator has 0\.1"):
+        load(tmp_path / "model.safetensors", heavier)
+    header, arrays = read_arrays(tmp_path / "model.safetensors")
+    del header["difference"]["parameters"]  # as an earlier version wrote it
+    write_arrays(tmp_path / "old.safetensors", header, arrays)
+    load(tmp_path / "old.safetensors", heavier)

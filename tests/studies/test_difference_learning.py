@@ -17,7 +17,7 @@ from sims.protocol import EvaluationProtocol
 from sims.system import System
 from sims.tasks import SwingUp, Task
 from studies.learning import steps as steps_module
-from studies.learning import streams, training
+from studies.learning import streams, testing, training
 from studies.learning.budget import Budget
 from studies.learning.kept import OnDisk
 from studies.learning.loop import learn_by_difference, run_loop
@@ -145,7 +145,7 @@ def test_no_two_steps_share_a_random_stream(monkeypatch):
         drawn.append((found, (seed, *purpose)))
         return found
 
-    for module in (steps_module, training):
+    for module in (steps_module, training, testing):
         monkeypatch.setattr(module, "stream", watched)
     learnt_with(None)
     # Tests of policies that are to be compared begin alike; that stream is theirs alone.

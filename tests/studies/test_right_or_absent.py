@@ -102,7 +102,7 @@ def test_an_edited_estimator_is_fitted_and_trained_with_again(first, tmp_path):
     (tmp_path / "mine.py").write_text(ESTIMATOR.replace("FACTOR = 1.0", "FACTOR = 0.5"))
     second = run(tmp_path, "run")
     added = {name.split("-")[0] for name in kept(tmp_path, "run").keys() - before.keys()}
-    assert added == {"fit", "difference", "measure"}
+    assert added == {"fit", "difference", "test", "measure"}
     error = [r["accuracy"][0]["visited"]["one_step"]["rate"] for r in (first[1], second)]
     assert error[1] > error[0] + 0.2
     after = bytes_of(tmp_path, "run")
@@ -132,6 +132,7 @@ def test_a_flipped_byte_in_any_kept_file_is_healed(tmp_path, caplog, rule):
     assert names == {
         "step.json", "agent.safetensors", "curve.json", "summary.json", "rollout.npz",
         "simulated.npz", "transitions.npz", "fit.json", "difference.safetensors", "accuracy.json",
+        "tests.json",
     }  # fmt: skip
     rng = np.random.default_rng(0)
     for path in kinds.values():

@@ -96,7 +96,7 @@ def test_a_file_is_no_folder_to_keep_in(tmp_path):
 def test_measures_that_are_no_numbers_by_name(monkeypatch, measures, says):
     whole = System("mine", *PARTS, EvaluationProtocol(every=60, true_episodes=1))
     system = dataclasses.replace(whole, measures=measures)
-    from studies.learning.training import test_on_truth
+    from studies.learning.testing import test_on_truth
 
     class Still:
         def act(self, observation):
