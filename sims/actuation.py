@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 
 from sims import drive as path
 from sims.effects.actuator import ActuatorEffect
+from sims.effects.dimensions import product
+from sims.effects.flexible import flexible_parts
 from sims.effects.store import stores
 from sims.simulator import Array, Channel, Hold
 
@@ -24,12 +26,12 @@ def history(simulator: HostSimulator, actuator: str) -> int:
 
 
 def moving_memory(simulator: HostSimulator) -> int:
-    """Memory channels that move with the physical ones: plays, then stores."""
-    return len(simulator.plays()) + len(stores(simulator))
+    """Memory channels that move with the physical ones: plays, then stores, then parts."""
+    return len(simulator.plays()) + len(stores(simulator)) + 2 * len(flexible_parts(simulator))
 
 
 def memory_channels(simulator: HostSimulator) -> Iterator[Channel]:
-    """Channels of places in plays, stores, past commands and lagged inputs, in this order."""
+    """Channels of plays, stores, flexible parts, past commands, lagged inputs, in this order."""
     channels = {channel.name: channel for channel in simulator.state_channels}
     joints = {joint.name: joint for joint in simulator.joints}
     for play in simulator.plays():
@@ -38,6 +40,12 @@ def memory_channels(simulator: HostSimulator) -> Iterator[Channel]:
     for store in stores(simulator):
         filled = channels[joints[store.joint].position]
         yield Channel(f"{store.joint} store", filled.unit, "memory", scale=filled.scale)
+    for part in flexible_parts(simulator):
+        rate = channels[str(joints[part.joint].rate)]
+        place = product({"rate": 1, "time": 1}, {"rate": (rate.unit, 1.0), "time": ("s", 1.0)})
+        swing = 2 * np.pi * float(np.max(part.frequency))
+        yield Channel(f"{part.joint} part", place, "memory", scale=rate.scale / swing)
+        yield Channel(f"{part.joint} part rate", rate.unit, "memory", scale=rate.scale)
     for channel in simulator.action_channels:
         for k in range(history(simulator, channel.name), 0, -1):
             past = f"{channel.name} {k} ago"
@@ -107,6 +115,7 @@ def with_memory(simulator: HostSimulator, states: Array, actions: Array) -> Arra
     for store in stores(simulator):
         full[:, at] = states[:, [joint.name for joint in simulator.joints].index(store.joint)]
         at += 1
+    at += 2 * len(flexible_parts(simulator))
     for j, channel in enumerate(simulator.action_channels):
         effects = simulator.actuator_effects(channel.name)
         received[:, j] = path.shaped(actions[:, j : j + 1], effects)[:, 0]

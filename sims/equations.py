@@ -13,18 +13,16 @@ import numpy as np
 from sims.authored import by_joint, force_is_added, joint_of
 from sims.effects.base import Effect
 from sims.effects.exchange import Exchange
+from sims.effects.flexible import flexible_parts
 from sims.effects.friction import DryFriction
 from sims.effects.limit import RateLimit
 from sims.effects.store import SecondStore, stores
 from sims.host import HostSimulator, Joint
-from sims.motion import Acceleration, DriveForce, Motion, advance_smoothly
+from sims.motion import Acceleration, DriveForce, Motion, substep_ends
 from sims.rows import State
 from sims.simulator import Array, Parameter
-from sims.sliding import advance
+from sims.sliding import move
 from sims.unsound import cannot_call
-
-# Rows advanced together: many enough to hide Python, few enough to stay in the cache.
-BLOCK = 4096
 
 
 class _Equations(HostSimulator):
@@ -87,6 +85,8 @@ class _Equations(HostSimulator):
             if isinstance(e, Exchange)
         ]
         flows += [(names.index(e.joint), len(names) + i, e) for i, e in enumerate(stores(self))]
+        states = len(names) + len(stores(self))
+        parts = [(names.index(e.joint), states + i, e) for i, e in enumerate(flexible_parts(self))]
         return Motion(
             acceleration,
             drive_force,
@@ -96,6 +96,7 @@ class _Equations(HostSimulator):
             plays=tuple((names.index(e.joint), e) for e in self.plays()),
             capped=tuple((names.index(e.joint), e) for e in limits),
             flows=tuple(flows),
+            parts=tuple(parts),
             span=span,
         )
 
@@ -190,26 +191,23 @@ class EquationOfMotion(_Equations):
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
         """See ``HostSimulator.integrate``."""
         states, inputs = np.asarray(states, float), np.asarray(inputs, float)
-        if len(states) > BLOCK:
-            blocks = [slice(i, i + BLOCK) for i in range(0, len(states), BLOCK)]
-            return np.concatenate(
-                [self.take(b).integrate(states[b], inputs[b], durations[b]) for b in blocks]
-            )
         h = np.asarray(durations, float) / inputs.shape[1]
         motion = self._motion(h)
+        begun = 2 * len(self.joints) + len(motion.plays)
+        plays, width = slice(2 * len(self.joints), begun), states.shape[1]
+        positions = [*self._positions, *range(begun, width, 2)]
+        rates = [*self._rates, *range(begun + 1, width, 2)]
         state = State(
-            np.ascontiguousarray(states[:, self._positions].T),
-            np.ascontiguousarray(states[:, self._rates].T),
-            np.ascontiguousarray(states[:, 2 * len(self.joints) :].T),
+            np.ascontiguousarray(states[:, positions].T),
+            np.ascontiguousarray(states[:, rates].T),
+            np.ascontiguousarray(states[:, plays].T),
         )
         for i, (_, play) in enumerate(motion.plays):
             edge = 0.5 * np.asarray(play.width)
             state.x[i] = np.clip(state.x[i], -edge, edge)
-        state = _advance(motion, state, substep_ends(inputs), h)
+        state = move(motion, state, substep_ends(inputs), h)
         after = np.empty_like(states)
-        after[:, self._positions] = state.q.T
-        after[:, self._rates] = state.v.T
-        after[:, 2 * len(self.joints) :] = state.x.T
+        after[:, positions], after[:, rates], after[:, plays] = state.q.T, state.v.T, state.x.T
         return after
 
     def _motion(self, span: Array) -> Motion:
@@ -272,27 +270,16 @@ class FirstOrderSystem(_Equations):
 
         # Nothing has play, so nobody asks for a drive force.
         motion = self._moved(names, rates, lambda q, v, u, p: np.zeros_like(v))
-        x = np.ascontiguousarray(np.asarray(states, float).T)
-        inputs = np.asarray(inputs, float)
-        state = State(np.zeros_like(x), x, np.empty((0, x.shape[1])))
+        x = np.asarray(states, float).T
+        own, inputs = len(x) - 2 * len(motion.parts), np.asarray(inputs, float)
+        state = State(
+            np.concatenate([np.zeros_like(x[:own]), x[own::2]]),
+            np.concatenate([x[:own], x[own + 1 :: 2]]),
+            np.empty((0, x.shape[1])),
+        )
         h = np.asarray(durations, float) / inputs.shape[1]
-        return _advance(motion, state, substep_ends(inputs), h).v.T.copy()
-
-
-def _advance(motion: Motion, state: State, ends: Array, h: Array) -> State:
-    """State after all sub-steps, see ``sims.sliding.advance``."""
-    if motion.dry or motion.plays:
-        return advance(motion, state, ends, h)
-    for u in ends:
-        state = advance_smoothly(motion, state, u, h)
-    return state
-
-
-def substep_ends(inputs: Array) -> Array:
-    """Values at both ends of every sub-step, (substeps, 2, n_a, n), rows contiguous."""
-    if inputs.ndim == 3:
-        ends = np.stack([inputs, inputs])
-    else:
-        mean, rise = inputs[..., 0], inputs[..., 1]
-        ends = np.stack([mean - 0.5 * rise, mean + 0.5 * rise])
-    return np.ascontiguousarray(ends.transpose(2, 0, 3, 1))
+        state = move(motion, state, substep_ends(inputs), h)
+        after = np.empty((x.shape[1], len(x)))
+        after[:, :own], after[:, own::2] = state.v[:own].T, state.q[own:].T
+        after[:, own + 1 :: 2] = state.v[own:].T
+        return after

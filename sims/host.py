@@ -39,7 +39,7 @@ class HostSimulator(Simulator):
         joints: Where generalized forces can act.
         substeps: Sub-steps in one control period.
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
-        written_out: True if given by equations, which host rate limits, exchanges and stores.
+        written_out: True if given by equations: they host rate limits, exchanges, stores and parts.
         has_contacts: True if motion jumps at impacts, so that only short windows compare with
             logs; see ``for_motion``.
         advances_rows_at_once: True if ``integrate`` advances rows together, each its own values.
@@ -117,7 +117,7 @@ class HostSimulator(Simulator):
 
     @property
     def integrated_channels(self) -> tuple[Channel, ...]:
-        """Columns of ``integrate``: the physical channels, then one for each play or store."""
+        """Columns of ``integrate``: the physical ones, then of plays, stores and flexible parts."""
         return self.state_channels[: len(self.physical_channels) + moving_memory(self)]
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:

@@ -18,7 +18,7 @@ import yaml
 
 from simgap_files import safe_yaml
 from sims.effects.base import Effect
-from sims.effects.library import curves_in, library
+from sims.effects.library import curves_in, library, parts_in
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
 from sims.model_files import model_settings, names_model
@@ -129,7 +129,7 @@ def chosen_effects(
         simulator: What hosts them.
         wanted: ``"library"``; effects of the library by name, ``"viscous_friction"`` or, at one
             place, ``"viscous_friction@pivot"``, parameters as ``"mass"``; a curve by points, as
-            ``"friction_curve"``; a class of your own by
+            ``"friction_curve"``, or a ``"flexible_part"``; a class of your own by
             import path, ``"my_file.FanTorque"``, at every place that can host it or at one; or
             ``class_path`` and ``init_args``; or an effect itself.
 
@@ -137,7 +137,7 @@ def chosen_effects(
         ValueError: Something is not known, or cannot act in this simulator.
     """
     known = {str(effect): effect for effect in library(simulator)}
-    curves = curves_in(simulator)
+    reserve = (*curves_in(simulator), *parts_in(simulator))
     found: dict[str, Effect] = {}
     for entry in wanted:
         if isinstance(entry, Effect):
@@ -149,13 +149,13 @@ def chosen_effects(
             own = list(known.values())
         else:
             name, _, where = entry.partition("@")
-            own = [e for e in (*known.values(), *curves) if entry in (e.name, str(e))]
+            own = [e for e in (*known.values(), *reserve) if entry in (e.name, str(e))]
             if not own and entry in simulator.parameters:
                 own = [ParameterChange(entry)]
             if not own and "." in name:
                 own = _placed(simulator, name, where)
         if not own:
-            there = [*known, *map(str, curves)]
+            there = [*known, *map(str, reserve)]
             near = difflib.get_close_matches(str(entry), there, 1)
             hint = f"did you mean {near[0]!r}? Else " if near else ""
             raise ValueError(

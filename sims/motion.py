@@ -6,13 +6,14 @@ Joints first and rows last, (n_joints, n), as in ``sims.rows``.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 
 import numpy as np
 
 from sims.effects.backlash import Backlash
 from sims.effects.exchange import Exchange
+from sims.effects.flexible import FlexiblePart
 from sims.effects.friction import CoulombFriction, DryFriction
 from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
@@ -35,6 +36,7 @@ class Motion:
         parameters: Each a scalar or (n,).
         smooth, dry, plays, capped: Effects with the number of the joint they act on.
         flows: The same with the numbers of both states that something flows between.
+        parts: The same with the number of the joint and the part's own, after all joints.
         span: Time in s, by row, in which a rate comes back to its limit; None of a first-order
             system, whose limit is of what ``acceleration`` tells.
     """
@@ -47,6 +49,7 @@ class Motion:
     plays: tuple[tuple[int, Backlash], ...] = ()
     capped: tuple[tuple[int, RateLimit], ...] = ()
     flows: tuple[tuple[int, int, Exchange | SecondStore], ...] = ()
+    parts: tuple[tuple[int, int, FlexiblePart], ...] = ()
     span: Array | None = None
 
     def take(self, rows: Rows) -> Motion:
@@ -60,13 +63,14 @@ class Motion:
             tuple((j, effect.take(rows)) for j, effect in self.plays),
             tuple((j, effect.take(rows)) for j, effect in self.capped),
             tuple((i, j, effect.take(rows)) for i, j, effect in self.flows),
+            tuple((j, i, effect.take(rows)) for j, i, effect in self.parts),
             None if self.span is None else self.span[rows],
         )
 
     @property
     def by_force(self) -> bool:
         """Whether a force on a joint is an acceleration of that joint, and of no other."""
-        return self.span is None
+        return self.span is None and not self.parts
 
     @property
     def even(self) -> bool:
@@ -86,7 +90,30 @@ class Motion:
 
     def accelerate(self, q: Array, v: Array, u: Array, load: Array) -> Array:
         """Accelerations under a force on every joint."""
-        return self.acceleration(q, v, u, load, self.parameters)
+        return self._accelerate(q, v, u, load, self.parameters, self.parts)
+
+    def _accelerate(
+        self, q: Array, v: Array, u: Array, load: Array, parameters: SimpleNamespace,
+        parts: Sequence[tuple[int, int, FlexiblePart]],
+    ) -> Array:  # fmt: skip
+        if not parts:
+            return self.acceleration(q, v, u, load, parameters)
+        own, found = len(q) - len(parts), np.empty_like(v)
+        q, parted = q[:own], q[own:]
+        found[:own] = self.acceleration(q, v[:own], u, load[:own], parameters)
+        rest = np.zeros_like(q), np.zeros_like(u), np.zeros_like(q)
+        # What pulls by position pulls at the part where that is; a speed has no position.
+        here = self.acceleration(q, *rest, parameters) if self.span is not None else 0.0 * q
+        for (j, i, part), beside in zip(parts, parted, strict=True):
+            there, falls = q, here
+            if self.span is not None:
+                there = q.copy()
+                there[j] += beside
+                falls = self.acceleration(there, *rest, parameters)
+            pull, carried = part.pull(beside, v[i]), part.carried
+            found[j] += part.ratio * (found[j] + pull - carried * here[j])
+            found[i] = carried * falls[j] - pull - found[j]
+        return found
 
     def cap(self, v: Array, acceleration: Array) -> Array:
         """The accelerations, which are changed, with rates kept within their limits."""
@@ -127,9 +154,9 @@ class Motion:
         ends = np.cumsum([place.size for place in places]).tolist()
         for j, (start, end) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
             more[j, start:end] += 1.0
-        change = self.acceleration(
+        change = self._accelerate(
             q.take(index, 1), v.take(index, 1), u.take(index, 1), more,
-            _some(self.parameters, index),
+            _some(self.parameters, index), [(j, i, part.take(index)) for j, i, part in self.parts],
         ) - acceleration.take(index, 1)  # fmt: skip
         for j, (start, end) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
             found[j][:, places[j]] = change[:, start:end]
@@ -137,7 +164,11 @@ class Motion:
 
     def drive(self, q: Array, v: Array, u: Array) -> Array:
         """Force of the actuators on every joint."""
-        return self.drive_force(q, v, u, self.parameters)
+        if not self.parts:
+            return self.drive_force(q, v, u, self.parameters)
+        own, push = len(q) - len(self.parts), np.zeros(q.shape)
+        push[:own] = self.drive_force(q[:own], v[:own], u, self.parameters)
+        return push
 
     def drive_and_free(self, q: Array, v: Array, u: Array) -> tuple[Array, Array]:
         """The same, and each drive's free speed across its play, (n_plays, n)."""
@@ -177,6 +208,16 @@ def advance_smoothly(motion: Motion, state: State, u: Array, h: Array) -> State:
     a4 = accelerations(q + h * v3, v4, u[1])
     sixth = h / 6
     return State(q + sixth * (v + 2 * (v2 + v3) + v4), v + sixth * (a1 + 2 * (a2 + a3) + a4), x)
+
+
+def substep_ends(inputs: Array) -> Array:
+    """Values at both ends of every sub-step, (substeps, 2, n_a, n), rows contiguous."""
+    if inputs.ndim == 3:
+        ends = np.stack([inputs, inputs])
+    else:
+        mean, rise = inputs[..., 0], inputs[..., 1]
+        ends = np.stack([mean - 0.5 * rise, mean + 0.5 * rise])
+    return np.ascontiguousarray(ends.transpose(2, 0, 3, 1))
 
 
 def _some(parameters: SimpleNamespace, rows: Rows) -> SimpleNamespace:

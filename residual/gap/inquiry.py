@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Callable, Sequence
 
 from residual.gap.answer.confirmed import Answer, confirm
-from residual.gap.answer.curves import over_the_log, takes_its_place, worth_a_curve
-from residual.gap.answer.free_parameters import better, worth_freeing
-from residual.gap.answer.lone import explains_the_rest, left_stretch, lone_stretch
+from residual.gap.answer.curves import over_the_log
 from residual.gap.clock import Clock, seldom
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
@@ -17,35 +14,16 @@ from residual.gap.confirmation.rest import fits_better_from_rest
 from residual.gap.confirmation.twins import exact_twins, with_twins
 from residual.gap.fitting.smooth import LEAD, SmoothFitter
 from residual.gap.log import Log
-from residual.gap.longer import longer_horizon
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.offered import Offered
+from residual.gap.once_more import Confirmed, OnceMore
 from residual.gap.preparation.numerics import held_otherwise, how_held
-from residual.gap.preparation.prepare import Prepared, prepare
+from residual.gap.preparation.prepare import Prepared, finely, prepare
 from residual.gap.search.explain import Explanation, explain
 from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.host import HostSimulator
-
-
-@dataclasses.dataclass(frozen=True)
-class Confirmed:
-    """What is known in the end.
-
-    Attributes:
-        prepared: The windows that the answer is of.
-        answer: What stays after confirmation.
-        says: What is to be said of how it was found.
-    """
-
-    prepared: Prepared
-    answer: Answer
-    says: tuple[str, ...]
-
-    def and_says(self, text: str) -> Confirmed:
-        """The same with one more thing to say."""
-        return dataclasses.replace(self, says=(*self.says, text))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,86 +143,27 @@ class Inquiry:
         answer = confirm(found, self.offered.groups, matters, tolerance, self.clock.confirm_until)
         known = Confirmed(prepared, answer, ())
         if matters:
-            known = self.without_lone_stretch(log, known, tolerance)
-            lone = bool(known.says)
-            known = self.with_parameters_free(known, tolerance)
-            known = self.with_curves(known, tolerance)
-            known = self.over_longer_forecasts(log, known, tolerance)
-            if not lone and (rest := left_stretch(known.answer)):
-                known = known.and_says(rest.says(left_out=False))
+            known = OnceMore(self, log, tolerance).of(known)
         answer = known.answer
         claims = with_twins(answer.found.search, answer.key, answer.claims)
         return dataclasses.replace(known, answer=dataclasses.replace(answer, claims=claims))
 
-    def with_parameters_free(self, known: Confirmed, tolerance: float) -> Confirmed:
-        """The same, or what is found with parameters free if they may hide something."""
-        answer = known.answer
-        beside = worth_freeing(answer, tolerance)
-        if not beside:
-            return known
-        if time.process_time() > self.clock.over:
-            return known.and_says(
-                "parameters within their tolerance may hide what is missing, or explain some of "
-                "what is left: there was no time to look, give more --minutes"
-            )
-        self.tell("once more with parameters free within their tolerance")
-        second = self._asked_again(known, tolerance, beside)
-        return dataclasses.replace(known, answer=second) if better(second, answer) else known
-
-    def with_curves(self, known: Confirmed, tolerance: float) -> Confirmed:
-        """The same, or what is found with curves by points if they take most of what is left."""
-        answer = known.answer
-        curves = worth_a_curve(answer, self.offered.curves)
-        if not curves:
-            return known
-        if time.process_time() > self.clock.search_until:
-            return known.and_says(
-                "what is left may be a law that the library does not have, along a curve by speed, "
-                "position or command: there was no time to look, give more --minutes"
-            )
-        self.tell("once more with curves by points in place of laws")
-        second = self._asked_again(known, tolerance, answer.found.search.beside, curves)
-        if not takes_its_place(second, answer):
-            return known
-        return dataclasses.replace(known, answer=second)
-
-    def over_longer_forecasts(self, log: Log, known: Confirmed, tolerance: float) -> Confirmed:
-        """The same, or what is found over longer forecasts, of which the records hold fewer.
-
-        They are tried where nothing could be named.
-        """
-        search = known.answer.found.search
-        if log.by_user or known.answer.key or search.beside:
-            return known
-        simulator = search.simulator
-        horizon = longer_horizon(simulator, log, known.answer)
-        if horizon is None or time.process_time() > self.clock.search_until:
-            return known
-        longer = log.at(horizon)
-        self.tell("once more over longer forecasts, of which the records hold fewer")
-        ready, answer = self._asked_of(simulator, longer.runs, longer.horizon, tolerance)
-        if not explains_the_rest(answer):
-            return known
-        says = (
-            f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s, "
-            "of which these records hold more, nothing can be named"
-        )
-        return Confirmed(ready, answer, (says,))
-
-    def _asked_of(
+    def asked_of(
         self,
         simulator: HostSimulator,
         runs: Sequence[Trajectory],
         horizon: float,
         tolerance: float,
+        more: Sequence[Effect] = (),
     ) -> tuple[Prepared, Answer]:
         """What is found in windows of other runs, or of another length, and these windows."""
         ready = prepare(simulator, runs, horizon)
-        again = self.explained(simulator, ready)
+        ready = finely(ready) if more else ready
+        again = self.explained(simulator, ready, more=more)
         until = self.clock.confirm_until
         return ready, confirm(again, self.offered.groups, True, tolerance, until)
 
-    def _asked_again(
+    def asked_again(
         self,
         known: Confirmed,
         tolerance: float,
@@ -268,24 +187,6 @@ class Inquiry:
             "windows), or what it follows never changed"
             for label in asked
         ]
-
-    def without_lone_stretch(self, log: Log, known: Confirmed, tolerance: float) -> Confirmed:
-        """The same, or what is found without a stretch of the log that nothing explains.
-
-        Elsewhere is looked only in time, and counts only if something is named there.
-        """
-        stretch = lone_stretch(known.answer)
-        if stretch is None:
-            return known
-        if time.process_time() > self.clock.search_until:
-            return known.and_says(stretch.says(left_out=False))
-        self.tell("once more without a stretch that nothing explains")
-        simulator = known.answer.found.search.simulator
-        runs = stretch.cut_from(log.runs)
-        ready, answer = self._asked_of(simulator, runs, log.horizon, tolerance)
-        if not explains_the_rest(answer):
-            return known.and_says(stretch.says(left_out=False))
-        return Confirmed(ready, answer, (stretch.says(left_out=True),))
 
 
 def _clearly_better(again: Explanation, found: Explanation) -> bool:

@@ -11,7 +11,8 @@ from residual.gap.confirmation.aliases import aliases, beyond_parameters, repres
 from residual.gap.log import Log
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
-from sims.effects.library import curves_in
+from sims.effects.flexible import FlexiblePart
+from sims.effects.library import curves_in, library, parts_in
 from sims.loading import LIBRARY, chosen_effects
 
 
@@ -26,6 +27,7 @@ class Offered:
         groups: Those groups by label.
         sets: Sets of which one is exactly made of the others.
         curves: Curves by points, for where laws of the library only come near.
+        parts: Flexible parts, for where nothing of the library swings as the log does.
         asked: Curves by points that a user asks for.
     """
 
@@ -35,6 +37,7 @@ class Offered:
     groups: dict[str, tuple[str, ...]]
     sets: Sequence[tuple[str, ...]]
     curves: Sequence[Curve]
+    parts: Sequence[FlexiblePart]
     asked: Sequence[Curve] = ()
 
     @classmethod
@@ -61,7 +64,11 @@ class Offered:
                 f"{asked[0]} is not looked for in what strikes the ground: leave it out of effects"
             )
         offered = tuple(effect for effect in offered if effect not in asked)
-        curves = curves_for(log.simulator, [str(effect) for effect in offered])
+        there = {str(effect) for effect in offered}
+        curves = curves_for(log.simulator, there)
+        # Whoever asks for some effects does not ask for a part on a spring.
+        whole = {str(e) for e in library(log.simulator) if not e.upstream_of_sensor} <= there
+        parts = [one for one in parts_in(log.simulator) if whole and str(one) not in there]
         if measured_input:
             offered = tuple(effect for effect in offered if not effect.upstream_of_sensor)
             curves = tuple(effect for effect in curves if not effect.upstream_of_sensor)
@@ -70,4 +77,4 @@ class Offered:
         groups, sets = aliases(log.simulator, offered, log.runs)
         kept, less = representatives(log.simulator, offered, groups)
         by_label = {str(effect): effect for effect in offered}
-        return cls(by_label, kept, less, groups, sets, curves, asked)
+        return cls(by_label, kept, less, groups, sets, curves, parts, asked)

@@ -24,6 +24,8 @@ from sims.effects.curves import InputCurve as InputCurve
 from sims.effects.curves import StateCurve as StateCurve
 from sims.effects.curves import SymmetricInputCurve as SymmetricInputCurve
 from sims.effects.exchange import Exchange as Exchange
+from sims.effects.flexible import FlexibleJoint as FlexibleJoint
+from sims.effects.flexible import FlexiblePart as FlexiblePart
 from sims.effects.friction import CoulombFriction as CoulombFriction
 from sims.effects.friction import DirectionalFriction as DirectionalFriction
 from sims.effects.friction import DryFriction as DryFriction

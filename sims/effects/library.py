@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,7 @@ from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.curves import CURVES
 from sims.effects.exchange import Exchange, like_states
+from sims.effects.flexible import FlexibleJoint, FlexiblePart, pulled_by_position
 from sims.effects.friction import (
     CoulombFriction,
     DirectionalFriction,
@@ -122,6 +124,19 @@ def curves_in(simulator: HostSimulator) -> tuple[Curve, ...]:
             except ValueError:
                 continue
             found.append(curve)
+    return tuple(found)
+
+
+def parts_in(simulator: HostSimulator) -> tuple[FlexiblePart, ...]:
+    """Flexible parts, at zero strength, of every joint that can have one, and flexible joints."""
+    found: list[FlexiblePart] = []
+    for joint in simulator.joints:
+        part = FlexiblePart(joint.name)
+        with contextlib.suppress(ValueError):
+            part.quantities(simulator)
+            found.append(part)
+            if pulled_by_position(simulator, joint.name):
+                found.append(FlexibleJoint(joint.name))
     return tuple(found)
 
 

@@ -42,7 +42,10 @@ CURVES = [
     if kind is not effects.StateCurve
 ]
 # Asked for where a command is followed, which a voltage is not.
-OTHERS = [effects.StateCurve("level"), effects.RateLimit("pivot")]
+OTHERS = [
+    effects.StateCurve("level"), effects.RateLimit("pivot"),
+    effects.FlexiblePart("pivot"), effects.FlexibleJoint("pivot"),
+]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if e.enters != "parameter"}
 

@@ -15,11 +15,12 @@ from sims.effects import (
     exact_aliases,
     library,
 )
-from sims.equations import BLOCK, EquationOfMotion, FirstOrderSystem
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.host import Joint
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel, Parameter
+from sims.sliding import BLOCK
 
 CART, POLE, ARM, GRAVITY = 0.5, 0.2, 0.3, 9.81
 

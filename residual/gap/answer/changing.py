@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.curves import NOTABLE
+from residual.gap.answer.left import NOTABLE
 from residual.gap.beside import Changing
 from residual.gap.confirmation.constancy import (
     CHANCE,

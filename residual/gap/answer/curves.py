@@ -12,10 +12,8 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.free_parameters import better
-from residual.gap.fitting.forecasts import noise_floor
+from residual.gap.answer.left import much_is_left
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.search.redundant import by_points
 from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
@@ -23,11 +21,6 @@ from sims.effects.curves import StateCurve
 from sims.effects.library import curves_in, library
 from sims.host import HostSimulator
 
-#: Part of the squared forecast error of the library's laws, less what noise makes, that a curve may
-#: leave.
-QUARTER = 0.25
-#: Residual over noise from which on laws may only imitate the true one.
-NOTABLE = 1.5
 #: Part of the values of a log between which a curve lies, where they were not measured.
 MOST = 0.99
 #: Angle beyond which a force by angle would count turns.
@@ -68,8 +61,7 @@ def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
     """
     search, key = answer.found.search, answer.key
     fitter = search.fitter
-    left = fitter.left(search.tried[key], answer.found.floor)
-    if left.adequate or left.ratio <= NOTABLE or not isinstance(fitter, SmoothFitter):
+    if not much_is_left(answer) or not isinstance(fitter, SmoothFitter):
         return []
     # A simulator's own damping moves like friction at its joint.
     alike = [one.effect for number in key for one in search.twins_of(number)]
@@ -117,18 +109,3 @@ def _values(curve: Curve, fitter: SmoothFitter, simulator: HostSimulator) -> tup
     if curve.along == "rate":
         return 0.0, float(np.quantile(np.abs(values), part))
     return tuple(np.quantile(values, [1 - part, part]))
-
-
-def takes_its_place(second: Answer, first: Answer) -> bool:
-    """Whether a curve was named and takes most of what the library's laws left beside noise.
-
-    Args:
-        second: What was found with the library and curves; ``first``: without them.
-    """
-    search, again = first.found.search, second.found.search
-    if not any(number in second.key for number in by_points(again)):
-        return False
-    before, after = search.validated[first.key].squares, again.validated[second.key].squares
-    by_noise = noise_floor(search.fitter, search.tried[first.key], first.found.floor.sigma)
-    left, now, least = (search.currency.error(one) ** 2 for one in (before, after, by_noise))
-    return now - least < QUARTER * (left - least) and better(second, first)

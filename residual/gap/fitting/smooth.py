@@ -150,7 +150,8 @@ class SmoothFitter:
             theta = np.hstack([np.repeat(fit.theta[None], len(values), axis=0), values])
             states = np.broadcast_to(inner.nodes, (len(values), n, width))
             if joint.width > width:
-                play = [joint.widen(samples, inner.nodes[:, : joint.physical], t) for t in theta]
+                nodes = inner.nodes[:, : joint.physical]
+                play = [joint.widen(samples, nodes, t, without=True) for t in theta]
                 states = np.concatenate([states, np.stack(play)[:, :, width:]], axis=2)
             still = np.zeros((n, width, len(values)))
             if candidate.effect.enters == "sensor":

@@ -32,8 +32,8 @@ def starts(
     """
     samples, windows, lead = fitter.samples, fitter.blocks.windows, fitter.lead
     measured, first, free = samples.measured, windows.index[:, 0], model.free
-    moves = 1e-3 * fitter.scale[free]
-    limit, ridge = 3 * fitter.scale[free], np.diag(1e-2 / fitter.scale[free])
+    scale = model.scales(fitter.scale)[free]
+    moves, limit, ridge = 1e-3 * scale, 3 * scale, np.diag(1e-2 / scale)
     length = int(lead.sum(axis=1).max())
     seen = samples.seen[windows.index[:, :length]][..., measured]
     there = (fitter.valid & lead[..., None])[:, :length]

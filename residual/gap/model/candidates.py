@@ -21,6 +21,7 @@ from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect, Quantity
 from sims.effects.curve import Curve
 from sims.effects.exchange import Exchange
+from sims.effects.flexible import FlexiblePart
 from sims.effects.joint import JointEffect
 from sims.effects.library import typical
 from sims.effects.limit import RateLimit
@@ -171,6 +172,8 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     if isinstance(effect, SecondStore):
         return effect.joint not in measured
     joint = next((j for j in simulator.joints if j.name == effect.where), None)
+    if isinstance(effect, FlexiblePart) and joint is not None:
+        return not {joint.position, joint.rate} & measured
     if not isinstance(effect, JointEffect) or joint is None or joint.position in measured:
         return False
     if joint.position == joint.rate:  # a speed, which shows in what it moves

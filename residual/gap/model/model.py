@@ -7,15 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from residual.gap.data.samples import Samples
 from residual.gap.model.candidates import Candidate, Knob
+from residual.gap.model.memory import Memory, half_plays
 from residual.gap.model.workers import integrate
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
-from sims.effects.base import Effect
-from sims.effects.store import SecondStore, stores
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -32,7 +30,7 @@ class Model:
         knobs: One for each unknown, with its bounds and step.
         owner: Which candidate each unknown belongs to, (p,).
         physical: Number of physical state channels, the first columns of a state.
-        width: Number of state columns: physical, then each play of a backlash, or store.
+        width: Number of state columns: physical, then of plays, stores and flexible parts.
         free: Columns whose start value is free in every window.
         batched: Whether the simulator advances all rows at once, each with its own numbers.
     """
@@ -46,10 +44,10 @@ class Model:
         self.high = np.array([knob.high for knob in self.knobs])
         self.step = np.array([knob.step for knob in self.knobs])
         self.known = np.array([knob.known for knob in self.knobs])
-        memories = sum(isinstance(c.effect, Backlash | SecondStore) for c in self.chosen)
         self.physical = len(simulator.physical_channels)
-        self.width = len(simulator.integrated_channels) + memories
-        self.free = list(range(self.physical))
+        self._memory = Memory(simulator, [c.effect for c in self.chosen])
+        self.width = self._memory.width
+        self.free = [*range(self.physical), *self._memory.swinging]
         self.batched = simulator.advances_rows_at_once
         enters = [c.effect.enters for c in self.chosen]
         self._actuator = np.array(
@@ -98,47 +96,20 @@ class Model:
                 effects.append(candidate.bind([np.repeat(v, each) for v in theta[:, own].T]))
         return self.simulator.with_effects((*self.simulator.effects, *effects))
 
-    def widen(self, samples: Samples, states: Array, theta: Array) -> Array:
-        """Physical states (n, n_physical) with the play of each backlash appended.
+    def widen(self, samples: Samples, states: Array, theta: Array, without: bool = False) -> Array:
+        """Physical states (n, n_physical) with the memory of effects appended that moves with them.
 
         A play is a share of half its width, from -1 to 1: a closed one stays closed whatever
-        width is tried.
+        width is tried. What follows the states is where it goes as they are, or, if that is a
+        motion ``without`` it, as it would change them.
         """
         if self.width == self.physical:
             return states
-        host = self.bind(theta)
-        full = np.zeros((len(states), self.width))
-        full[:, : self.physical] = states
-        filled = self._stores(host.effects[len(self.simulator.effects) :])
-        for i, store in enumerate(filled):
-            column = full[:, self._place(store)]
-            full[:, self.physical + i] = _following(samples, column, float(store.time))
-        if filled:
-            return full
-        if len(host.integrated_channels) == self.width:
-            # The play lies where the input before the sample has pushed it.
-            before = np.vstack([samples.actions[:1], samples.actions[:-1]])
-            for (start, _), recorded in zip(samples.runs, samples.recorded, strict=True):
-                before[start] = recorded.first
-            pushed = host.augment(states, before)[:, self.physical : self.width]
-            full[:, self.physical :] = pushed / _halves(host, 1)
-        return full
+        return self._memory.beside(self.bind(theta), samples, states, without)
 
     def scales(self, physical: Array) -> Array:
         """Typical variation of every state column, from that of the physical ones."""
-        chosen = [candidate.effect for candidate in self.chosen]
-        plays = [0.1 for e in (*self.simulator.plays(), *chosen) if isinstance(e, Backlash)]
-        filled = [physical[self._place(store)] for store in self._stores(chosen)]
-        return np.concatenate([physical, plays, filled])
-
-    def _stores(self, chosen: Sequence[Effect]) -> list[SecondStore]:
-        """The stores with columns of their own, in their order; those that are chosen have them
-        at zero strength, too."""
-        return [*stores(self.simulator), *(e for e in chosen if isinstance(e, SecondStore))]
-
-    def _place(self, store: SecondStore) -> int:
-        names = [channel.name for channel in self.simulator.physical_channels]
-        return names.index(store.joint)
+        return self._memory.scales(physical)
 
     def inputs(self, samples: Samples, theta: Array) -> Array:
         """Mean and rise of the input in every sub-step, (V, n, substeps, n_a, 2).
@@ -210,15 +181,17 @@ class Model:
     def _integrate(
         self, host: HostSimulator, states: Array, driven: Array, durations: Array
     ) -> Array:
-        own = len(host.integrated_channels)
         after = np.array(states)
-        if own == self.physical:
-            after[:, :own] = integrate(host, after[:, :own], driven, durations)
+        if len(host.integrated_channels) == self.physical:
+            own = slice(self.physical)
+            after[:, own] = integrate(host, after[:, own], driven, durations)
             return after
-        halves = _halves(host, len(states))
-        after[:, self.physical : own] *= halves
-        after[:, :own] = integrate(host, after[:, :own], driven, durations)
-        after[:, self.physical : own] /= halves
+        columns, halves = self._memory.of(host), half_plays(host, len(states))
+        inside = after[:, columns]
+        inside[:, self.physical :] *= halves
+        inside = integrate(host, inside, driven, durations)
+        inside[:, self.physical :] /= halves
+        after[:, columns] = inside
         return after
 
     def sense(self, states: Array, theta: Array) -> Array:
@@ -259,21 +232,3 @@ class Model:
                 host, path[:, k], driven[which, at], samples.durations[at]
             )
         return path
-
-
-def _halves(host: HostSimulator, rows: int) -> Array:
-    """Half the width of every play, (rows, n_plays); 1 in rows without play, and of stores."""
-    widths = [np.broadcast_to(play.width, rows) for play in host.plays()]
-    widths += [np.full(rows, 2.0) for _ in stores(host)]
-    return np.stack([np.where(width > 0, 0.5 * width, 1.0) for width in widths], axis=1)
-
-
-def _following(samples: Samples, column: Array, time: float) -> Array:
-    """What a store holds that follows a state (n,), in every run first in balance with it."""
-    found = np.empty_like(column)
-    for start, stop in samples.runs:
-        away = column[start:stop] - column[start]
-        step = float(np.median(np.diff(samples.times[start:stop]))) if stop - start > 1 else 0.0
-        kept = np.exp(-step / time)
-        found[start:stop] = column[start] + lfilter([0.0, 1.0 - kept], [1.0, -kept], away)
-    return found

@@ -8,6 +8,7 @@ import numpy as np
 
 from residual.gap.data.samples import Samples
 from sims.effects.base import Effect, Quantity
+from sims.effects.flexible import FlexiblePart
 from sims.effects.limit import RateLimit
 from sims.effects.store import SecondStore
 from sims.host import HostSimulator
@@ -19,6 +20,9 @@ NEAR_FULL = 0.5
 BEYOND, SPAN = 1.2, 5
 #: Time constants of a store that are tried, as parts of the longest record.
 STORED = (0.01, 0.03, 0.1, 0.3)
+#: Frequencies of a part that are tried: swings in the longest record at least, and in a sample at
+#: most; from one to the next by so much at the most, which a damping to begin with makes up for.
+SWINGS, IN_A_SAMPLE, FURTHER = 3.0, 0.4, 1.35
 
 
 def full_command(channel: Channel, reach: float) -> float:
@@ -74,6 +78,15 @@ def within_reach(
             name: dataclasses.replace(q, high=min(q.high, longest)) if q.unit == "s" else q
             for name, q in known.items()
         }
+    if isinstance(effect, FlexiblePart):
+        slow, fast = SWINGS / _longest(samples), IN_A_SAMPLE / float(np.median(samples.durations))
+        count = max(1 + int(np.ceil(np.log(fast / slow) / np.log(FURTHER))), 2)
+        starts = tuple(np.geomspace(slow, max(fast, slow), count).tolist())
+        swing = dataclasses.replace(
+            known["frequency"], low=slow, high=max(fast, slow), scale=starts[count // 2],
+            starts=starts,
+        )  # fmt: skip
+        return {**known, "frequency": swing}
     if isinstance(effect, SecondStore):
         longest = _longest(samples)
         starts = tuple(part * longest for part in STORED)

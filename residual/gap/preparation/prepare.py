@@ -47,6 +47,8 @@ FINEST = 1e-5
 AT_ONCE, BY_ROW = 120, 40
 #: States in all windows of a row together: every state costs a simulation more.
 STATES = 400
+#: Sub-steps of a row, ten of the fastest swing that is looked for (``residual.gap.model.reach``).
+STEPS = 4
 #: Where states are known fits of what strikes the ground are quick, and better than their linear
 #: picture; the few periods in which simulators part at an impact leave a few hundredths.
 KNOWN_STATES = Effort(5, 4, 1, 3, 3, enough=0.05, partners=4)
@@ -116,6 +118,14 @@ def prepare(
 
     effort = Effort() if simulator.advances_rows_at_once else Effort(5, 1, 1, 3, 4)
     return Prepared(fitter, floor, weigh, effort, horizon)
+
+
+def finely(ready: Prepared) -> Prepared:
+    """The same with sub-steps that are short beside the fastest swing of a flexible part."""
+    fitter = ready.fitter
+    if not isinstance(fitter, SmoothFitter) or fitter.samples.substeps >= STEPS:
+        return ready
+    return dataclasses.replace(ready, fitter=fitter.with_substeps(STEPS))
 
 
 def _noise_around(

@@ -1,6 +1,7 @@
 """Noise of thinned logs: a vibration between their rows is none, and a slow sensor has no less."""
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 from residual.gap import find_gap
@@ -60,7 +61,12 @@ def test_a_vibration_between_the_rows_is_no_noise():
     (sigma, _) = found.noise["x"]
     assert NOISE / 2 < sigma < 3 * NOISE
     assert found.gap.before.value > 10 * sigma
-    assert not [v for v in found.verdicts if v.kind in ("no_gap", "confirmed")]
+    # It has a name: 4 of 9 kg on a spring.
+    (named,) = (v for v in found.verdicts if v.kind in ("no_gap", "confirmed"))
+    assert named.effect == "flexible_part"
+    assert named.parameters["ratio"].value == pytest.approx(4.0 / 5.0, rel=0.01)
+    swing = np.sqrt(1600.0 * (1 / 5.0 + 1 / 4.0)) / (2 * np.pi)
+    assert named.parameters["frequency"].value == pytest.approx(swing, rel=0.01)
 
 
 def test_noise_of_a_slow_sensor_is_not_read_between_its_readings():

@@ -1,0 +1,94 @@
+"""What is left of a gap when effects are named, and whether further effects explain most of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from residual.gap.answer.confirmed import Answer
+from residual.gap.answer.free_parameters import better
+from residual.gap.fitting.forecasts import noise_floor
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.search.sets import Key
+from sims.effects.base import Effect
+from sims.effects.flexible import FlexiblePart
+
+#: Part of the squared forecast error of the library's laws, less what noise makes, that further
+#: effects may leave.
+QUARTER = 0.25
+#: Residual over noise from which on laws may only imitate the true one.
+NOTABLE = 1.5
+#: Part of the gap without a name that is much, however little it is beside noise.
+MUCH = 0.3
+
+
+def worth_a_part(answer: Answer, parts: Sequence[FlexiblePart]) -> Sequence[FlexiblePart]:
+    """The flexible parts to ask for: all, if clearly more than noise is left, or of the gap."""
+    search = answer.found.search
+    if not isinstance(search.fitter, SmoothFitter):
+        return ()
+    if search.fitter.left(search.tried[answer.key], answer.found.floor).adequate:
+        return ()
+    if much_is_left(answer):
+        return parts
+    nominal = search.currency.error(search.validated[()].squares) ** 2
+    left, least = beside_noise(answer, answer.key)
+    return parts if left - least > MUCH * (nominal - least) else ()
+
+
+def much_is_left(answer: Answer) -> bool:
+    """Whether what was named leaves clearly more than noise."""
+    search = answer.found.search
+    left = search.fitter.left(search.tried[answer.key], answer.found.floor)
+    return not left.adequate and left.ratio > NOTABLE
+
+
+def beside_noise(answer: Answer, key: Key) -> tuple[float, float]:
+    """Squared forecast error of a set, and what noise alone makes."""
+    search = answer.found.search
+    by_noise = noise_floor(search.fitter, search.tried[key], answer.found.floor.sigma)
+    squares = search.validated[key].squares, by_noise
+    left, least = (search.currency.error(one) ** 2 for one in squares)
+    return left, least
+
+
+def takes_what_is_left(second: Answer, first: Answer, more: Sequence[Effect]) -> bool:
+    """Whether further effects were named and take most of what the library left beside noise.
+
+    Args:
+        second: What was found with them on offer, too; ``first``: without.
+        more: The further effects.
+    """
+    search, again = first.found.search, second.found.search
+    if not {str(effect) for effect in more}.intersection(again.labels(second.key)):
+        return False
+    left, least = beside_noise(first, first.key)
+    now = search.currency.error(again.validated[second.key].squares) ** 2
+    return now - least < QUARTER * (left - least) and better(second, first)
+
+
+def takes_most_by_itself(answer: Answer, more: Sequence[Effect]) -> bool:
+    """Whether further effects were named that take most of what all else named would leave."""
+    search, key = answer.found.search, answer.key
+    labels = {str(effect) for effect in more}
+    own = tuple(number for number in key if search.candidates[number].label in labels)
+    if not own:
+        return False
+    rest, start = search.merged(key, (), drop=own)
+    if rest not in search.tried:
+        search.fit(rest, start)
+    left, least = beside_noise(answer, rest)
+    now = search.error(key) ** 2
+    return now - least < QUARTER * (left - least)
+
+
+def still_names(answer: Answer, earlier: Answer) -> bool:
+    """Whether an answer names all that an earlier one does with certainty, or of its family."""
+    search = answer.found.search
+    there = [search.candidates[number].effect for number in answer.key]
+    known = earlier.found.search.candidates
+    wanted = [known[claim.number].effect for claim in earlier.claims if claim.sure]
+    return all(
+        any(str(one) == str(e) or (e.family and (one.family, one.where) == (e.family, e.where))
+            for one in there)
+        for e in wanted
+    )  # fmt: skip

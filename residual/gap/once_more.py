@@ -1,0 +1,199 @@
+"""Search and confirmation once more, where what was found leaves something open."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from residual.gap.answer.confirmed import Answer
+from residual.gap.answer.curves import worth_a_curve
+from residual.gap.answer.free_parameters import better, worth_freeing
+from residual.gap.answer.left import (
+    still_names,
+    takes_most_by_itself,
+    takes_what_is_left,
+    worth_a_part,
+)
+from residual.gap.answer.lone import explains_the_rest, left_stretch, lone_stretch
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.log import Log
+from residual.gap.longer import longer_horizon
+from residual.gap.preparation.prepare import Prepared, finely
+from residual.gap.search.redundant import by_points
+from sims.effects.base import Effect
+
+if TYPE_CHECKING:
+    from residual.gap.inquiry import Inquiry
+
+
+@dataclasses.dataclass(frozen=True)
+class Confirmed:
+    """What is known in the end.
+
+    Attributes:
+        prepared: The windows that the answer is of.
+        answer: What stays after confirmation.
+        says: What is to be said of how it was found.
+    """
+
+    prepared: Prepared
+    answer: Answer
+    says: tuple[str, ...]
+
+    def and_says(self, text: str) -> Confirmed:
+        """The same with one more thing to say."""
+        return dataclasses.replace(self, says=(*self.says, text))
+
+
+@dataclasses.dataclass(frozen=True)
+class OnceMore:
+    """What asks once more, each only in time, and only if it then explains more.
+
+    Attributes:
+        inquiry: Searches and confirms.
+        log: What was recorded.
+        tolerance: How well the simulator's parameters are known, as a share of each.
+    """
+
+    inquiry: Inquiry
+    log: Log
+    tolerance: float
+
+    def of(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found without a stretch that nothing explains, with parameters
+        free, with more than the library on offer, or over longer forecasts."""
+        known = self.without_lone_stretch(known)
+        lone = bool(known.says)
+        known = self.with_parameters_free(known)
+        known = self.with_curves(known)
+        known = self.with_parts(known)
+        known = self.over_longer_forecasts(known)
+        if not lone and (rest := left_stretch(known.answer)):
+            known = known.and_says(rest.says(left_out=False))
+        return known
+
+    def without_lone_stretch(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found without a stretch of the log that nothing explains.
+
+        It counts only if something is named elsewhere.
+        """
+        stretch = lone_stretch(known.answer)
+        if stretch is None:
+            return known
+        if self._late:
+            return known.and_says(stretch.says(left_out=False))
+        self.inquiry.tell("once more without a stretch that nothing explains")
+        simulator = known.answer.found.search.simulator
+        runs = stretch.cut_from(self.log.runs)
+        ready, answer = self.inquiry.asked_of(simulator, runs, self.log.horizon, self.tolerance)
+        if not explains_the_rest(answer):
+            return known.and_says(stretch.says(left_out=False))
+        return Confirmed(ready, answer, (stretch.says(left_out=True),))
+
+    def with_parameters_free(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found with parameters free if they may hide something."""
+        answer = known.answer
+        beside = worth_freeing(answer, self.tolerance)
+        if not beside:
+            return known
+        if time.process_time() > self.inquiry.clock.over:
+            return known.and_says(
+                "parameters within their tolerance may hide what is missing, or explain some of "
+                "what is left: there was no time to look, give more --minutes"
+            )
+        self.inquiry.tell("once more with parameters free within their tolerance")
+        second = self.inquiry.asked_again(known, self.tolerance, beside)
+        return dataclasses.replace(known, answer=second) if better(second, answer) else known
+
+    def with_curves(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found with curves by points if they take most of what is left."""
+        curves = worth_a_curve(known.answer, self.inquiry.offered.curves)
+        lacking = "a law that the library does not have, a curve by speed, position or command"
+        return self._with_more(known, curves, "curves by points in place of laws", lacking)
+
+    def with_parts(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found with flexible parts if they take most of what is left.
+
+        Where rows are far apart, so that no swing of some samples shows, shorter forecasts, which
+        have every sample, are asked after them.
+        """
+        parts, part = self.inquiry.offered.parts, "a part on a spring"
+        asked = worth_a_part(known.answer, parts)
+        found = self._with_more(_finely(known), asked, part, part)
+        fitter = known.prepared.fitter
+        if found.answer is not known.answer:
+            return found
+        known = dataclasses.replace(known, says=found.says)
+        if not asked or self._late or self.log.by_user:
+            return known
+        if not isinstance(fitter, SmoothFitter) or fitter.samples.stride == 1:
+            return known
+        shorter = self.log.at(self.log.horizon / fitter.samples.stride)
+        self.inquiry.tell(f"once more over short forecasts, with {part}")
+        search = known.answer.found.search
+        curves = [search.candidates[n].effect for n in by_points(search) if n in known.answer.key]
+        ready, answer = self.inquiry.asked_of(
+            search.simulator, shorter.runs, shorter.horizon, self.tolerance, [*curves, *parts]
+        )
+        if not (takes_most_by_itself(answer, parts) and still_names(answer, known.answer)):
+            return known
+        says = (
+            f"forecasts go over {ready.fitter.seconds:.3g} s, in which every sample shows: over "
+            f"{fitter.seconds:.3g} s rows are too far apart for what swings so fast"
+        )
+        return Confirmed(ready, answer, (*known.says, says))
+
+    def over_longer_forecasts(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found over longer forecasts, of which the records hold fewer.
+
+        They are tried where nothing could be named.
+        """
+        search = known.answer.found.search
+        if self.log.by_user or known.answer.key or search.beside:
+            return known
+        simulator = search.simulator
+        horizon = longer_horizon(simulator, self.log, known.answer)
+        if horizon is None or self._late:
+            return known
+        longer = self.log.at(horizon)
+        self.inquiry.tell("once more over longer forecasts, of which the records hold fewer")
+        ready, answer = self.inquiry.asked_of(
+            simulator, longer.runs, longer.horizon, self.tolerance
+        )
+        if not explains_the_rest(answer):
+            return known
+        says = (
+            f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s, "
+            "of which these records hold more, nothing can be named"
+        )
+        return Confirmed(ready, answer, (says,))
+
+    def _with_more(
+        self, known: Confirmed, more: Sequence[Effect], what: str, lacking: str
+    ) -> Confirmed:
+        """The same, or what is found with more on offer if that takes most of what is left."""
+        if not more:
+            return known
+        if self._late:
+            return known.and_says(
+                f"what is left may be {lacking}: there was no time to look, give more --minutes"
+            )
+        self.inquiry.tell(f"once more with {what}")
+        search = known.answer.found.search
+        curves = [search.candidates[n].effect for n in by_points(search) if n in known.answer.key]
+        offered = [*curves, *more]
+        second = self.inquiry.asked_again(known, self.tolerance, search.beside, offered)
+        if not takes_what_is_left(second, known.answer, more):
+            return known
+        return dataclasses.replace(known, answer=second)
+
+    @property
+    def _late(self) -> bool:
+        return time.process_time() > self.inquiry.clock.search_until
+
+
+def _finely(known: Confirmed) -> Confirmed:
+    """The same with sub-steps that are short beside the fastest swing of a part."""
+    return dataclasses.replace(known, prepared=finely(known.prepared))
