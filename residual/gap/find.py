@@ -21,7 +21,12 @@ from residual.gap.inquiry import Inquiry
 from residual.gap.log import look, settle
 from residual.gap.model.workers import workers
 from residual.gap.offered import Offered
-from residual.gap.preparation.conventions import beyond_scale, other_sign, otherwise
+from residual.gap.preparation.conventions import (
+    beyond_scale,
+    other_sign,
+    otherwise,
+    still_open,
+)
 from residual.gap.preparation.horizon import other_length
 from residual.gap.preparation.numerics import held_as
 from residual.gap.result import GapResult
@@ -124,6 +129,9 @@ def find_gap(
         log, prepared, found, on_rest = inquiry.begun_from_rest(log, prepared, found)
         with clock.besides():
             prepared, found, on_more = on_more_windows(prepared, found, clock.confirm_until, tell)
+        chosen = [found.search.candidates[number].effect for number in found.key]
+        if conventions and not still_open(conventions, found.adequate, chosen):
+            conventions = None
         clock.lap("search")
 
         tell("confirming")

@@ -13,17 +13,19 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 #: What can be read, for a message.
-DATED = "as 2024-05-01 12:00:00.5, 01.05.2024 12:00:00.5 or 12:00:00.5"
+DATED = "as 2024-05-01 12:00:00.5, 01.05.2024 12:00:00.5, 2024-05-01 or 12:00:00.5"
 
 _TIME = r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?"
-_YEAR_FIRST = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}")
-_DAY_FIRST = re.compile(rf"\d{{1,2}}\.\d{{1,2}}\.\d{{4}}[T ]+{_TIME}")
+_YEAR_FIRST = re.compile(r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}|\Z)")
+_DAY_FIRST = re.compile(rf"\d{{1,2}}\.\d{{1,2}}\.\d{{4}}(?:[T ]+{_TIME})?")
 _OF_DAY = re.compile(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?")
 _ANY = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}\b|\d{1,2}:\d{2}\b")
 
 
 def seconds_of(texts: Sequence[str]) -> Array | None:
     """Dates as seconds since 1970 (UTC unless they say otherwise), times of day since midnight.
+
+    A date alone is its midnight, as in a log of days.
 
     Dates with slashes are not read: whether the day or the month stands first is not known.
 
@@ -58,8 +60,11 @@ def _reordered(text: str) -> str:
     """A date that begins with the day, with the year first; any other text as it is."""
     if not _DAY_FIRST.fullmatch(text):
         return text
-    date, time = re.split(r"[T ]+", text, maxsplit=1)
+    date, *later = re.split(r"[T ]+", text, maxsplit=1)
     day, month, year = date.split(".")
+    if not later:
+        return f"{year}-{month:0>2}-{day:0>2}"
+    (time,) = later
     hour, rest = time.split(":", 1)
     return f"{year}-{month:0>2}-{day:0>2} {hour:0>2}:{rest.replace(',', '.')}"
 

@@ -51,8 +51,10 @@ def _conventions(result: GapResult) -> str:
     if other is None:
         return ""
     changes = f"{' or '.join(other.changes)} in the column map"
+    errs = f"with {changes} the nominal simulator errs {other.times:.2g} times less"
     why = {
-        "forecasts": f"with {changes} the nominal simulator errs {other.times:.2g} times less",
+        "forecasts": errs,
+        "zero": errs,
         "sign": f"what fits acts the other way, as with {changes}",
         "scale": f"an input is {other.times:.0f} times the scale that its channel declares, as "
         f"without {changes}",

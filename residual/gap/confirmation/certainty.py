@@ -36,6 +36,8 @@ WORSE = 2.0
 #: Part of the time between samples below which a delay or lag is no more certain than the log's
 #: clock: time stamps, and filters in sensors, are as late.
 BRIEF = 0.5
+#: The same of an input that is said to run straight: a line half a sample late is nearly a step.
+HELD = 0.75
 #: Blocks below which forms within a family are not told apart, and below which nothing is sure.
 FEW, TOO_FEW = 8, 4
 
@@ -268,9 +270,13 @@ def brief(search: Search, number: int, values: Array) -> bool:
     if candidate.effect.enters != "actuator":
         return False
     runs = search.fitter.samples.recorded
-    clock = BRIEF * float(np.median(np.concatenate([run.durations for run in runs])))
+    clock = float(np.median(np.concatenate([run.durations for run in runs])))
+    inputs = {channel.name: channel.hold for channel in search.simulator.action_channels}
+    acting = getattr(candidate.effect, "actuators", ())
+    straight = any(inputs[name] == "linear" for name in acting)
+    shortest = HELD if straight else BRIEF
     return any(
-        knob.unit == "s" and 0 < abs(value) < clock
+        knob.unit == "s" and 0 < abs(value) < shortest * clock
         for knob, value in zip(candidate.knobs, values, strict=True)
     )
 

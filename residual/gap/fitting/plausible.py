@@ -116,7 +116,8 @@ def told_by_data(fit: Fit, nominal: Fit, fitter: Fitter, noise: Array | None) ->
     """Whether numbers out of all proportion explain what moved, of a gap far above the noise.
 
     What only switches the motion off does not: the motion is left. A parameter of the other sign is
-    another law, and of what commands tell nothing of nothing can be told.
+    another law, unless it leaves only noise: then a sign is wrong, in the simulator or in the log.
+    Of what commands tell nothing of nothing can be told.
 
     Args:
         fit: With such numbers.
@@ -127,12 +128,11 @@ def told_by_data(fit: Fit, nominal: Fit, fitter: Fitter, noise: Array | None) ->
     if noise is None or not isinstance(fitter, SmoothFitter):
         return False
     host, own = fit.model.bind(fit.theta), len(fit.model.simulator.effects)
-    if min(_ratios(host, fit.model).values(), default=1.0) < 0:
-        return False
+    turned = min(_ratios(host, fit.model).values(), default=1.0) < 0
     if by_commands(host, fitter.samples, own) is not None:
         return False
     far, left = (fitter.over_noise(one, noise) for one in (nominal, fit))
-    little = np.maximum(CLOSE, UNMOVED * _motion(fitter) / noise)
+    little = np.maximum(CLOSE, 0.0 if turned else UNMOVED * _motion(fitter) / noise)
     return bool((far > FAR).any() and (left < little).all())
 
 

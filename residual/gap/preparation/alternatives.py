@@ -46,6 +46,13 @@ class Convention:
         return bool((factors == -1).any() and (np.abs(factors) == 1).all() and not offsets.any())
 
     @property
+    def turned(self) -> bool:
+        """Whether nothing but the zero of an angle is another one."""
+        factors, offsets = np.hstack([self.states, self.inputs])
+        quarters = np.isin(np.abs(self.states[1]), np.abs(QUARTERS[1:]))
+        return bool((factors == 1).all() and quarters.sum() == 1 == np.count_nonzero(offsets))
+
+    @property
     def exchanged(self) -> bool:
         """Whether two columns are in each other's place."""
         return any((np.diff(places) < 0).any() for places in (self.states_from, self.inputs_from))

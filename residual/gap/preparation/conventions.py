@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +91,24 @@ def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
     if further is not None and BETTER * least > _error(simulator, fitter, further):
         return None
     alike = plainest([one for error, one in errors if error < ALIKE * least])
-    return Conventions(tuple(one.says for one in alike), own / least)
+    zero = all(one.turned for one in alike)
+    reason: Literal["zero", "forecasts"] = "zero" if zero else "forecasts"
+    return Conventions(tuple(one.says for one in alike), own / least, reason)
+
+
+def still_open(conventions: Conventions, adequate: bool, found: Sequence[Effect]) -> bool:
+    """Whether conventions are to be asked for in spite of what was found.
+
+    What stands upright in a loop runs away in every forecast that misses something, and would err
+    less if it hung. What is explained down to the noise without a sensor's zero does not.
+
+    Args:
+        conventions: With which the nominal simulator forecasts better.
+        adequate: Whether what was found leaves only noise.
+        found: Its effects.
+    """
+    zero = conventions.reason == "zero"
+    return not (zero and adequate) or any(effect.enters == "sensor" for effect in found)
 
 
 def other_sign(simulator: HostSimulator, found: Sequence[Effect]) -> Conventions | None:

@@ -274,3 +274,14 @@ def test_times_may_be_dates(tmp_path, form):
     (run,) = read(write(tmp_path / "log.csv", dated)).trajectories
     assert np.allclose(np.diff(run.times), 0.05, atol=1e-6)
     assert len(run.times) == 200
+
+
+@pytest.mark.parametrize("form", ["%Y-%m-%d", "%d.%m.%Y"])
+def test_a_log_of_days_needs_no_time_of_day(tmp_path, form):
+    columns = swing()
+    begun = datetime.date(2026, 2, 20)
+    days = [
+        (begun + datetime.timedelta(days=k)).strftime(form) for k in range(len(columns["time"]))
+    ]
+    (run,) = read(write(tmp_path / "log.csv", columns | {"time": np.array(days)})).trajectories
+    assert np.array_equal(np.diff(run.times), np.full(199, 86400.0))

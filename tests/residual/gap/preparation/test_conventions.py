@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from residual.gap import find_gap
+from residual.gap.beside import Conventions
 from residual.gap.data.samples import Samples
-from residual.gap.preparation.conventions import beyond_scale, otherwise
+from residual.gap.preparation.conventions import beyond_scale, otherwise, still_open
 from residual.gap.preparation.prepare import prepare
 from residual.trajectories import Trajectory
-from sims.effects import ActuatorGain, CoulombFriction, LinearSpring
+from sims.effects import ActuatorGain, CoulombFriction, LinearSpring, SensorOffset
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel, Parameter
@@ -259,3 +260,17 @@ def test_an_input_far_beyond_its_scale_may_be_in_another_unit(loads, changes):
     found = beyond_scale(Hoist(), Samples.join(runs, 1))
     assert (found and found.changes) == changes
     assert found is None or (found.reason, found.times) == ("scale", pytest.approx(1000.0))
+
+
+def test_what_is_explained_does_not_hang_by_a_zero():
+    """An upright pendulum in a loop runs away in forecasts, and would err less if it hung."""
+    run = log()
+    turned = dataclasses.replace(run, states=run.states + np.array([np.pi, 0.0]))
+    simulator = PendulumEquation(dt=0.02)
+    told = otherwise(simulator, prepare(simulator, [turned], 0.5).fitter)
+    assert told is not None and told.reason == "zero"
+    friction, offset = CoulombFriction("pivot", 0.01), SensorOffset("angle", np.pi)
+    assert still_open(told, False, [friction]) and still_open(told, True, [offset])
+    assert not still_open(told, True, [friction])
+    # A unit that is wrong is made up for by a gain, down to the noise.
+    assert still_open(Conventions(("`unit: mV` for voltage",), 9.0), True, [friction])
