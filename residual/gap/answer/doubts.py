@@ -14,8 +14,8 @@ DOUBTS: dict[Doubt, str] = {
     "one_way": "motion goes one way only, so that a part of it may be a constant load",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
-    "clock": "late time stamps, an input that is held, or a filter in a sensor, of half a sample or "
-    "so, would do as well",
+    "clock": "late time stamps, an input that is held, or a filter in a sensor, of about half a "
+    "sample, would do as well",
     "conventions": "it has to be seen first whether the log counts as the simulator does",
     "cut_off": "it has to be seen first whether the simulator is meant to cut an input or a state "
     "off where it does",
