@@ -16,7 +16,12 @@ from residual.gap.answer.left import (
     takes_what_is_left,
     worth_a_part,
 )
-from residual.gap.answer.lone import explains_the_rest, left_stretch, lone_stretch
+from residual.gap.answer.lone import (
+    explains_the_rest,
+    few_stretches,
+    left_stretch,
+    lone_stretch,
+)
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.log import Log
 from residual.gap.longer import longer_horizon
@@ -70,9 +75,11 @@ class OnceMore:
         known = self.with_curves(known)
         known = self.with_parts(known)
         known = self.over_longer_forecasts(known)
-        if not lone and (rest := left_stretch(known.answer)):
-            known = known.and_says(rest.says(left_out=False))
-        return known
+        if lone:
+            return known
+        rest = left_stretch(known.answer)
+        says = rest.says(left_out=False) if rest else few_stretches(known.answer)
+        return known.and_says(says) if says else known
 
     def without_lone_stretch(self, known: Confirmed) -> Confirmed:
         """The same, or what is found without a stretch of the log that nothing explains.

@@ -1,4 +1,4 @@
-"""A stretch of a log that holds most of the error and that nothing explains: a hand, a knock.
+"""Stretches of a log that hold most of the error and that nothing explains: a hand, a knock.
 
 Sums of squares let one block outweigh all others. What happened in it is then all that is asked
 about, and if no effect hosts it, nothing is named, however clear the rest of the log is. One block
@@ -29,6 +29,8 @@ MOST = 0.5
 HARDLY = 0.7
 #: Part of the nominal simulator's squared error that is worth a word if it is left in one block.
 MUCH = 0.1
+#: Part of what is left that lies in a few blocks, how few of all that is, and how many are listed.
+NEARLY_ALL, FEW, LISTED = 0.8, 1 / 3, 4
 #: Part of the motion over that of the error, from which on it may be the motion that is not known.
 MOVES = 0.5
 
@@ -113,6 +115,34 @@ def left_stretch(answer: Answer) -> Stretch | None:
     if left[block] <= MOST * left.sum() or left[block] < MUCH * stakes.sum():
         return None
     return _stretch(answer, block, left, beside=True)
+
+
+def few_stretches(answer: Answer) -> str:
+    """A sentence on the few blocks in which nearly all lies that is left, beside less motion; none
+    if it is spread over the log, or no more than noise.
+
+    Args:
+        answer: Of which no single block tells.
+    """
+    search = answer.found.search
+    if not _many_blocks(answer):
+        return ""
+    if search.fitter.left(search.tried[answer.key], answer.found.floor).adequate:
+        return ""
+    _, left = _by_block(answer)
+    order = np.argsort(-left)
+    count = int(np.searchsorted(np.cumsum(left[order]), NEARLY_ALL * left.sum())) + 1
+    worst = [_stretch(answer, int(block), left, beside=True) for block in order[:count]]
+    share = sum(one.share for one in worst)
+    if not 1 < count <= FEW * len(left) or sum(one.motion for one in worst) > MOVES * share:
+        return ""
+    told = sorted(worst[:LISTED], key=lambda one: (one.run, one.begin))
+    places = ", ".join(f"{o.run} from {moment(o.begin)} to {moment(o.end)}" for o in told)
+    more = f" and {count - LISTED} more" if count > LISTED else ""
+    return (
+        f"{share:.0%} of the squared error that is left lies in {count} of {len(left)} stretches: "
+        f"{places}{more}. Did something happen there that the simulator does not know?"
+    )
 
 
 def _many_blocks(answer: Answer) -> bool:

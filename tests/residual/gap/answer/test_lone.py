@@ -1,6 +1,7 @@
 """A stretch that was knocked, held or reset does not hide what the rest shows, and is told."""
 
 import dataclasses
+import re
 from typing import ClassVar
 
 import numpy as np
@@ -118,3 +119,39 @@ def test_where_alone_it_moves_is_told_as_such():
     found = find_gap(Servo(), [run], effects=["sensor_offset"])
     (said,) = [one for one in found.quality if "one stretch" in one]
     assert "of the motion lies there, too" in said
+
+
+class Tank(FirstOrderSystem):
+    """A tank with an outlet that is always open."""
+
+    dt = 2.0
+    state_channels = (Channel("level", "m", "other", scale=0.5),)
+    action_channels = (Channel("inflow", "l/s", "input", scale=1.0, low=0.0, high=2.0),)
+    parameters: ClassVar = {"area": Parameter(100.0, "dm^2", "of the surface", low=1.0)}
+
+    def derivative(self, x, u, p):
+        return ((u[:, 0] - 2.0 * x[:, 0]) / p.area / 0.1)[:, None]
+
+
+def tanks(leak):
+    """Three records; in each somebody opens a tap for a minute, another minute every time."""
+    rng, simulator = np.random.default_rng(0), Tank()
+    for number in range(3):
+        inflow = np.repeat(rng.uniform(0.0, 2.0, 20), 15)
+        level, opened = [np.array([0.3])], slice(70 + 60 * number, 100 + 60 * number)
+        for row, u in enumerate(inflow):
+            gone = leak if opened.start <= row < opened.stop else 0.0
+            after = simulator.step(level[-1][None], np.array([[u]]))[0]
+            level.append(after - gone * 2.0 / 100.0)
+        states = np.array(level) + 1e-3 * rng.standard_normal((301, 1))
+        yield Trajectory(f"run {number}", 2.0 * np.arange(301), states, inflow[:, None])
+
+
+def test_what_happens_now_and_then_is_told_with_its_times():
+    said = [one for one in find_gap(Tank(), list(tanks(0.5))).quality if "stretches" in one]
+    assert len(said) == 1 and "Did something happen there" in said[0]
+    for number in range(3):
+        begin, end = 2.0 * (70 + 60 * number), 2.0 * (100 + 60 * number)
+        places = re.findall(rf"run {number} from ([\d.]+) s to ([\d.]+) s", said[0])
+        assert any(float(a) < end and float(b) > begin for a, b in places), said[0]
+    assert not [one for one in find_gap(Tank(), list(tanks(0.0))).quality if "stretches" in one]
