@@ -33,7 +33,7 @@ from studies.learnt.sections import (
 from studies.learnt.statistics import to_digits
 from studies.learnt.tables import apart, tables_of
 from studies.learnt.verdict import headline
-from studies.learnt.words import Results, measures_of, record_key, shown
+from studies.learnt.words import Results, counted, measures_of, record_key, shown
 from studies.reporting.figures import save_figure
 from studies.reporting.sections import Animation, Code, Figure, Gallery, KeyValues, Report, Section
 
@@ -82,7 +82,7 @@ def write_report(
     sections += warnings_section(results)
     if failures:
         text = "\n".join(f"{path}\n{failure}" for path, failure in failures.items())
-        count = f"{len(failures)} trials failed and are in no mean"
+        count = f"{counted(len(failures), 'trial')} failed, in no mean"
         sections.append(Code(text, summary=count, heading="Failed trials"))
     drawings: list[Drawing] = []
     if episodes:
@@ -101,7 +101,7 @@ def write_report(
     ]
     title = f"{about['name'].replace('_', ' ').capitalize()}: closing the simulation gap"
     seeds = len(set(rows["seed"]))
-    subtitle = f"{len(results)} trials, {seeds} seeds"
+    subtitle = f"{counted(len(results), 'trial')}, {counted(seeds, 'seed')}"
     if len(results) == 1:
         by = other_name(results[0].get("config", {}).get("learner"))
         own = [results[0].get("label", ""), by, f"seed {results[0].get('seed', 0)}"]

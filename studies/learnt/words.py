@@ -69,3 +69,8 @@ def record_key(record: Record) -> str:
     """Name of a policy's files."""
     name = record["name"]
     return f"{name}-{record['iteration']}" if name in ("difference", "control") else name
+
+
+def counted(count: int, what: str) -> str:
+    """So many of something: ``"1 trial"``, ``"3 trials"``."""
+    return f"{count} {what}{'s' * (count != 1)}"

@@ -216,7 +216,7 @@ def test_a_grid_runs_every_trial_and_reports_failed_ones(tmp_path, monkeypatch, 
     assert "deliberate" in capsys.readouterr().err
     rows = (tmp_path / "out" / "results.csv").read_text().splitlines()
     assert len(rows) == 1 + 2 * 2
-    assert "1 trials failed" in (tmp_path / "out" / "report.html").read_text()
+    assert "1 trial failed" in (tmp_path / "out" / "report.html").read_text()
     assert "residual.Linear" in (tmp_path / "out" / "results.json").read_text()
 
 
