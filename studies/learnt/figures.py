@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,20 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from studies.learnt.statistics import Mean, mean
 from studies.learnt.words import POLICY_WORDS, Results, policy_name
-from studies.reporting.figures import INK, PALETTE, draw_lines, legend_above, new_figure, styled
+from studies.reporting.figures import (
+    AMBER,
+    BLUE,
+    GREEN,
+    INK,
+    ORANGE,
+    PALETTE,
+    PINK,
+    SKY,
+    draw_lines,
+    legend_above,
+    new_figure,
+    styled,
+)
 
 Drawn = tuple[Figure, pd.DataFrame]
 
@@ -24,6 +37,8 @@ _SECONDS, _LEAST_STEPS = 10.0, 100
 MOST_ACTIONS = 3
 #: Errors below are drawn here, or a model without error would flatten all others.
 LEAST_SHOWN = 1e-5
+#: Colours of the first policy of each kind, in every figure.
+_KINDS = {"idealised": BLUE, "difference": ORANGE, "control": GREEN, "corrected": PINK}
 _DASHED: Any = {"color": "#6e7781", "linestyle": (0, (4, 3)), "linewidth": 1.2}
 
 
@@ -68,6 +83,8 @@ def curves_figure(results: Results) -> Drawn:
     figure, axes = new_figure(height=3.8)
     values = [value for _, y in series.values() for value in y]
     factor = scale_of_returns(axes[0, 0], values or [0.0])
+    kinds = [str(r["name"]) for r in results["policies"] if policy_name(r) in series]
+    axes[0, 0].set_prop_cycle(color=_by_kind(kinds) or PALETTE)
     draw_lines(axes[0, 0], {name: (x, factor * y) for name, (x, y) in series.items()})
     axes[0, 0].set_xlabel("steps of this training")
     if series:
@@ -174,7 +191,7 @@ def updates_figure(rows: pd.DataFrame) -> Drawn:
              "half_width": found.half_width}
         )  # fmt: skip
 
-    for colour, (label, part) in zip(PALETTE * 2, loops, strict=False):
+    for colour, (label, part) in zip(_of_loops(loops), loops, strict=False):
         means = {0: mean(begin)} | {
             int(group["iteration"].iloc[0]): mean(group["return_true"].tolist())
             for _, group in part.groupby("iteration")
@@ -201,6 +218,23 @@ def updates_figure(rows: pd.DataFrame) -> Drawn:
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.legend(loc="outside upper left", ncols=2, handlelength=1.4)
     return figure, pd.DataFrame(numbers)
+
+
+def _of_loops(loops: Sequence[tuple[Any, pd.DataFrame]]) -> list[str]:
+    """Colours of estimators, and of the control, as in the other figures: blue is before."""
+    kinds = [str(part["name"].iloc[0]) for _, part in loops]
+    return _by_kind(kinds)
+
+
+def _by_kind(kinds: Sequence[str]) -> list[str]:
+    """A colour for each policy in a row: its kind's, and then those that no kind has."""
+    spare = iter([AMBER, SKY, PINK, GREEN, BLUE] * len(kinds))
+    seen: set[str] = set()
+    colours = []
+    for kind in kinds:
+        colours.append(next(spare) if kind in seen else _KINDS.get(kind, INK))
+        seen.add(kind)
+    return colours
 
 
 @styled()
