@@ -57,7 +57,8 @@ def test_rollouts_are_judged_over_as_much_as_the_protocol_says(
         return real(model, states, actions, **given)
 
     monkeypatch.setattr(measuring, "accuracy_along", told)
-    found = where_it_goes(system, Algorithm(), Drive(), corrected(), 0)
+    found, taken = where_it_goes(system, Algorithm(), Drive(), corrected(), 0)
+    assert taken == steps * protocol.visited_rollouts
     assert seen == {
         "stride": stride, "lengths": {steps}, "rollouts": protocol.visited_rollouts
     }  # fmt: skip
