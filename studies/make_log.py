@@ -25,9 +25,9 @@ import numpy as np
 from jsonargparse.typing import PositiveInt
 
 from policy.learner import OURS, Algorithm
+from residual.logs.writing import write_log
 from sims.pendulum import IDEALISED_MASS, TRUE_MASS
 from studies.hidden.data import Truth, make_logs
-from studies.hidden.logs import write_log
 from studies.hidden.walks import write_walks
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded

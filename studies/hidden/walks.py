@@ -10,9 +10,9 @@ from jsonargparse.typing import NonNegativeFloat, PositiveInt
 from policy.evaluate import collect
 from policy.learner import Algorithm, load_policy
 from policy.noise import OrnsteinUhlenbeck
+from residual.logs.writing import write_log
 from sims.environment import SimulatorEnv
 from sims.leo import Leo, Walking
-from studies.hidden.logs import write_log
 
 #: Sub-steps of 0.04 ms, a fifth of what find_gap explains the log with.
 SUBSTEPS = 150

@@ -15,11 +15,11 @@ import torch
 from jsonargparse.typing import NonNegativeFloat
 
 from policy.learner import other_name
+from residual.logs.writing import write_log
 from residual.persistence import is_ours, save
 from residual.trajectories import Trajectory
 from simgap_files.npz import write_npz
 from sims.simulator import Simulator
-from studies.hidden.logs import write_log
 from studies.learning.described import modules_in, settings_of
 from studies.learning.fingerprint import fingerprint
 from studies.learning.kept import OnDisk

@@ -1,4 +1,4 @@
-"""Logs of made-up measurements, in the format that ``find_gap`` reads."""
+"""Runs as log files, in the format that ``read_logs`` and ``find_gap`` take."""
 
 from __future__ import annotations
 
