@@ -250,7 +250,7 @@ def _with_rivals(verdict: Verdict, result: GapResult) -> str:
         return f"perhaps {name}"
     if len(others) <= FEW_RIVALS:
         return f"{name} or {names_of(others)}"
-    return f"{name} or one of {len(others)} others"
+    return f"perhaps {name} or one of {len(others)} others"
 
 
 def _short(verdict: Verdict, result: GapResult) -> str:
