@@ -10,7 +10,6 @@ from toy import Toy
 from residual.gap.answer.verdicts import effect_verdict, minor_verdict, nameable
 from residual.gap.confirmation.certainty import (
     Claim,
-    brief,
     in_plain_form,
     in_the_limit,
     near,
@@ -25,7 +24,7 @@ from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
 from residual.gap.result import Number
 from residual.trajectories import Trajectory
-from sims.effects import ActuatorLag, DeadZone, Delay
+from sims.effects import DeadZone
 from sims.pendulum_equation import PendulumEquation
 
 
@@ -282,20 +281,3 @@ def test_of_what_strikes_the_ground_a_rival_has_to_forecast_worse(contacts, erro
     toy.halved = {(0,): toy.tried[0,]}
     toy.simulator.has_contacts = contacts
     assert near(toy, (0,), 0, adequate=True)[2] == left
-
-
-@pytest.mark.parametrize(
-    ("effect", "hold", "samples", "found"),
-    [
-        (Delay, "zero", 0.4, True), (Delay, "zero", 0.6, False), (Delay, "linear", 0.6, True),
-        (Delay, "linear", 0.9, False), (ActuatorLag, "linear", 0.6, True),
-    ],
-)  # fmt: skip
-def test_a_line_half_a_sample_late_may_be_a_step(effect, hold, samples, found):
-    simulator = PendulumEquation().with_hold({"voltage": hold})
-    run = Trajectory("run", 0.05 * np.arange(50), np.zeros((50, 2)), np.ones((49, 1)))
-    table = Samples.join([run], 4)
-    tried = candidates(simulator, [effect("voltage")], table)
-    fitter = SimpleNamespace(samples=table)
-    search = SimpleNamespace(candidates=tried, fitter=fitter, simulator=simulator)
-    assert brief(search, 0, np.array([samples * 0.05])) is found
