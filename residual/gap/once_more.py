@@ -139,10 +139,9 @@ class OnceMore:
             return known
         shorter = self.log.at(self.log.horizon / fitter.samples.stride)
         self.inquiry.tell(f"once more over short forecasts, with {part}")
-        search = known.answer.found.search
-        curves = [search.candidates[n].effect for n in by_points(search) if n in known.answer.key]
+        simulator, offered = known.answer.found.search.simulator, [*_curves(known), *parts]
         ready, answer = self.inquiry.asked_of(
-            search.simulator, shorter.runs, shorter.horizon, self.tolerance, [*curves, *parts]
+            simulator, shorter.runs, shorter.horizon, self.tolerance, offered
         )
         if not (takes_most_by_itself(answer, parts) and still_names(answer, known.answer)):
             return known
@@ -188,10 +187,8 @@ class OnceMore:
                 f"what is left may be {lacking}: there was no time to look, give more --minutes"
             )
         self.inquiry.tell(f"once more with {what}")
-        search = known.answer.found.search
-        curves = [search.candidates[n].effect for n in by_points(search) if n in known.answer.key]
-        offered = [*curves, *more]
-        second = self.inquiry.asked_again(known, self.tolerance, search.beside, offered)
+        beside, offered = known.answer.found.search.beside, [*_curves(known), *more]
+        second = self.inquiry.asked_again(known, self.tolerance, beside, offered)
         if not takes_what_is_left(second, known.answer, more):
             return known
         return dataclasses.replace(known, answer=second)
@@ -199,6 +196,12 @@ class OnceMore:
     @property
     def _late(self) -> bool:
         return time.process_time() > self.inquiry.clock.search_until
+
+
+def _curves(known: Confirmed) -> list[Effect]:
+    """The curves that were named: a search with more on offer is to have them, too."""
+    search, key = known.answer.found.search, known.answer.key
+    return [search.candidates[number].effect for number in by_points(search) if number in key]
 
 
 def _finely(known: Confirmed) -> Confirmed:

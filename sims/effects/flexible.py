@@ -98,10 +98,8 @@ def pulled_by_position(simulator: HostSimulator, joint: str) -> bool:
     if place.rate in (None, place.position):
         return False
     states = np.zeros((len(ELSEWHERE), len(names)))
-    states[:, names.index(place.position)] = ELSEWHERE
-    states[:, names.index(place.position)] *= plain.state_channels[
-        names.index(place.position)
-    ].scale
+    column = names.index(place.position)
+    states[:, column] = plain.state_channels[column].scale * np.array(ELSEWHERE)
     after = plain.step(states, np.zeros((len(states), len(plain.action_channels))))
     return bool(np.ptp(after[:, names.index(str(place.rate))]) > 0)
 

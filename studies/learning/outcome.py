@@ -12,7 +12,7 @@ from residual.difference import DifferenceModel
 from residual.trajectories import Trajectory
 from studies.learning.results import Measured, Model, Samples
 from studies.learning.training import Training
-from studies.learnt.words import record_key
+from studies.learnt.words import counted, record_key
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -130,7 +130,7 @@ class Learnt:
         return (
             f"Learnt({self.system['name']}: return on the true system "
             f"{first['return_true']:.4g} -> {last['return_true']:.4g} "
-            f"with {last['true_samples']} true samples, {updates} update{'s' * (updates != 1)})"
+            f"with {last['true_samples']} true samples, {counted(updates, 'update')})"
         )
 
     def _last(self) -> Mapping[str, Any]:

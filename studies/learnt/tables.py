@@ -100,9 +100,7 @@ def policy_frame(policies: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
 
 def _policy(record: Mapping[str, Any]) -> dict[str, Any]:
     """A policy's record without its curve, and with the means of its tests by measure."""
-    flat = {
-        name: value for name, value in record.items() if name not in ("curve", "tests", "warnings")
-    }
+    flat = {name: value for name, value in record.items() if name not in _LISTS}
     return flat | measures_of(record)
 
 

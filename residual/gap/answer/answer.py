@@ -39,9 +39,8 @@ def summed_up(answer: Answer) -> Gap:
     found, search = answer.found, answer.found.search
     by_noise = fitted_floor if search.simulator.has_contacts else noise_floor
     floor = by_noise(search.fitter, search.tried[answer.key], found.floor.sigma)
-    left = search.fitter.left(search.tried[answer.key], found.floor)
     order = [claim.number for claim in answer.claims]
-    return gap(search, answer.key, order, floor, (found.nominal_left.ratio, left.ratio))
+    return gap(search, answer.key, order, floor, (found.nominal_left.ratio, answer.left.ratio))
 
 
 def told(
@@ -103,11 +102,11 @@ def verdicts(
     blind: Sequence[Blind],
 ) -> list[Verdict]:  # fmt: skip
     """All verdicts, most important first: what is certain, then what takes off most."""
-    found, search = answer.found, answer.found.search
+    search = answer.found.search
     labels = [search.candidates[claim.number].label for claim in answer.claims]
     blocks = len(search.fitter.blocks)
     made: list[Verdict] = []
-    left = search.fitter.left(search.tried[answer.key], found.floor)
+    left = answer.left
     times = 1.0 if left.adequate else left.ratio
     for claim, label in zip(answer.claims, labels, strict=True):
         exact = dependent(label, labels, sets)

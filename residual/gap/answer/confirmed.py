@@ -14,6 +14,7 @@ from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.numerics import other_numerics, with_enough_substeps
 from residual.gap.confirmation.size import may_vanish
 from residual.gap.confirmation.tolerance import allow_for_parameters
+from residual.gap.fitting.contract import Left
 from residual.gap.fitting.forecasts import main_channel, noise_floor
 from residual.gap.search.choice import better_fit
 from residual.gap.search.comparisons import material
@@ -47,6 +48,12 @@ class Answer:
     key: Key
     claims: tuple[Claim, ...]
     leads: tuple[str, ...]
+
+    @property
+    def left(self) -> Left:
+        """What it leaves, beside the noise."""
+        search = self.found.search
+        return search.fitter.left(search.tried[self.key], self.found.floor)
 
     @functools.cached_property
     def corrected(self) -> HostSimulator:

@@ -25,7 +25,7 @@ def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
         tolerance: How well they are known, as a share of each.
     """
     search, key = answer.found.search, answer.key
-    left = search.fitter.left(search.tried[key], answer.found.floor)
+    left = answer.left
     if not tolerance or left.adequate or left.ratio <= FOOTNOTE:
         return []
     if not key and within_noise(summed_up(answer)):

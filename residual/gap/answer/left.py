@@ -24,9 +24,7 @@ MUCH = 0.3
 def worth_a_part(answer: Answer, parts: Sequence[FlexiblePart]) -> Sequence[FlexiblePart]:
     """The flexible parts to ask for: all, if clearly more than noise is left, or of the gap."""
     search = answer.found.search
-    if not isinstance(search.fitter, SmoothFitter):
-        return ()
-    if search.fitter.left(search.tried[answer.key], answer.found.floor).adequate:
+    if not isinstance(search.fitter, SmoothFitter) or answer.left.adequate:
         return ()
     if much_is_left(answer):
         return parts
@@ -37,8 +35,7 @@ def worth_a_part(answer: Answer, parts: Sequence[FlexiblePart]) -> Sequence[Flex
 
 def much_is_left(answer: Answer) -> bool:
     """Whether what was named leaves clearly more than noise."""
-    search = answer.found.search
-    left = search.fitter.left(search.tried[answer.key], answer.found.floor)
+    left = answer.left
     return not left.adequate and left.ratio > NOTABLE
 
 

@@ -124,10 +124,7 @@ def few_stretches(answer: Answer) -> str:
     Args:
         answer: Of which no single block tells.
     """
-    search = answer.found.search
-    if not _many_blocks(answer):
-        return ""
-    if search.fitter.left(search.tried[answer.key], answer.found.floor).adequate:
+    if not _many_blocks(answer) or answer.left.adequate:
         return ""
     _, left = _by_block(answer)
     order = np.argsort(-left)

@@ -55,7 +55,7 @@ def unlike(answer: Answer) -> tuple[Unlike, ...]:
     if not isinstance(fitter, SmoothFitter):
         return ()
     names, group = _records(fitter)
-    if len(names) < 2 or fitter.left(search.tried[key], answer.found.floor).adequate:
+    if len(names) < 2 or answer.left.adequate:
         return ()
     noise = noise_floor(fitter, search.tried[key], answer.found.floor.sigma)
     found = [

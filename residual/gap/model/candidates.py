@@ -21,7 +21,7 @@ from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect, Quantity
 from sims.effects.curve import Curve
 from sims.effects.exchange import Exchange
-from sims.effects.flexible import FlexiblePart
+from sims.effects.flexible import ELSEWHERE, FlexiblePart
 from sims.effects.joint import JointEffect
 from sims.effects.library import typical
 from sims.effects.limit import RateLimit
@@ -183,7 +183,7 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     there = typical(effect, simulator)
     assert isinstance(there, JointEffect)
     size = effect.measures(simulator)["position"][1] if joint.rate else 1.0
-    places = size * np.array([-0.7, 0.0, 0.4, 1.0])
+    places = size * np.array(ELSEWHERE)
     # The state of a first-order system counts as a rate.
     rates = np.zeros(4) if joint.rate else places
     return bool(np.ptp(there.force(places, rates)) > 0)
