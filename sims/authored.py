@@ -62,3 +62,24 @@ def force_is_added(
     except Exception:  # what is wrong with it is told where a simulator is checked
         pass
     return np.zeros(joints, bool)
+
+
+def mobility(
+    acceleration: Callable[..., Any], j: int, places: Array, inputs: int, values: Mapping[str, Any]
+) -> Array:
+    """Acceleration of every joint at rest per unit force on joint ``j``, (n, joints).
+
+    Args:
+        acceleration: What the author wrote.
+        j: The joint.
+        places: Positions of all joints, (n, joints).
+        inputs: How many there are.
+        values: Parameters by name.
+    """
+    n = len(places)
+    q, rest = np.concatenate([places, places]), np.zeros((2 * n, places.shape[1]))
+    force = rest.copy()
+    force[n:, j] = 1.0
+    with np.errstate(all="ignore"):
+        moved = acceleration(q, rest, np.zeros((2 * n, inputs)), force, SimpleNamespace(**values))
+    return np.asarray(moved[n:] - moved[:n])

@@ -10,15 +10,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from sims.authored import by_joint, force_is_added, joint_of
+from sims.authored import by_joint, force_is_added, joint_of, mobility
 from sims.effects.base import Effect
 from sims.effects.exchange import Exchange
-from sims.effects.flexible import flexible_parts
+from sims.effects.flexible import ELSEWHERE, flexible_parts
 from sims.effects.friction import DryFriction
+from sims.effects.inertia import AddedInertia
 from sims.effects.limit import RateLimit
 from sims.effects.store import SecondStore, stores
 from sims.host import HostSimulator, Joint
-from sims.motion import Acceleration, DriveForce, Motion, substep_ends
+from sims.motion import Acceleration, DriveForce, Motion, carrying, substep_ends
 from sims.rows import State
 from sims.simulator import Array, Parameter
 from sims.sliding import move
@@ -87,10 +88,12 @@ class _Equations(HostSimulator):
         flows += [(names.index(e.joint), len(names) + i, e) for i, e in enumerate(stores(self))]
         states = len(names) + len(stores(self))
         parts = [(names.index(e.joint), states + i, e) for i, e in enumerate(flexible_parts(self))]
+        added = {f"{e} {i}": e for i, e in enumerate(there) if isinstance(e, AddedInertia)}
+        inertia = {name: e.inertia for name, e in added.items()}
         return Motion(
-            acceleration,
+            carrying(acceleration, {name: names.index(e.joint) for name, e in added.items()}),
             drive_force,
-            SimpleNamespace(**self.parameter_values()),
+            SimpleNamespace(**self.parameter_values(), **inertia),
             smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
             dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
             plays=tuple((names.index(e.joint), e) for e in self.plays()),
@@ -176,17 +179,26 @@ class EquationOfMotion(_Equations):
         """The joint's own scale, or the force that sets up a typical rate in ten periods."""
         if joint.scale is not None:
             return joint.scale
-        j = [other.name for other in self.joints].index(joint.name)
-        joints = len(self.joints)
-        force = np.zeros((2, joints))
-        force[1, j] = 1.0
-        rest, u = np.zeros((2, joints)), np.zeros((2, len(self.action_channels)))
-        values = {name: np.mean(p.value) for name, p in self.parameters.items()}
+        j = self.joints.index(joint)
+        speed = self.state_channels[self._rates[j]].scale
+        moved = self._mobility(j, np.zeros((1, len(self.joints))))[0, j]
         with np.errstate(all="ignore"):
-            a = self.acceleration(rest, rest, u, force, SimpleNamespace(**values))[:, j]
-        return float(
-            abs(self.state_channels[self._rates[j]].scale / (10 * self.dt * (a[1] - a[0])))
-        )
+            return float(abs(speed / (10 * self.dt * moved)))
+
+    def coupled_inertia(self, joint: Joint) -> float | None:
+        """See ``HostSimulator.coupled_inertia``; compared at some places."""
+        j = self.joints.index(joint)
+        scales = np.array([self.state_channels[column].scale for column in self._positions])
+        # Not all at the same share of their scale, where a coupling may vanish.
+        shares = np.array([np.roll(ELSEWHERE, k) for k in range(len(scales))]).T
+        moved = self._mobility(j, shares * scales)
+        own, others = np.median(moved[:, j]), np.abs(np.delete(moved, j, axis=1)).sum()
+        return float(1 / own) if own > 0 and 0 < others < np.inf else None
+
+    def _mobility(self, j: int, places: Array) -> Array:
+        """Acceleration of every joint per unit force on joint ``j`` at rest, (n, n_joints)."""
+        values = {name: np.mean(p.value) for name, p in self.parameters.items()}
+        return mobility(self.acceleration, j, places, len(self.action_channels), values)
 
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
         """See ``HostSimulator.integrate``."""

@@ -35,13 +35,11 @@ class HostSimulator(Simulator):
     Effects with memory (delay, lag, backlash) append ``memory`` channels to the physical ones.
 
     Attributes:
-        effects: The effects, in any order.
-        joints: Where generalized forces can act.
+        effects, joints: The effects, in any order, and where generalized forces can act.
         substeps: Sub-steps in one control period.
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
-        written_out: True if given by equations: they host rate limits, exchanges, stores and parts.
-        has_contacts: True if motion jumps at impacts, so that only short windows compare with
-            logs; see ``for_motion``.
+        written_out: True if given by equations, which host rate limits, exchanges, stores, parts.
+        has_contacts: True if motion jumps at impacts: see ``for_motion``.
         advances_rows_at_once: True if ``integrate`` advances rows together, each its own values.
         lagged: How an input with a lag acts in sub-steps, see ``sims.drive.lagged``.
     """
@@ -82,6 +80,10 @@ class HostSimulator(Simulator):
         if joint.scale is None:
             raise NotImplementedError(f"joint {joint.name!r} has no scale")
         return joint.scale
+
+    def coupled_inertia(self, joint: Joint) -> float | None:
+        """Inertia at a joint that moves others, while those are free; None where it moves none."""
+        return None
 
     def smooth_states(self, n: int, rng: np.random.Generator) -> Array:
         """Random physical states where a small change has a small effect, (n, n_physical).

@@ -6,7 +6,7 @@ Joints first and rows last, (n_joints, n), as in ``sims.rows``.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -186,6 +186,35 @@ class Motion:
         for j, effect in self.dry:
             size[j] += effect.limit(np.abs(v[j]))
         return size
+
+
+def carrying(acceleration: Acceleration, places: Mapping[str, int]) -> Acceleration:
+    """The accelerations with inertia that moves with one joint alone, a force ``-inertia q''``.
+
+    Args:
+        acceleration: Without it.
+        places: Numbers of joints, by the name of the parameter that holds their inertia.
+    """
+    if not places:
+        return acceleration
+
+    def slowed(q: Array, v: Array, u: Array, force: Array, p: SimpleNamespace) -> Array:
+        found = acceleration(q, v, u, force, p)
+        moved = []  # by a unit force on each of the joints
+        for j in places.values():
+            more = force.copy()
+            more[j] += 1.0
+            moved.append(acceleration(q, v, u, more, p) - found)
+        # One inertia after the other, by the formula of Sherman and Morrison.
+        for i, (name, j) in enumerate(places.items()):
+            inertia = getattr(p, name)
+            share = inertia / (1 + inertia * moved[i][j])
+            for other in range(i + 1, len(moved)):
+                moved[other] = moved[other] - moved[i] * (share * moved[other][j])
+            found = found - moved[i] * (share * found[j])
+        return found
+
+    return slowed
 
 
 def advance_smoothly(motion: Motion, state: State, u: Array, h: Array) -> State:

@@ -13,6 +13,7 @@ import numpy as np
 from sims.effects.actuator import AND, ActuatorBias, ActuatorGain
 from sims.effects.base import Effect
 from sims.effects.friction import DryFriction
+from sims.effects.inertia import AddedInertia
 from sims.effects.joint import JointEffect
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
@@ -176,8 +177,8 @@ def _is_linear(simulator: HostSimulator, effect: Effect) -> bool:
     if isinstance(effect, SensorOffset | SensorScale):
         return _alone(simulator, effect.channel)
     force = isinstance(effect, JointEffect) and not isinstance(effect, DryFriction)
-    input_or_parameter = isinstance(effect, ParameterChange | ActuatorGain | ActuatorBias)
-    return (force or input_or_parameter) and len(effect.strengths()) == 1
+    proportional = ParameterChange | ActuatorGain | ActuatorBias | AddedInertia
+    return (force or isinstance(effect, proportional)) and len(effect.strengths()) == 1
 
 
 def _columns(

@@ -28,6 +28,7 @@ from sims.effects.friction import (
     DirectionalFriction,
     StribeckFriction,
 )
+from sims.effects.inertia import AddedInertia
 from sims.effects.joint import (
     Cogging,
     ConstantLoad,
@@ -94,6 +95,8 @@ def library(simulator: HostSimulator) -> tuple[Effect, ...]:
     for channel in simulator.physical_channels:
         places += [(effect, channel.name) for effect in SENSOR_EFFECTS]
     places += [(ParameterChange, name) for name in simulator.parameters]
+    # After parameters, which many a system has for it.
+    places += [(AddedInertia, joint.name) for joint in simulator.joints]
     found = []
     for kind, where in places:
         effect = kind(where)  # type: ignore[call-arg]

@@ -3,11 +3,12 @@
 import inspect
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sims import effects
 from sims.effects import Effect, library
-from sims.equations import FirstOrderSystem
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel
 
@@ -23,10 +24,28 @@ class Tank(FirstOrderSystem):
         return u + 0.0 * x
 
 
+class Coupled(EquationOfMotion):
+    """Two joints that move each other."""
+
+    state_channels = tuple(
+        channel
+        for name in ("pivot", "elbow")
+        for channel in (
+            Channel(name, "rad", "position", angle=True),
+            Channel(f"{name} rate", "rad/s", "rate", rate_of=name),
+        )
+    )
+    action_channels = (Channel("voltage", "V", "input"),)
+
+    def acceleration(self, q, v, u, force, p):
+        return force @ np.array([[2.0, -0.5], [-0.5, 3.0]])
+
+
 def row(effect: Effect) -> str:
     """The effect's row of the table; units are those of a joint that turns, driven by a voltage."""
     first_order = effect.name in ("proportional_loss", "state_curve", "exchange", "second_store")
-    known = effect.quantities(Tank() if first_order else PendulumEquation())
+    host = Coupled() if effect.name == "added_inertia" else PendulumEquation()
+    known = effect.quantities(Tank() if first_order else host)
     numbers = ", ".join(f"`{name}` {quantity.unit}" for name, quantity in known.items())
     place = PLACES[next(iter(inspect.signature(type(effect)).parameters))]
     place = "two states" if " and " in effect.where else place
@@ -44,7 +63,7 @@ CURVES = [
 # Asked for where a command is followed, which a voltage is not.
 OTHERS = [
     effects.StateCurve("level"), effects.RateLimit("pivot"),
-    effects.FlexiblePart("pivot"), effects.FlexibleJoint("pivot"),
+    effects.FlexiblePart("pivot"), effects.FlexibleJoint("pivot"), effects.AddedInertia("pivot"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if e.enters != "parameter"}
