@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import gymnasium
@@ -149,16 +150,34 @@ def evaluate(
     return np.array([rollout(policy, env, seed + k, noise).total for k in range(episodes)])
 
 
+#: Rolls out one episode, as ``rollout`` does.
+Roll = Callable[
+    [Policy, gymnasium.Env[Any, Any], int, OrnsteinUhlenbeck | None, int | None], Rollout
+]
+
+
 def collect(
     policy: Policy,
     env: gymnasium.Env[Any, Any],
     samples: int,
     seed: int,
     noise: OrnsteinUhlenbeck | None = None,
+    roll: Roll = rollout,
+    tell: Callable[[int], None] | None = None,
 ) -> list[Rollout]:
-    """Rollouts with exactly ``samples`` steps in all, the last one cut short if need be."""
+    """Rollouts with exactly ``samples`` steps in all, the last one cut short if need be.
+
+    Args:
+        policy, env, seed, noise: See ``rollout``; seeds count on.
+        samples: How many steps.
+        roll: Rolls out each.
+        tell: Told after each how many steps there are.
+    """
     rollouts: list[Rollout] = []
-    while samples > 0:
-        rollouts.append(rollout(policy, env, seed + len(rollouts), noise, samples))
-        samples -= len(rollouts[-1].rewards)
+    taken = 0
+    while taken < samples:
+        rollouts.append(roll(policy, env, seed + len(rollouts), noise, samples - taken))
+        taken += len(rollouts[-1].rewards)
+        if tell:
+            tell(taken)
     return rollouts

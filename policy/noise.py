@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,6 +47,15 @@ class OrnsteinUhlenbeck:
     def __repr__(self) -> str:
         size, sigma, theta = self.value.size, self.sigma, self.theta
         return f"{type(self).__name__}({size}, sigma={sigma:g}, theta={theta:g})"
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """Where its random numbers are, plain values; set it to go on from there."""
+        return dict(self._rng.bit_generator.state)
+
+    @state.setter
+    def state(self, state: dict[str, Any]) -> None:
+        self._rng.bit_generator.state = state
 
     def reset(self) -> None:
         """Forget the past: the next value starts from zero."""

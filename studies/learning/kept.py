@@ -82,6 +82,12 @@ class OnDisk:
                 self._compute(folder, described, compute)
         return load(folder, key)
 
+    def forget(self, keys: Sequence[str]) -> None:
+        """Remove steps that a later one holds."""
+        for key in keys:
+            shutil.rmtree(self.root / key, ignore_errors=True)
+            (self.root / f".{key}.lock").unlink(missing_ok=True)
+
     def _compute(self, folder: Path, described: str, compute: Callable[[], R]) -> None:
         # The lock says that nobody is working on what a killed process left.
         for left in self.root.glob(f".{folder.name}.*"):

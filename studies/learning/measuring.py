@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from policy.evaluate import Policy, rollout
+from policy.evaluate import Policy, Roll, rollout
 from policy.learner import Algorithm
 from residual.accuracy import LEAST_STEPS, Accuracy, accuracy_along, uniform_rollouts
 from residual.corrected import CorrectedSimulator
@@ -26,7 +26,12 @@ STARTS = 1000
 
 
 def where_it_goes(
-    system: System, algorithm: Algorithm, policy: Policy, corrected: CorrectedSimulator, seed: int
+    system: System,
+    algorithm: Algorithm,
+    policy: Policy,
+    corrected: CorrectedSimulator,
+    seed: int,
+    roll: Roll = rollout,
 ) -> tuple[Accuracy, int]:
     """Accuracy along fresh true rollouts of a policy, all but the first with exploration noise.
 
@@ -36,6 +41,7 @@ def where_it_goes(
         policy: Trained on ``corrected``.
         corrected: The simulator with its difference model.
         seed: Where the random numbers of the rollouts begin.
+        roll: Rolls out an episode.
 
     Returns:
         The accuracy, and the steps of the true system that it took.
@@ -46,9 +52,9 @@ def where_it_goes(
     if protocol.visited_seconds is not None:
         # Long enough for the longest of the usual horizons.
         steps = max(*LEAST_STEPS, round(protocol.visited_seconds / corrected.dt))
-    runs = [rollout(policy, env, seed, max_steps=steps)]
+    runs = [roll(policy, env, seed, None, steps)]
     runs += [
-        rollout(policy, env, seed + k, exploration(system, algorithm, seed + k), steps)
+        roll(policy, env, seed + k, exploration(system, algorithm, seed + k), steps)
         for k in range(1, protocol.visited_rollouts)
     ]
     # One that fell ends early, and is as long as it is.

@@ -24,6 +24,7 @@ from sims.rates import refuse_unrelated_rates
 from sims.simulator import Simulator
 from sims.system import System
 from studies.learning.described import modules_in, settings_of
+from studies.learning.episodes import Episodes
 from studies.learning.fingerprint import fingerprint
 from studies.learning.measuring import anywhere, where_it_goes
 from studies.learning.results import Measured, Model, Samples
@@ -81,22 +82,23 @@ class Steps:
             known: What was learnt of the difference, for the state that the policy sees.
         """
 
+        settings: dict[str, Any] = {"policy": policy.key, "samples": samples, "update": update}
+        if known:
+            settings |= {"known": known.key, **self._estimator}
+        episodes = self._episodes("collect", settings)
+
         def compute() -> Samples:
             seed = stream(self.seed, "collect", update)
             noise = exploration(self.system, self.algorithm, seed)
             env = self.system.true_environment(self.corrected(known) if known else None)
             with self.progress.task(f"collect {samples} true samples", samples) as tell:
-                runs = collect(policy.policy, env, samples, seed, noise)
-                tell(samples, "")
+                runs = collect(policy.policy, env, samples, seed, noise, episodes.roll, tell)
             steps = [(visited(self.system, run), run.actions) for run in runs]
             for refuse in (refuse_ended_at_once, refuse_unrelated_rates):
                 refuse("the true system", self.system.nominal, steps)
             return Samples(transitions(self.system, runs))
 
-        settings: dict[str, Any] = {"policy": policy.key, "samples": samples, "update": update}
-        if known:
-            settings |= {"known": known.key, **self._estimator}
-        return self._kept("collect", settings, compute, Samples.load)
+        return self._kept("collect", settings, compute, Samples.load, episodes)
 
     def fit(self, samples: Sequence[Samples]) -> Model:
         """The difference model on all transitions so far."""
@@ -158,23 +160,28 @@ class Steps:
         compute = functools.partial(train, self, kind, steps, start, on, update)
         learnt = self._kept(kind, settings, compute, load)
         # Apart: what a robot in trouble costs is a test, and no training.
-        testing = functools.partial(tested, self, kind, learnt, on)
-        return learnt.tested(self._kept("test", {"policy": learnt.key}, testing, Tested.load))
+        policy = {"policy": learnt.key}
+        episodes = self._episodes("test", policy)
+        testing = functools.partial(tested, self, kind, learnt, on, episodes.roll)
+        return learnt.tested(self._kept("test", policy, testing, Tested.load, episodes))
 
     def measure(self, model: Model, policy: Training, update: int) -> Measured:
         """Accuracy of the model along fresh true rollouts of the policy trained on it."""
         settings = {"model": model.key, "policy": policy.key, "update": update, **self._estimator}
+        episodes = self._episodes("measure", settings)
 
         def compute() -> Measured:
             corrected, acting = self.corrected(model), policy.policy
             seed, elsewhere = (stream(self.seed, name, update) for name in ("measure", "elsewhere"))
-            accuracy, taken = where_it_goes(self.system, self.algorithm, acting, corrected, seed)
+            accuracy, taken = where_it_goes(
+                self.system, self.algorithm, acting, corrected, seed, episodes.roll
+            )
             found: dict[str, Any] = {"visited": accuracy, "rollout_steps": taken}
             if accuracy_there := anywhere(self.system, corrected, elsewhere):
                 found["uniform"] = accuracy_there
             return Measured(jsonable(found))
 
-        return self._kept("measure", settings, compute, Measured.load)
+        return self._kept("measure", settings, compute, Measured.load, episodes)
 
     def corrected(self, model: Model) -> CorrectedSimulator:
         """The simulator at hand with a difference model."""
@@ -202,11 +209,23 @@ class Steps:
             "scaled": self.scaled,
         }
 
-    def _kept(self, name: str, settings: Any, compute: Any, load: Any) -> Any:
+    def _episodes(self, purpose: str, settings: Mapping[str, Any]) -> Episodes:
+        """Episodes of a step, kept one by one if the true system can only be sampled."""
+        sampled = self.keeper is not None and not isinstance(self.system.true, Simulator)
+        keep = functools.partial(self._kept, "episode") if sampled else None
+        return Episodes(keep, {"purpose": purpose, **settings})
+
+    def _kept(
+        self, name: str, settings: Any, compute: Any, load: Any, of: Episodes | None = None
+    ) -> Any:
+        """A step, found again or computed; the episodes that it is made of are then let go."""
         if self.keeper is None:
             return compute()
         everything = {**self._common, **settings}
         # The classes of the estimator and of whatever else settings tell are among the modules.
         roots = [Steps, self.algorithm.kind(), *self.system.code()]
         roots += sorted(modules_in(everything))
-        return self.keeper.run(name, everything, roots, compute, load)
+        found = self.keeper.run(name, everything, roots, compute, load)
+        if of:
+            self.keeper.forget(of.keys)
+        return found

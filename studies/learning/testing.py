@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 import numpy as np
 
-from policy.evaluate import Policy, evaluate, rollout
+from policy.evaluate import Policy, Roll, evaluate, rollout
 from residual.corrected import CorrectedSimulator
 from simgap_files.npz import read_npz, write_npz
 from sims.simulator import Array, Simulator
@@ -55,7 +55,9 @@ class Tested:
         return cls(summary, read_npz(folder / EPISODE), key)
 
 
-def tested(steps: Steps, kind: Kind, learnt: Training, on: Model | Simulator | None) -> Tested:
+def tested(
+    steps: Steps, kind: Kind, learnt: Training, on: Model | Simulator | None, roll: Roll = rollout
+) -> Tested:
     """Test a policy on the true system, and from as many starts on what it learnt on.
 
     Args:
@@ -63,13 +65,14 @@ def tested(steps: Steps, kind: Kind, learnt: Training, on: Model | Simulator | N
         kind: See ``Steps.train``, as the others.
         learnt: The policy.
         on: The difference model added to the simulator, or another simulator.
+        roll: Rolls out an episode on the true system.
     """
     system, policy = steps.system, learnt.policy
     # Of no kind and no update: what differs between policies is not where they began.
     starts = stream(steps.seed, "test starts")
     # One of its own: what the filter steps is not what was trained on and held.
     believed, _ = learnt_on(steps, on)
-    summary, episode = test_on_truth(system, policy, starts, believed)
+    summary, episode = test_on_truth(system, policy, starts, believed, roll)
     summary["held"] = 0
     count, protocol = len(summary["tests"]), system.evaluation
     if not protocol.final_episodes and count > protocol.episodes and kind not in ON_TRUTH:
@@ -82,7 +85,11 @@ def tested(steps: Steps, kind: Kind, learnt: Training, on: Model | Simulator | N
 
 
 def test_on_truth(
-    system: System, policy: Policy, seed: int, believed: Simulator | None = None
+    system: System,
+    policy: Policy,
+    seed: int,
+    believed: Simulator | None = None,
+    roll: Roll = rollout,
 ) -> tuple[dict[str, Any], dict[str, Array]]:
     """Rollouts on the true system, each from a start of its own.
 
@@ -92,12 +99,13 @@ def test_on_truth(
         seed: Of the first reset; the others count on from it. Policies tested with one seed begin
             in the same states.
         believed: Makes a state of what the true system's sensors show, see ``System``.
+        roll: Rolls out an episode.
 
     Returns:
         Their mean return, every test, steps and warnings, and the first rollout.
     """
     env = system.true_environment(believed)
-    runs = [rollout(policy, env, seed + k) for k in range(_starts(system, env, seed))]
+    runs = [roll(policy, env, seed + k, None, None) for k in range(_starts(system, env, seed))]
     tests = []
     for run in runs:
         states = visited(system, run)

@@ -58,6 +58,40 @@ def test_what_was_trained_is_kept_if_the_robot_fails_in_a_test(tmp_path, monkeyp
     assert [policy["name"] for policy in learnt.policies] == ["idealised", "difference"]
 
 
+@pytest.mark.parametrize("loose_at", [1 + 45, 1 + 150 + 35, 1 + 150 + 60 + 150 + 40])
+def test_a_robot_that_breaks_off_costs_the_episode_at_hand(tmp_path, monkeypatch, loose_at):
+    monkeypatch.setattr(Loose, "taken", 0)
+
+    def once(folder):
+        options = {"keep": tmp_path / folder, **QUICK}
+        return learn_by_difference(PendulumEquation(), Loose, SwingUp(horizon=30), **options)
+
+    whole = once("whole")
+    needed = Loose.taken
+    monkeypatch.setattr(Loose, "taken", 0)
+    monkeypatch.setattr(Loose, "loose_at", loose_at)
+    with pytest.raises(ValueError, match="no answer"):
+        once("broken")
+    broken = once("broken")
+    # The check that it steps at all comes again, and so does the episode at hand.
+    assert Loose.taken - needed <= 1 + 30
+    measured = [
+        {name: value for name, value in one.accuracy[0].items() if name != "fit_seconds"}
+        for one in (broken, whole)
+    ]
+    assert measured[0] == measured[1]
+    assert [p["tests"] for p in broken.policies] == [p["tests"] for p in whole.policies]
+    assert all(
+        np.array_equal(one.states, other.states)
+        for one, other in zip(broken.runs, whole.runs, strict=True)
+    )
+    left = [
+        sorted(path.name.rsplit("-", 1)[0] for path in (tmp_path / name).iterdir())
+        for name in ("broken", "whole")
+    ]
+    assert left[0] == left[1] and "collect" in left[0] and "episode" not in left[0]
+
+
 def test_every_step_of_the_true_system_is_counted(monkeypatch):
     monkeypatch.setattr(Loose, "taken", 0)
     monkeypatch.setattr(Loose, "loose_at", 0)

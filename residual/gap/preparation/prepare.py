@@ -110,7 +110,7 @@ def prepare(
         if len(fit.theta):
             # Noise suffers from a large gap, so it is estimated around the better model.
             better = _noise_around(fit, fitter, floor, horizon / (1 - LEAD))
-            around = better if (better.sigma < floor.sigma).all() else floor
+            around = better if (better.sigma <= floor.sigma).all() else floor
         again = weighted(now, fit, around.sigma)
         corrected = fit.model.bind(fit.theta)
         few = enough_for(corrected, simulator, now.samples, now.nodes, again.sigma, finest)
