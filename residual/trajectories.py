@@ -139,6 +139,7 @@ class Trajectory:
         actions: Action from sample k to sample k + 1, shape (T, n_a).
         before: Action that was held for long before the first sample, shape (n_a,), which delays
             and lags remember; by default the first one.
+        converted: Channels whose columns were in another unit when they were read.
 
     Raises:
         ValueError: The arrays do not belong together.
@@ -149,6 +150,7 @@ class Trajectory:
     states: Array
     actions: Array
     before: Array | None = None
+    converted: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         samples = len(self.times)
@@ -178,6 +180,7 @@ class Trajectory:
             self.states[start:stop],
             self.actions[start : stop - 1],
             self.before if start == 0 else None,
+            self.converted,
         )
 
     @property

@@ -112,7 +112,8 @@ def find_gap(
 
         log, prepared = settle(simulator, log, tell)
         clock.begin()
-        conventions = otherwise(simulator, prepared.fitter)
+        converted = frozenset[str]().union(*(run.converted for run in log.runs))
+        conventions = otherwise(simulator, prepared.fitter, converted)
         conventions = conventions or beyond_scale(simulator, prepared.fitter.samples)
         if conventions is not None:
             tell(f"does the log count otherwise, by {' or '.join(conventions.changes)}?")

@@ -105,7 +105,9 @@ def _error(ready: Prepared, nominal: HostSimulator, found: Explanation) -> float
 def _shifted(runs: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
     """Runs whose inputs act a row earlier, without their last row, of which none is known."""
     return tuple(
-        Trajectory(run.name, run.times[:-1], run.states[:-1], run.actions[1:], run.before)
+        dataclasses.replace(
+            run, times=run.times[:-1], states=run.states[:-1], actions=run.actions[1:]
+        )
         for run in runs
         if len(run) > 1
     )

@@ -170,7 +170,7 @@ def _trajectory(
         if jumps:
             says = f"{channel.name} jumped by whole turns {jumps} times and was unwrapped."
             findings.append(Finding("unwrapped", run.name, says, {"jumps": jumps}))
-    return Trajectory(run.name, run.times, going_on, run.actions[:-1])
+    return Trajectory(run.name, run.times, going_on, run.actions[:-1], converted=run.converted)
 
 
 def _unmeasured(channels: Sequence[Channel], runs: Sequence[Run]) -> list[Finding]:

@@ -12,7 +12,7 @@ from residual.logs.headers import TIME, columns_of, time_column
 from residual.logs.layout import Column, LogFormat
 from residual.logs.table import LogError, Table
 from residual.logs.timing import Run
-from residual.logs.units import find_unit
+from residual.logs.units import Unit, find_unit
 from sims.simulator import Channel
 
 Array = NDArray[np.float64]
@@ -87,6 +87,13 @@ def runs_of(
         raise LogError("no time at all, expected seconds", table.path, column=time.column)
     matrix = np.column_stack(seen)
     inputs_matrix = np.column_stack(acted) if acted else np.zeros((len(table), 0))
+    converted = frozenset(
+        channel.name
+        for channel in (*states, *actions)
+        if (column := (found | inputs).get(channel.name))
+        and column.unit
+        and find_unit(column.unit, channel.unit) != Unit(1.0)
+    )
     for label, rows in _groups(table, columns):
         for part in _resets(table, times, rows, columns.split_at_time_resets, time.column):
             inside = _between(times[part], columns.start, columns.stop)
@@ -102,6 +109,7 @@ def runs_of(
                 times[part],
                 matrix[part],
                 inputs_matrix[part],
+                converted,
             )
 
 

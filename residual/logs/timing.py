@@ -31,6 +31,7 @@ class Run:
         times: In s, shape (n,).
         states: One column for each channel that a log can hold, shape (n, n_s), NaN if missing.
         actions: At each sample, shape (n, n_a), NaN if missing.
+        converted: Channels whose columns are in another unit than they.
     """
 
     path: Path
@@ -39,6 +40,7 @@ class Run:
     times: Array
     states: Array
     actions: Array
+    converted: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(self.times)

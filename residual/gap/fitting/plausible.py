@@ -19,9 +19,10 @@ from residual.gap.fitting.intervals import at_bound, deviations
 from residual.gap.fitting.screening import flatten
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.model import Model
-from sims.effects.actuator import ActuatorEffect, ActuatorGain
+from sims.effects.actuator import ActuatorEffect, ActuatorGain, StaticActuatorEffect
 from sims.effects.aliases import probes, shortly_after
 from sims.effects.base import Effect
+from sims.effects.curve import Curve
 from sims.effects.parameter import ParameterChange
 from sims.effects.sensor import SensorEffect, SensorOffset
 from sims.host import HostSimulator
@@ -76,6 +77,10 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
             return number, f"{channel.name} would have {left / usual:.2g} of its strength"
         if turned_round(host.effects, channel.name):
             return number, f"{channel.name} would act the other way"
+        curve = _turned_by_a_curve(host.effects, channel.name, samples.actions[:, j])
+        if curve is not None:
+            number = curve - len(model.simulator.effects)
+            return number, f"{channel.name} would act the other way in a part of its range"
     return len(model.chosen), ""
 
 
@@ -83,6 +88,19 @@ def turned_round(effects: Sequence[Effect], actuator: str) -> bool:
     """Whether effects make an input act the other way."""
     gains = [one for one in effects if isinstance(one, ActuatorGain) and actuator in one.actuators]
     return sum(gain.turns_round for gain in gains) % 2 == 1
+
+
+def _turned_by_a_curve(effects: Sequence[Effect], actuator: str, commands: Array) -> int | None:
+    """Position of a curve that turns commands round, more than a bias of a tenth does."""
+    most = float(np.abs(commands).max(initial=0.0))
+    for place, one in enumerate(effects):
+        if not (isinstance(one, StaticActuatorEffect) and isinstance(one, Curve)):
+            continue
+        if actuator in one.actuators and most > 0:
+            against = one.shape(commands) * np.sign(commands) < -THROUGH * most
+            if float(against.mean()) > SELDOM:
+                return place
+    return None
 
 
 def _ratios(host: HostSimulator, model: Model) -> dict[int, float]:

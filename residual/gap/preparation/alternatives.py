@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,8 +63,16 @@ def reversed_sign(name: str) -> str:
     return f"`scale: -1` for {name}"
 
 
-def conventions(simulator: HostSimulator, samples: Samples) -> list[Convention]:
-    """What a column map may have to say: signs, zeros of angles, units, other columns."""
+def conventions(
+    simulator: HostSimulator, samples: Samples, converted: Collection[str]
+) -> list[Convention]:
+    """What a column map may have to say: signs, zeros of angles, units, other columns.
+
+    Args:
+        simulator: Its channels are what columns stand for.
+        samples: The measured table.
+        converted: Channels whose columns were in another unit.
+    """
     found = []
     for place, action in enumerate(simulator.action_channels):
         found.append(_of_input(simulator, reversed_sign(action.name), place, -1.0))
@@ -73,11 +81,11 @@ def conventions(simulator: HostSimulator, samples: Samples) -> list[Convention]:
         for name, unit in other_units(action.unit):
             says = f"`unit: {name}` for {action.name} ({_beside_a_unit(unit)})"
             found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
-        for says, unit in _misread(action):
+        for says, unit in _misread(action, converted):
             found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
     joints = _measured_joints(simulator, samples)
     for seen in joints:
-        found += _turned(simulator, seen) + _in_other_units(simulator, seen)
+        found += _turned(simulator, seen) + _in_other_units(simulator, seen, converted)
     return found + _exchanged(simulator, joints)
 
 
@@ -133,7 +141,9 @@ def _turned(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
     return found
 
 
-def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
+def _in_other_units(
+    simulator: HostSimulator, joint: Sequence[int], converted: Collection[str]
+) -> list[Convention]:
     """A position and its rate in units that go together."""
     channels = [simulator.physical_channels[i] for i in joint]
     found = []
@@ -145,7 +155,7 @@ def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Conv
         if len(said) == len(channels):
             says = f"{' and '.join(said)} ({_beside_a_unit(unit)})"
             found.append(_of_states(simulator, says, joint, unit.factor, unit.offset))
-    for says, unit in _misread(channels[0]):
+    for says, unit in _misread(channels[0], converted):
         found.append(_of_states(simulator, says, joint[:1], unit.factor, unit.offset))
     return found
 
@@ -158,10 +168,10 @@ def _upside_down(simulator: HostSimulator, place: int) -> Convention:
     return _of_input(simulator, says, place, -1.0, ends)
 
 
-def _misread(channel: Channel) -> list[tuple[str, Unit]]:
+def _misread(channel: Channel, converted: Collection[str]) -> list[tuple[str, Unit]]:
     """What undoes the conversion of a column from a unit that it is not in, in words and numbers;
-    but for what another unit does, too."""
-    others = other_units(channel.unit)
+    but for what another unit does, too. Where nothing was converted, there is nothing to undo."""
+    others = other_units(channel.unit) if channel.name in converted else []
     found = []
     for name, unit in others:
         back = Unit(1 / unit.factor, -unit.offset / unit.factor)

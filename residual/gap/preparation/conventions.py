@@ -9,7 +9,7 @@ changed.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Literal
 
 import numpy as np
@@ -59,7 +59,9 @@ AT_ONCE, BY_ROW = 120, 20
 WRONG = 5.0
 
 
-def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
+def otherwise(
+    simulator: HostSimulator, fitter: Fitter, converted: Collection[str] = ()
+) -> Conventions | None:
     """Conventions with which the nominal simulator forecasts far better.
 
     Not asked of systems that strike the ground, whose forecasts are too short for it.
@@ -67,6 +69,7 @@ def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
     Args:
         simulator: The nominal simulator.
         fitter: With the windows to forecast.
+        converted: Channels whose columns were in another unit, which a header may say wrongly.
 
     Returns:
         The best of them and what is as good; None where none is.
@@ -77,9 +80,8 @@ def otherwise(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
     if own < HIDDEN:
         return None
     poor = own >= POOR
-    asked = [
-        one for one in conventions(simulator, fitter.samples) if poor or one.sign or one.exchanged
-    ]
+    possible = conventions(simulator, fitter.samples, converted)
+    asked = [one for one in possible if poor or one.sign or one.exchanged]
     errors = [(_error(simulator, fitter, one), one) for one in asked]
     least, best = min(errors, key=lambda pair: pair[0], default=(own, as_said(simulator)))
     times, good = (EXCHANGED, FAIR) if best.exchanged else (BETTER, GOOD)

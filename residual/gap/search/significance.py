@@ -16,6 +16,9 @@ from residual.gap.search.sets import Key, Search, all_but
 NO_DIFFERENCE = 1.0
 #: Forecast error with an effect over that without, below which it forecasts better.
 BETTER = 0.95
+#: Forecast error of a set over that of one that fits as well, from which on that one comes first:
+#: a level that no fold but one tells fits all data, and foretells little.
+ASTRAY = 1.5
 
 
 def size(search: Search) -> int:
@@ -34,8 +37,9 @@ def significant(search: Search, needed: float) -> Key:
     """The set of least score, of which every effect lowers the cost by what chance does not.
 
     Costs of what strikes the ground hang on luck in finding start states, so there the best
-    forecasts decide among such sets that fit as well. A set that forecasts worse than the nominal
-    simulator is none, however well it fits: noise that is not white passes for an effect.
+    forecasts decide among such sets that fit as well; elsewhere much better ones do. A set that
+    forecasts worse than the nominal simulator is none, however well it fits: noise that is not
+    white passes for an effect.
 
     Args:
         search: Fitted sets, residuals in units of the noise.
@@ -49,12 +53,13 @@ def _likeliest(search: Search, needed: float) -> Key:
     key = pruned(search, min(search.usable(), key=lambda k: score(search, k)), needed)
     if not key:
         return key
-    if not search.simulator.has_contacts:
-        return least_otherwise(search, key)
+    touches = search.simulator.has_contacts
+    key = key if touches else least_otherwise(search, key)
     own = score(search, key)
     alike = [k for k in search.usable() if score(search, k) <= own + tie(search, key, k)]
     other = min((k for k in alike if search.numbers(k) <= search.numbers(key)), key=search.error)
-    return other if pruned(search, other, needed) == other else key
+    better = touches or search.error(key) > ASTRAY * search.error(other)
+    return other if better and pruned(search, other, needed) == other else key
 
 
 def tie(search: Search, key: Key, other: Key) -> float:

@@ -14,8 +14,15 @@ from residual.gap.beside import Conventions
 from residual.gap.data.samples import Samples
 from residual.gap.preparation.conventions import beyond_scale, otherwise, still_open
 from residual.gap.preparation.prepare import prepare
+from residual.logs import read_logs
 from residual.trajectories import Trajectory
-from sims.effects import ActuatorGain, CoulombFriction, LinearSpring, SensorOffset
+from sims.effects import (
+    ActuatorGain,
+    CoulombFriction,
+    LinearSpring,
+    ParameterChange,
+    SensorOffset,
+)
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel, Parameter
@@ -159,11 +166,45 @@ def test_degrees_that_a_header_calls_kelvin_are_told():
         state_channels = (Channel("room", "degC", "other", scale=10.0),)
         parameters = Room.parameters | {"outside": Parameter(-3.15, "degC", "outside")}
 
-    found = otherwise(InDegrees(), prepare(InDegrees(), [run], 300.0).fitter)
+    fitter = prepare(InDegrees(), [run], 300.0).fitter
+    found = otherwise(InDegrees(), fitter, {"room"})
     assert found is not None
     assert found.changes == ("`unit: degC` for room (not K)",)
+    # What was not converted was not converted by mistake.
+    plain = otherwise(InDegrees(), fitter)
+    assert plain is None or "not K" not in str(plain.changes)
     right = dataclasses.replace(run, states=read)
     assert otherwise(InDegrees(), prepare(InDegrees(), [right], 300.0).fitter) is None
+
+
+class Yard(Room):
+    """A room whose outside is measured."""
+
+    state_channels = (Channel("room", "degC", "other", scale=10.0),)
+    action_channels = (*Room.action_channels, Channel("outside", "degC", "input", scale=10.0))
+    parameters: ClassVar = {name: Room.parameters[name] for name in ("capacity", "loss")}
+
+    def derivative(self, x, u, p):
+        return (u[:, :1] - p.loss * (x - u[:, 1:])) / p.capacity
+
+
+def test_degrees_fahrenheit_of_an_input_are_told_of_that_column(tmp_path):
+    rng = np.random.default_rng(0)
+    watts = np.repeat(rng.uniform(0.0, 3000.0, 20), 30)
+    outside = 8.0 + np.cumsum(0.05 * rng.standard_normal(600))
+    weak = Yard(effects=[ParameterChange("loss", 10.0)])
+    warm = weak.rollout([12.0], np.column_stack([watts, outside]))[:-1, 0]
+    warm += 0.1 * rng.standard_normal(600)
+    columns = [10.0 * np.arange(600), warm, watts, 1.8 * outside + 32.0]
+    for header, zero, unit in (("room", 0.0, ""), ("room [K]", 273.15, "K")):
+        path = tmp_path / f"log{unit}.csv"
+        table = np.column_stack([columns[0], warm + zero, *columns[2:]])
+        np.savetxt(path, table, delimiter=",", comments="", header=f"time,{header},heater,outside")
+        read = read_logs(path, Yard.state_channels, Yard.action_channels).trajectories
+        assert read[0].converted == ({"room"} if unit else set())
+        found = otherwise(Yard(), prepare(Yard(), read, 600.0).fitter, read[0].converted)
+        assert found is not None
+        assert found.changes[0].startswith("`unit: degF` for outside")
 
 
 def test_thousandths_are_told_of_any_unit():

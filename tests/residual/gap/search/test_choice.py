@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from toy import Toy
 
 from residual.gap.search.choice import choose
-from residual.gap.search.significance import least_otherwise
+from residual.gap.search.significance import least_otherwise, significant
 from sims.pendulum_equation import PendulumEquation
 
 
@@ -200,3 +200,21 @@ def test_down_to_the_noise_the_same_counts_among_what_fits_no_worse(merit, key):
     known = PendulumEquation().parameters["mass"].value
     toy = Toy(sets, {(0, 3): merit, (1, 3): 20.0, (0, 1): 90.0}, mass=0.02 * known)
     assert least_otherwise(toy, (1, 3)) == key
+
+
+class Fitted(Toy):
+    """The same, with what is left of a set without a member, if it was tried."""
+
+    def merged(self, key, more, drop):
+        return tuple(number for number in key if number not in drop), None
+
+    def add(self, sets):
+        assert set(sets) <= set(self.tried)
+
+
+@pytest.mark.parametrize(("error", "named"), [(0.08, (3,)), (0.025, (2,))])
+def test_where_only_noise_is_left_a_fit_whose_forecasts_go_astray_is_not_the_likeliest(
+    error, named
+):
+    toy = Fitted({(2,): error, (3,): 0.02}, {(): 5000.0, (2,): 100.0, (3,): 100.04})
+    assert significant(toy, needed=10.0) == named
