@@ -28,7 +28,7 @@ Kind = Literal[
 Doubt = Literal[
     "not_needed", "unsteady", "creeps", "drift", "one_way", "numerics", "at_bound", "calibration",
     "slight", "no_time", "clock", "sensor", "conventions", "cut_off", "extreme", "records",
-    "set_aside", "no_help", "may_be_zero", "share_may_be_zero", "few_blocks", "rivals",
+    "law", "set_aside", "no_help", "may_be_zero", "share_may_be_zero", "few_blocks", "rivals",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.
 WORSE = 1.05

@@ -12,6 +12,8 @@ DOUBTS: dict[Doubt, str] = {
     "drift": "a push that grows steadily along the records, as of a room that warms, would do as "
     "well",
     "one_way": "motion goes one way only, so that a part of it may be a constant load",
+    "law": "it, or a parameter beside it, explains more if it changes with what was measured, so "
+    "that the law may be another one",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps, an input that is held, or a filter in a sensor, of about half a "
@@ -54,6 +56,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "creeps": claim.creeps,
         "drift": claim.drifts,
         "one_way": claim.one_way,
+        "law": claim.other_law,
         "numerics": not claim.sound,
         "at_bound": claim.bounded,
         "calibration": claim.calibration and not claim.slight,

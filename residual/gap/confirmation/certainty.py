@@ -12,6 +12,7 @@ from scipy.stats import t
 from residual.gap.confirmation.claim import Claim, other_than
 from residual.gap.confirmation.constancy import creeps, on_the_way
 from residual.gap.confirmation.drift import Drift
+from residual.gap.confirmation.following import by_another_law
 from residual.gap.confirmation.numerics import STEADY, at_half_step, in_the_limit, survives
 from residual.gap.confirmation.one_way import may_hold_a_load
 from residual.gap.fitting.intervals import bounded, deviations, ended
@@ -61,7 +62,7 @@ def claims(
     fit = search.tried[key]
     half = 1.96 * deviations(fit, search.fitter.blocks)
     limits = in_the_limit(fit.theta, numerics)
-    found, drift = [], Drift(search)
+    found, drift, other_law = [], Drift(search), by_another_law(search, key)
     for place, number in enumerate(key):
         own = [int(j) for j in np.flatnonzero(fit.model.owner == place)]
         label = search.candidates[number].label
@@ -99,6 +100,7 @@ def claims(
                 drifts=not search.candidates[number].effect.creeps
                 and drift.does_as_well(key, number),
                 one_way=may_hold_a_load(search, key, number, half),
+                other_law=number in other_law,
                 extreme=key in search.extreme,
             )
         )

@@ -35,6 +35,7 @@ class Claim:
         creeps: Whether it is a constant that changes along the records, or from one to another.
         drifts: Whether a push that grows steadily along the records would do its work as well.
         one_way: Whether motion goes one way only, so that part of it may be a load.
+        other_law: Whether it, or one beside it, explains more if it changes with the motion.
         sound: Whether it survives other numerics.
         bounded: Whether a number of it lies at its bound.
         share: Part of the nominal squared error that it takes off, with a 95 % interval.
@@ -85,6 +86,7 @@ class Claim:
     creeps: bool = False
     drifts: bool = False
     one_way: bool = False
+    other_law: bool = False
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
 
@@ -118,6 +120,7 @@ class Claim:
             self.creeps,
             self.drifts,
             self.one_way,
+            self.other_law,
         )
         return self.needed and self.gains and self.steady and self.sound and not any(against)
 

@@ -1,0 +1,82 @@
+"""Whether a parameter that follows the motion does the work of what was named beside it.
+
+Where the law itself is another one, as of growth that its own food slows down, two numbers of the
+old law imitate it. One of them that changes with a measured state then explains more than both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.confirmation.constancy import FEW
+from residual.gap.confirmation.drift import beside
+from residual.gap.fitting.screening import beside_starts
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.significance import tie
+from sims.effects.actuator import ActuatorGain
+from sims.effects.parameter import ParameterChange
+
+Array = NDArray[np.float64]
+
+#: Part of the loss that it has to leave at most.
+LESS = 0.95
+#: Quantiles of what was measured between which it changes.
+ENDS = 0.05, 0.95
+
+
+def by_another_law(search: Search, key: Key) -> frozenset[int]:
+    """Members of a set in whose place a parameter or gain beside them leaves clearly less if it
+    changes in proportion to what was measured, and those parameters.
+
+    In the linear picture, so that it is as many numbers for one. What strikes the ground is not
+    asked.
+
+    Args:
+        search: With the set, and what is left of it without each member.
+        key: The set.
+    """
+    found: set[int] = set()
+    if not isinstance(search.fitter, SmoothFitter) or len(search.fitter.blocks) < FEW:
+        return frozenset()
+    for number in key:
+        for other in all_but(key, number):
+            effect = search.candidates[other].effect
+            if not isinstance(effect, ParameterChange | ActuatorGain):
+                continue
+            if not {number, other} <= found and _explains_more(search, key, number, other):
+                found |= {number, other}
+    return frozenset(found)
+
+
+def _explains_more(search: Search, key: Key, number: int, other: int) -> bool:
+    """Whether a set without a member leaves clearly less if another one changes with a level."""
+    fitter, rest = search.fitter, all_but(key, number)
+    assert isinstance(fitter, SmoothFitter)
+    if rest not in search.tried:
+        return False
+    fit, own = search.tried[rest], search.tried[key].merit
+    least = min(LESS * own, own - tie(search, key, rest))
+    candidate = search.candidates[other]
+    return any(
+        beside(
+            fit, [beside_starts(fit, fitter.columns(fit, [candidate], level)[..., :1])], fitter.cap
+        ).loss < least
+        for level in _levels(search)
+    )  # fmt: skip
+
+
+def _levels(search: Search) -> Iterator[Array]:
+    """Every measured state and input, and the sizes of those of both signs, each row between -1/2
+    and 1/2, (n,)."""
+    samples = search.fitter.samples
+    seen = [samples.seen[:, column] for column in samples.measured]
+    for column in (*seen, *samples.actions.T):
+        for values in (column, np.abs(column)) if np.nanmin(column) < 0 else (column,):
+            low, high = np.nanquantile(values, ENDS)
+            if high > low:
+                level = np.clip((values - low) / (high - low), 0.0, 1.0) - 0.5
+                yield np.where(np.isfinite(level), level, 0.0)
