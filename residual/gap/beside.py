@@ -44,14 +44,17 @@ class Conventions:
 
 @dataclasses.dataclass(frozen=True)
 class Changing:
-    """A parameter or a gain whose change along the records would take most of what is left off.
+    """A parameter or a gain whose change along the records, or with a measured channel, would take
+    most of what is left off.
 
     Attributes:
         label: ``name@where``, or the name alone of a parameter.
-        begin, end: Its values where records begin and end.
+        begin, end: Its values where records begin and end, or at both ends of the channel.
         nominal: What it is in the simulator.
         unit: Of these; ``"1"`` for the share of a gain.
         taken: Part of the squared residual that this would take off.
+        over: The channel that it follows, ``|name|`` if that one's size; empty along the records.
+        low, high, over_unit: The ends of that channel.
     """
 
     label: str
@@ -60,6 +63,10 @@ class Changing:
     nominal: float
     unit: str
     taken: float
+    over: str = ""
+    low: float = 0.0
+    high: float = 0.0
+    over_unit: str = ""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,7 +1,8 @@
-"""A parameter, or a gain, that changes along the records about what the simulator takes it for.
+"""A parameter, or a gain, that changes about what the simulator takes it for.
 
-A rope is hauled in, an outlet clogs, a battery sags. No effect of the library depends on time, and
-one whose mean is right does not stand out either: the gap stays, and has no name.
+A rope is hauled in, an outlet clogs, a battery sags; a resistance falls as it warms. No effect of
+the library depends on time, or makes a parameter follow a state, and one whose mean is right does
+not stand out either: the gap stays, and has no name.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ from residual.gap.confirmation.constancy import (
     FEW,
     along_records,
     along_windows,
-    change_over,
+    clear_number,
 )
 from residual.gap.confirmation.drift import Drift, Fall, beside
+from residual.gap.data.levels import Level, levels
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
@@ -41,10 +43,12 @@ CLEARLY = 1.5
 
 
 def changing(answer: Answer) -> Changing | None:
-    """The parameter or gain whose change along the records would take most of what is left off.
+    """The parameter or gain whose change along the records, or with what was measured, would take
+    most of what is left off.
 
     It has to take off half of what it leaves as a constant, more than chance, more than a push that
-    drifts, and clearly more than a change of what is named: of that both ends are told anyway.
+    drifts, and clearly more than a change along the records of what is named: of that both ends are
+    told anyway. With a measured channel that has to be clearly more than along the records.
     """
     found, search, key = answer.found, answer.found.search, answer.key
     fitter, fit = search.fitter, search.tried[answer.key]
@@ -52,32 +56,87 @@ def changing(answer: Answer) -> Changing | None:
         return None
     if fitter.left(fit, found.floor).ratio < NOTABLE:
         return None
-    pool, named = _pool(search, key), search.numbers(key)
-    best: tuple[Fall, Candidate, int | None] | None = None
+    over_time = _best(search, key, [None], named=False)
+    courses = list(levels(search.simulator, fitter.samples))
+    over_level = _best(search, key, courses, named=True)
+    own = [
+        beside(fit, [_own_course(search, fit, j)], fitter.cap).loss
+        for j in range(search.numbers(key))
+    ]
+    least = min([Drift(search).least(key), *(loss / CLEARLY for loss in own)])
+    if over_time is not None and over_time.fall.loss >= least:
+        over_time = None
+    if over_level is not None:
+        told = [over_time.fall.loss] if over_time else []
+        if over_level.fall.loss >= min([least, *(loss / CLEARLY for loss in told)]):
+            over_level = None
+    best = over_level or over_time
+    return best.told(search, fit) if best else None
+
+
+@dataclasses.dataclass(frozen=True)
+class _Course:
+    """A parameter or gain that changes over a course.
+
+    Attributes:
+        one: It.
+        free: Where its number stands in the fit; None if it is not free there.
+        level: What it follows; None along the records.
+        fall: What is left beside it.
+    """
+
+    one: Candidate
+    free: int | None
+    level: Level | None
+    fall: Fall
+
+    def told(self, search: Search, fit: Fit) -> Changing:
+        """Its ends."""
+        (knob,), nominal, unit = self.one.knobs, 0.0, "1"
+        effect, moved, level = self.one.effect, self.fall, self.level
+        if isinstance(effect, ParameterChange):
+            value = search.simulator.parameters[effect.parameter].value
+            nominal, unit = float(value), knob.unit
+        mean = float(moved.numbers[0] if self.free is None else moved.theta[self.free])
+        change = float(moved.numbers[-1])
+        ends = np.clip([mean - change / 2, mean + change / 2], knob.low, knob.high) + nominal
+        taken = 1 - moved.loss / max(fit.merit, 1e-300)
+        told = Changing(self.one.label, float(ends[0]), float(ends[1]), nominal, unit, taken)
+        if level is None:
+            return told
+        return dataclasses.replace(
+            told, over=level.name, low=level.low, high=level.high, over_unit=level.unit
+        )
+
+
+def _best(search: Search, key: Key, courses: Sequence[Level | None], named: bool) -> _Course | None:
+    """What leaves least over one of the courses, of what is clear and leaves half at most.
+
+    Args:
+        courses: Levels, or None for along the records.
+        named: Whether parameters and gains that are named are asked, too.
+    """
+    fitter, fit = search.fitter, search.tried[key]
+    assert isinstance(fitter, SmoothFitter)
+    pool, best = _pool(search, () if named else key), None
     for one in pool:
         free = _place(fit, one)
         constant = [] if free is not None else [_column(fitter, fit, one)]
-        course = _own_course(search, fit, free) if free is not None else _column(
-            fitter, fit, one, along_records(search)
-        )  # fmt: skip
-        fixed, moved = (beside(fit, c, fitter.cap) for c in (constant, [*constant, course]))
-        if moved.loss > HALF * fixed.loss or (best and moved.loss >= best[0].loss):
-            continue
-        if _clear(search, fit, constant, free, CHANCE / len(pool)):
-            best = (moved, one, free)
-    own = [beside(fit, [_own_course(search, fit, j)], fitter.cap).loss for j in range(named)]
-    least = min([Drift(search).least(key), *(loss / CLEARLY for loss in own)])
-    if best is None or best[0].loss >= least:
-        return None
-    moved, one, free = best
-    mean = float(moved.numbers[0] if free is None else moved.theta[free])
-    change = float(moved.numbers[-1])
-    (knob,), nominal, unit = one.knobs, 0.0, "1"
-    if isinstance(one.effect, ParameterChange):
-        nominal, unit = float(search.simulator.parameters[one.effect.parameter].value), knob.unit
-    ends = np.clip([mean - change / 2, mean + change / 2], knob.low, knob.high) + nominal
-    taken = 1 - moved.loss / max(fit.merit, 1e-300)
-    return Changing(one.label, float(ends[0]), float(ends[1]), nominal, unit, taken)
+        fixed = beside(fit, constant, fitter.cap)
+        for level in courses:
+            if level is None and free is not None:
+                course = _own_course(search, fit, free)
+            else:
+                along = along_records(search) if level is None else level.course
+                course = _column(fitter, fit, one, along)
+            moved = beside(fit, [*constant, course], fitter.cap)
+            if moved.loss > HALF * fixed.loss or (best and moved.loss >= best.fall.loss):
+                continue
+            chance = CHANCE / (len(pool) * len(courses))
+            more = np.concatenate([*constant, course], axis=2)
+            if clear_number(fit, fitter.blocks.block, more, chance):
+                best = _Course(one, free, level, moved)
+    return best
 
 
 def _pool(search: Search, key: Key) -> list[Candidate]:
@@ -108,15 +167,3 @@ def _place(fit: Fit, one: Candidate) -> int | None:
     if one.label not in labels:
         return None
     return int(np.flatnonzero(fit.model.owner == labels.index(one.label))[0])
-
-
-def _clear(
-    search: Search, fit: Fit, given: Sequence[Array], free: int | None, chance: float
-) -> bool:
-    """Whether a change along the records is more than chance, by blocks."""
-    if free is None:
-        by_knob = np.concatenate([fit.by_knob, *given], axis=2)
-        free = len(fit.theta)
-        fit = dataclasses.replace(fit, theta=np.append(fit.theta, 0.0), by_knob=by_knob)
-    course = along_windows(search)
-    return change_over(fit, search.fitter.blocks.block, free, course, chance) != 0.0

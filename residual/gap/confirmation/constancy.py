@@ -109,12 +109,20 @@ def _courses(search: Search) -> Iterator[Array]:
 def change_over(fit: Fit, block: NDArray[np.int64], j: int, course: Array, chance: float) -> float:
     """How much a number changes over a course over the windows; 0 if it does not clearly do so, or
     by less than a part of itself.
+    """
+    column = (fit.by_knob[..., j] * course[:, None])[..., None]
+    change = clear_number(fit, block, column, chance)
+    return change if abs(change) > SAME * abs(float(fit.theta[j])) else 0.0
 
-    By one Gauss-Newton step with the course as one more unknown, and the sandwich over blocks
+
+def clear_number(fit: Fit, block: NDArray[np.int64], more: Array, chance: float) -> float:
+    """The number of the last of further columns (W, R, c); 0 if it may be zero.
+
+    By one Gauss-Newton step with them as further unknowns, and the sandwich over blocks
     (White, "Maximum likelihood estimation of misspecified models", Econometrica 50, 1982).
     """
     root = np.sqrt(fit.weights)[:, None]
-    rows = np.concatenate([fit.by_knob, (fit.by_knob[..., j] * course[:, None])[..., None]], axis=2)
+    rows = np.concatenate([fit.by_knob, more], axis=2)
     rows, residual = rows * root[..., None], fit.projected * root
     scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
     rows = rows / scale
@@ -128,7 +136,6 @@ def change_over(fit: Fit, block: NDArray[np.int64], j: int, course: Array, chanc
     meat = scores.T @ scores * count / freedom
     sandwich = float((inverse @ meat @ inverse)[-1, -1])
     plain = float((left**2).sum() / max((left != 0).sum() - len(step), 1) * inverse[-1, -1])
-    change, error = float(step[-1]), np.sqrt(max(sandwich, plain, 0.0))
-    clear = abs(change) > error * t.ppf(1 - chance / 2, freedom)
-    change /= float(scale[-1])
-    return change if clear and abs(change) > SAME * abs(float(fit.theta[j])) else 0.0
+    number, error = float(step[-1]), np.sqrt(max(sandwich, plain, 0.0))
+    clear = abs(number) > error * t.ppf(1 - chance / 2, freedom)
+    return number / float(scale[-1]) if clear else 0.0

@@ -6,13 +6,9 @@ old law imitate it. One of them that changes with a measured state then explains
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import numpy as np
-from numpy.typing import NDArray
-
 from residual.gap.confirmation.constancy import FEW
 from residual.gap.confirmation.drift import beside
+from residual.gap.data.levels import levels
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.search.sets import Key, Search, all_but
@@ -20,12 +16,8 @@ from residual.gap.search.significance import tie
 from sims.effects.actuator import ActuatorGain
 from sims.effects.parameter import ParameterChange
 
-Array = NDArray[np.float64]
-
 #: Part of the loss that it has to leave at most.
 LESS = 0.95
-#: Quantiles of what was measured between which it changes.
-ENDS = 0.05, 0.95
 
 
 def by_another_law(search: Search, key: Key) -> frozenset[int]:
@@ -63,20 +55,8 @@ def _explains_more(search: Search, key: Key, number: int, other: int) -> bool:
     candidate = search.candidates[other]
     return any(
         beside(
-            fit, [beside_starts(fit, fitter.columns(fit, [candidate], level)[..., :1])], fitter.cap
+            fit, [beside_starts(fit, fitter.columns(fit, [candidate], level.course)[..., :1])],
+            fitter.cap,
         ).loss < least
-        for level in _levels(search)
+        for level in levels(search.simulator, fitter.samples)
     )  # fmt: skip
-
-
-def _levels(search: Search) -> Iterator[Array]:
-    """Every measured state and input, and the sizes of those of both signs, each row between -1/2
-    and 1/2, (n,)."""
-    samples = search.fitter.samples
-    seen = [samples.seen[:, column] for column in samples.measured]
-    for column in (*seen, *samples.actions.T):
-        for values in (column, np.abs(column)) if np.nanmin(column) < 0 else (column,):
-            low, high = np.nanquantile(values, ENDS)
-            if high > low:
-                level = np.clip((values - low) / (high - low), 0.0, 1.0) - 0.5
-                yield np.where(np.isfinite(level), level, 0.0)
