@@ -24,7 +24,7 @@ def class_of_word(word: str) -> dict[str, str]:
 
 
 def unfinished(words: Sequence[str], contents: Iterable[Any]) -> str:
-    """What a class that words or settings name does not define yet, as an end of a line."""
+    """What a class that words or settings name does not define yet, as a line."""
     named: list[Any] = [path for i in range(len(words)) for path in _chosen(words, i).values()]
     for content in contents:
         if isinstance(content, Mapping):
@@ -34,7 +34,8 @@ def unfinished(words: Sequence[str], contents: Iterable[Any]) -> str:
         module, _, name = str(path).rpartition(".")
         kind = getattr(sys.modules.get(module), name, None)
         if missing := getattr(kind, "__abstractmethods__", None):
-            return f": {name} does not define {', '.join(sorted(missing))}"
+            lacking = " and ".join(sorted(missing))
+            return f"{path}: {name} does not define {lacking}, which what it derives from asks for"
     return ""
 
 
