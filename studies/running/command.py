@@ -154,7 +154,6 @@ class Parser(jsonargparse.ArgumentParser):
         reason = unknown or re.sub(r"\s*\n\s*-?\s*", " ", str(message).strip())
         if ex is None:  # of the words that were given, not of what one of them means
             reason += self._likely(message)
-        # Whatever else was said, a class that is not all there is why.
         reason = unfinished(self._words, (inside for _, inside in _READ.values())) or reason
         sys.stderr.write(f"error: {reason} (see --help)\n")
         raise SystemExit(2)
