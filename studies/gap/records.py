@@ -28,7 +28,8 @@ def beside_lead(result: GapResult) -> str:
     along them."""
     if not result.unlike:
         much = any(v.kind == "unexplained" and v.share.value >= FOOTNOTE for v in result.verdicts)
-        if not result.changing or not much:
+        law = any("law" in verdict.doubts for verdict in result.verdicts)
+        if not result.changing or not (much or law):
             return ""
         begin, end, _ = _values(result.changing)
         name = effect_name(result.changing.label)

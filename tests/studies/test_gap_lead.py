@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 from told import DELAY, FRICTION, MASS, NO_GAP, rest, result
 
-from residual.gap.beside import Conventions
+from residual.gap.beside import Changing, Conventions
 from residual.gap.result import (
     ChannelGap,
     Span,
@@ -35,6 +35,16 @@ def test_what_the_log_may_count_otherwise_comes_first():
     assert "with `scale: -1` for voltage or `unit: mV` for voltage in the column map" in first
     assert first.endswith("errs 19 times less.")
     assert rest == lead(result(MASS))
+
+
+def test_a_law_that_may_be_another_one_leads_to_what_changes():
+    """However little is left beside numbers that imitate it."""
+    warm = Changing("damping", 2e-3, 1e-3, 1.5e-3, "N m s/rad", 0.8, "rate", -5.0, 5.0, "rad/s")
+    doubted = dataclasses.replace(MASS, kind="ambiguous", doubts=("law",))
+    for verdict, told in ((doubted, True), (MASS, False)):
+        says = lead(dataclasses.replace(result(verdict, rest(0.01)), changing=warm))
+        assert says.endswith(" from about 2 mN m s/rad to 1 mN m s/rad.") == told
+        assert ("The rest looks like damping that changes with rate," in says) == told
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ DOUBTS: dict[Doubt, str] = {
     "drift": "a push that grows steadily along the records, as of a room that warms, would do as "
     "well",
     "one_way": "motion goes one way only, so that a part of it may be a constant load",
-    "law": "it, or a parameter beside it, explains more if it changes with what was measured, so "
-    "that the law may be another one",
+    "law": "the law may be another one: a parameter that changes with what was measured explains "
+    "more",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
     "clock": "late time stamps, an input that is held, or a filter in a sensor, of about half a "

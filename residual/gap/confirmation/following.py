@@ -14,6 +14,7 @@ from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.search.sets import Key, Search, all_but
 from residual.gap.search.significance import tie
 from sims.effects.actuator import ActuatorGain
+from sims.effects.curve import Curve
 from sims.effects.parameter import ParameterChange
 
 #: Part of the loss that it has to leave at most.
@@ -22,7 +23,7 @@ LESS = 0.95
 
 def by_another_law(search: Search, key: Key) -> frozenset[int]:
     """Members of a set in whose place a parameter or gain beside them leaves clearly less if it
-    changes in proportion to what was measured, and those parameters.
+    changes in proportion to what was measured, those parameters, and curves beside them.
 
     In the linear picture, so that it is as many numbers for one. What strikes the ground is not
     asked.
@@ -41,7 +42,9 @@ def by_another_law(search: Search, key: Key) -> frozenset[int]:
                 continue
             if not {number, other} <= found and _explains_more(search, key, number, other):
                 found |= {number, other}
-    return frozenset(found)
+    # A curve follows whatever a law that is not the true one leaves.
+    curves = {n for n in key if isinstance(search.candidates[n].effect, Curve)}
+    return frozenset(found | curves if found else found)
 
 
 def _explains_more(search: Search, key: Key, number: int, other: int) -> bool:
