@@ -49,7 +49,7 @@ def test_thousands_of_them(area, folder):
     try_all(area, LONG[area], folder)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=100, suppress_health_check=list(HealthCheck))
 @given(text=st.text(max_size=200), header=st.booleans())
 def test_any_text_at_all_is_a_log_or_an_error_of_one_line(text, header, folder):
     path = folder / "any.csv"

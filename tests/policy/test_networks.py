@@ -51,7 +51,7 @@ def assert_gradient(network: FlatNetwork, weights: list[torch.Tensor]) -> None:
         np.testing.assert_allclose(ours, theirs.grad, rtol=1e-4, atol=1e-4)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(sizes, st.sampled_from([0.0, 0.3]))
 def test_actor_matches_autograd(size, penalty):
     n_o, n_a, hidden, batch, seed = size
@@ -74,7 +74,7 @@ def test_actor_matches_autograd(size, penalty):
 
 
 @pytest.mark.parametrize("action_layer", [1, 2])
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(size=sizes)
 def test_critic_matches_autograd(action_layer, size):
     n_o, n_a, hidden, batch, seed = size

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from policy.replay import Replay
@@ -12,7 +12,6 @@ def fill(replay, count, start=0):
         replay.add(np.full(2, k), [k], k, np.full(2, k + 0.5), k % 3 == 0)
 
 
-@settings(deadline=None)
 @given(st.integers(1, 30), st.integers(1, 100))
 def test_the_last_transitions_are_kept_whole(capacity, count):
     replay = Replay(capacity, 2, 1)

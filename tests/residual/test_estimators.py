@@ -109,7 +109,7 @@ def test_same_seed_same_bits_whatever_the_global_generators_hold(estimator):
 
 
 @pytest.mark.parametrize("estimator", small(), ids=lambda e: type(e).__name__)
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=3)
 @given(
     scale=st.floats(1e-3, 1e3), shift=st.floats(-1e2, 1e2), unit=st.sampled_from([1e-3, 1.0, 1e4])
 )

@@ -173,9 +173,7 @@ def test_another_safetensors_file_is_refused(tmp_path):
         load(tmp_path / "other")
 
 
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(cut=st.floats(0, 0.999), flip=st.integers(0, 10**6), how=st.sampled_from(["cut", "flip"]))
 def test_a_damaged_file_never_raises_anything_but_a_value_error(cut, flip, how, tmp_path):
     path = tmp_path / "model"

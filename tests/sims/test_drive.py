@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sims.effects import (
@@ -30,7 +30,6 @@ def test_without_effects_every_sub_step_has_the_command():
     assert np.array_equal(found, np.repeat([[1.0], [-2.0], [3.0]], 4, axis=1))
 
 
-@settings(deadline=None)
 @given(st.floats(0.0, 0.12))
 def test_a_delayed_step_keeps_its_exact_mean_in_every_sub_step(delay):
     found = drive([Delay("voltage", delay)], [0.0, 0.0, 3.0, 3.0, 3.0, 3.0], substeps=5).ravel()

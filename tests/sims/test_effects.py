@@ -238,7 +238,7 @@ def test_values_by_row_equal_a_loop_over_scalars(host, effect):
 
 
 @host
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(
     st.lists(
         st.tuples(st.floats(-9, 9), st.sampled_from([0.0, 0.1, -3.0, 11.0]), st.floats(-3, 3)),

@@ -162,7 +162,7 @@ def test_squats_for_twenty_seconds_give_the_return_of_the_reference():
 # -- purity -----------------------------------------------------------------------------------
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(
     st.lists(st.lists(st.floats(-1, 1), min_size=24, max_size=24), min_size=2, max_size=5),
     st.randoms(use_true_random=False),

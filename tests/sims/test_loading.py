@@ -54,7 +54,7 @@ def test_every_effect_comes_back_bit_for_bit(effect, tmp_path):
     np.testing.assert_array_equal(loaded.step(states, voltages), wanted.step(states, voltages))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(value=st.floats(-0.05, 1.0, allow_subnormal=False))
 def test_no_digit_is_lost(value):
     wanted = [ParameterChange("mass", value), Delay("voltage", abs(value)), Saturation("voltage")]

@@ -86,7 +86,7 @@ def test_twenty_seconds_open_loop(voltage):
         assert abs(path[k + 1, 0] - state[0, 0]) < 1e-4
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     st.lists(
         st.tuples(st.floats(-50, 50), st.floats(-60, 60), st.floats(-4, 4)),

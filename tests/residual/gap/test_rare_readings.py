@@ -36,7 +36,7 @@ def log(effects=(), every=(1, 1), seconds=20.0, seed=0):
 
 
 @given(stride=st.sampled_from([2, 4, 8]), every=st.integers(1, 9), seed=st.integers(0, 1000))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_inputs_between_rows_keep_their_integral_wherever_the_readings_are(stride, every, seed):
     rng = np.random.default_rng(seed)
     times = np.arange(65.0)

@@ -66,7 +66,7 @@ def ready(breakaway: float, seed: int) -> tuple[Prepared, Model]:
 
 
 @given(rest=st.integers(0, 900), seed=st.integers(0, 9))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_rest_does_not_make_motion_small(rest, seed):
     moving = np.random.default_rng(seed).standard_normal((100, 2))
     states = np.vstack([moving, np.zeros((rest, 2))])
@@ -113,7 +113,7 @@ def test_friction_that_slopes_miss_is_found(breakaway, seed):
     sliding=st.floats(1e-3, 0.1), times=st.floats(1.01, 4.0),
     speed=st.floats(0.1, 50), gain=st.floats(-0.5, 2.0),
 )  # fmt: skip
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_friction_is_sought_where_it_breaks_away_harder_than_it_slides(sliding, times, speed, gain):
     servo = Servo()
     samples = Samples.join([hunting()], 20)

@@ -13,7 +13,7 @@ from residual.logs.faults import grain, rounding
     step=st.sampled_from([1.0, 0.15, 2.5e-5, 2 * np.pi / 2400]),
     zero=st.sampled_from([0.0, 0.3]),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_all_values_are_whole_steps_apart(counts, step, zero):
     found = grain([zero + step * np.array(counts, float)])
     whole = np.gcd.reduce(np.diff(np.sort(counts)))
@@ -30,7 +30,7 @@ def test_an_encoder_that_was_never_read_one_step_apart():
 
 
 @given(seed=st.integers(0, 1000), size=st.integers(8, 400))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_readings_that_were_not_rounded_have_none(seed, size):
     assert grain([np.random.default_rng(seed).standard_normal(size)]) == 0
 

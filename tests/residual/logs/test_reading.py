@@ -26,7 +26,7 @@ def test_every_format_is_read_exactly(tmp_path, suffix):
     assert kinds(data) == ["sampling"]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     unit=st.sampled_from(["deg", "mrad", "rev", "°"]),
     rate_unit=st.sampled_from(["deg/s", "rpm", "rev/s"]),

@@ -48,7 +48,7 @@ def test_a_step_is_mujocos_own(name):
         assert np.allclose(after, np.concatenate([data.qpos, data.qvel]), rtol=1e-9, atol=1e-10)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.sampled_from(NAMES), st.data())
 def test_rows_with_their_own_attributes_do_not_see_each_other(name, data):
     simulator = ROBOTS[name]

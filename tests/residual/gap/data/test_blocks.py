@@ -37,7 +37,7 @@ def means(hard, found):
 
 
 @given(st.integers(0, 500))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_every_fold_has_its_share_of_slow_and_fast_blocks(seed):
     _, hard, found = dealt(table(seed))
     ranked = found.fold[np.argsort(means(hard, found), kind="stable")]
@@ -51,7 +51,7 @@ def test_every_fold_has_its_share_of_slow_and_fast_blocks(seed):
 
 
 @given(st.integers(0, 100), st.permutations(range(4)))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_order_and_the_names_of_files_do_not_matter(seed, order):
     runs = table(seed)
     other = [Trajectory(f"file {i}", runs[i].times, runs[i].states, runs[i].actions) for i in order]

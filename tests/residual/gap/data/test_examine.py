@@ -76,7 +76,7 @@ def test_a_sensor_that_is_late_beside_the_other_is_told(angle, rate, who, noise)
 @given(
     late=st.floats(0, 0.2), noise=st.sampled_from([1e-4, 3e-3, 1e-2, 3e-2]), seed=st.integers(0, 99)
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_sensors_that_are_equally_late_are_not_told_apart(late, noise, seed):
     assert kinematics(PendulumEquation(), two_sensors(late, late, noise, seed))[1] == []
 
@@ -181,7 +181,7 @@ def test_a_second_between_samples_is_told():
 
 
 @given(step=st.floats(0.01, 0.2))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_rounded_columns_are_told_with_their_step(step):
     run = noisy(dt=0.01)
     bad = changed(run, 0, slice(None), step * np.round(run.states[:, 0] / step))

@@ -27,7 +27,7 @@ def integrals(driven, durations, edges):
 
 
 @given(st.integers(0, 10_000), st.sampled_from([1, 2, 4]), st.floats(0.0, 3.0))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_integral_and_first_moment_stay(seed, count, unlike):
     rng = np.random.default_rng(seed)
     driven, durations = rng.standard_normal((8, 2)), np.exp(unlike * rng.standard_normal(8))

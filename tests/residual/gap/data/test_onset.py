@@ -45,7 +45,7 @@ def test_a_drive_that_comes_on_late_in_one_record(off, place):
 
 
 @given(waits=st.integers(0, 25), counts=st.permutations([100, -150, 200, 60]))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_delay_that_all_records_have_is_no_late_drive(waits, counts):
     runs = [step(f"run {i}", count, waits) for i, count in enumerate(counts)]
     assert left_out(Slide(), runs) == ([0] * 4, [])

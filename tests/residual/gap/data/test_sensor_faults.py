@@ -16,7 +16,7 @@ from sims.pendulum_equation import PendulumEquation
 
 
 @given(row=st.integers(3, 395), size=st.sampled_from([-1.0, 1.0]), column=st.integers(0, 1))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_wild_sample_is_taken_out_and_told(row, size, column):
     run = noisy()
     size *= (4.0, 12.0)[column]
@@ -31,7 +31,7 @@ def test_a_wild_sample_is_taken_out_and_told(row, size, column):
 
 
 @given(row=st.integers(5, 390), size=st.sampled_from([-1.0, 1.0]))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_spike_on_a_smooth_path_is_wild_even_if_motion_is_faster_elsewhere(row, size):
     """1 rad is less than eight times what the rate of a spin moves an angle in a sample."""
     run = noisy()
@@ -44,7 +44,7 @@ def test_a_spike_on_a_smooth_path_is_wild_even_if_motion_is_faster_elsewhere(row
 
 
 @given(speed=st.floats(0.02, 2.0), row=st.integers(20, 380))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_bounce_between_two_samples_is_no_wild_sample(speed, row):
     """It comes back, but as fast as it went."""
     path = speed * np.abs(np.arange(400.0) - row) + 1e-3 * np.random.default_rng(0).normal(size=400)
@@ -52,7 +52,7 @@ def test_a_bounce_between_two_samples_is_no_wild_sample(speed, row):
 
 
 @given(row=st.integers(3, 380), count=st.integers(1, 9))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_zeros_amid_motion_are_drop_outs(row, count):
     rows = slice(row, row + count)
     bad = changed(noisy(), 0, rows, 0.0)
@@ -63,7 +63,7 @@ def test_zeros_amid_motion_are_drop_outs(row, count):
 
 
 @given(seed=st.integers(0, 50))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_many_zeros_are_drop_outs_too(seed):
     """As of a camera that loses a ball on a fifth of its pictures."""
     rng = np.random.default_rng(seed)
@@ -107,7 +107,7 @@ def turning():
 
 
 @given(row=st.integers(10, 300), count=st.integers(40, 60))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_frozen_encoder_is_told_when_it_thaws(row, count):
     run = turning()
     rows = slice(row, row + count)
@@ -142,7 +142,7 @@ def test_a_sensor_at_the_end_of_its_range_is_told():
 
 
 @given(step=st.floats(0.001, 0.3), phase=st.floats(0, 6))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_rounded_swing_is_not_taken_for_a_clipped_one(step, phase):
     times = 0.01 * np.arange(1000)
     angle = np.pi + step * np.round(np.sin(2 * times + phase) / step)
@@ -161,7 +161,7 @@ def test_rest_is_no_frozen_sensor():
 
 
 @given(st.floats(70, 130), st.floats(60, 150), st.integers(0, 1000))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_a_servo_that_sticks_has_no_broken_encoder(breakaway, gain, seed):
     angle, volts = sticking(breakaway, gain, seed)
     states = np.stack([angle, np.full(len(angle), np.nan)], axis=1)
@@ -191,7 +191,7 @@ def test_where_readings_scatter_equal_ones_are_frozen(row, seed):
     noise=st.floats(0.1, 4.0), seed=st.integers(0, 100), row=st.integers(100, 270),
     level=st.floats(0.0, 1.0),
 )  # fmt: skip
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_rounded_readings_that_scatter_are_frozen_only_if_chance_cannot_make_them_equal(
     noise, seed, row, level
 ):

@@ -37,7 +37,7 @@ def said(run, kind):
 
 
 @given(seed=st.integers(0, 50), factor=st.floats(0.1, 3.0))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_sizes_of_about_what_is_declared_raise_no_question(seed, factor):
     run = turning(seed)
     run = dataclasses.replace(run, states=factor * run.states, actions=0.4 * factor * run.actions)

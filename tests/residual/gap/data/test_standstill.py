@@ -18,14 +18,14 @@ def swings(size, period):
     return size * np.sin(2 * np.pi * TIMES / period)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(1e-4, 1e4), st.floats(0.2, 8.0), st.floats(0.0, 0.01))
 def test_swinging_is_no_standstill_in_any_unit(size, period, noise):
     rough = noise * size * np.random.default_rng(0).standard_normal(len(TIMES))
     assert not stands_still([swings(size, period) + rough])
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(1e-4, 1e4), st.floats(0.2, 8.0), st.floats(0.3, 0.9))
 def test_stopping_for_a_while_is(size, period, part):
     moving = (TIMES / period) % 1 > part

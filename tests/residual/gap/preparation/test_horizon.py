@@ -59,7 +59,7 @@ def test_a_length_beyond_the_record_is_what_it_holds_and_one_block_is_never_no_g
 
 
 @given(st.floats(0.8, 10))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_third_of_the_period(period):
     found = usual_horizon(PendulumEquation(), [swing(period, 8 * period)])
     assert found == pytest.approx(period / 3, rel=0.1)
@@ -88,7 +88,7 @@ def test_how_often_and_in_which_order_it_was_recorded_does_not_matter():
 
 
 @given(st.integers(3, 15), st.integers(10, 25))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_samples_in_bursts_do_not_pass_for_fast_motion(burst, pause):
     run = swing(2.0, step=0.005)
     rows = np.arange(len(run.times))

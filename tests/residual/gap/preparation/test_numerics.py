@@ -36,7 +36,7 @@ def record(rows, step=0.01, seed=0):
 
 
 @given(st.sampled_from([2, 4, 8]), st.sampled_from([1, 2, 8, 16]), st.integers(0, 1000))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_merged_inputs_keep_their_integral_and_first_moment(stride, substeps, seed):
     run = record(64)
     samples = Samples.join([run], substeps, stride)
@@ -64,7 +64,7 @@ def test_merged_inputs_keep_their_integral_and_first_moment(stride, substeps, se
 
 
 @given(st.floats(1e-3, 0.1), st.floats(0.01, 20))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_horizon_keeps_rows_enough_after_thinning(step, horizon):
     stride = stride_for([record(10, step)], horizon)
     assert np.log2(stride) == int(np.log2(stride))

@@ -153,7 +153,7 @@ def test_what_takes_more_than_a_fifth_is_not_said_to_take_little():
 
 
 @given(st.lists(st.floats(0.02, 1.2), min_size=6, max_size=6), st.integers(0, 3))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_what_is_chosen_is_never_worse_than_the_nominal(errors, seed):
     keys = [(0,), (1,), (3,), (0, 1), (0, 3), (0, 1, 3)]
     toy = Toy(dict(zip(keys, errors, strict=True)), scatter=0.1 * seed)
