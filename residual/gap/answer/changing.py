@@ -58,7 +58,7 @@ def changing(answer: Answer) -> Changing | None:
         return None
     over_time = _best(search, key, [None], named=False)
     courses = list(levels(search.simulator, fitter.samples))
-    over_level = _best(search, key, courses, named=True)
+    over_level = _best(search, key, courses, named=True) if courses else None
     own = [
         beside(fit, [_own_course(search, fit, j)], fitter.cap).loss
         for j in range(search.numbers(key))
@@ -119,21 +119,20 @@ def _best(search: Search, key: Key, courses: Sequence[Level | None], named: bool
     fitter, fit = search.fitter, search.tried[key]
     assert isinstance(fitter, SmoothFitter)
     pool, best = _pool(search, () if named else key), None
+    along = [along_records(search) if one is None else one.course for one in courses]
     for one in pool:
         free = _place(fit, one)
-        constant = [] if free is not None else [_column(fitter, fit, one)]
-        fixed = beside(fit, constant, fitter.cap)
-        for level in courses:
+        constant, *moved_by = _columns(fitter, fit, one, [np.ones_like(along[0]), *along])
+        given = [] if free is not None else [constant]
+        fixed = beside(fit, given, fitter.cap)
+        for level, course in zip(courses, moved_by, strict=True):
             if level is None and free is not None:
                 course = _own_course(search, fit, free)
-            else:
-                along = along_records(search) if level is None else level.course
-                course = _column(fitter, fit, one, along)
-            moved = beside(fit, [*constant, course], fitter.cap)
+            moved = beside(fit, [*given, course], fitter.cap)
             if moved.loss > HALF * fixed.loss or (best and moved.loss >= best.fall.loss):
                 continue
             chance = CHANCE / (len(pool) * len(courses))
-            more = np.concatenate([*constant, course], axis=2)
+            more = np.concatenate([*given, course], axis=2)
             if clear_number(fit, fitter.blocks.block, more, chance):
                 best = _Course(one, free, level, moved)
     return best
@@ -150,10 +149,13 @@ def _pool(search: Search, key: Key) -> list[Candidate]:
     return candidates(search.simulator, effects, search.fitter.samples)
 
 
-def _column(fitter: SmoothFitter, fit: Fit, one: Candidate, share: Array | None = None) -> Array:
-    """What a candidate does to every window by unit of its number, (W, R, 1)."""
+def _columns(
+    fitter: SmoothFitter, fit: Fit, one: Candidate, shares: Sequence[Array]
+) -> list[Array]:
+    """What a candidate does to every window by unit of its number over each course, (W, R, 1)."""
     size = float(one.trials[0].values[0, 0])
-    return beside_starts(fit, fitter.columns(fit, [one], share)[..., :1]) / size
+    moved = beside_starts(fit, fitter.columns(fit, [one], np.stack(shares))) / size
+    return [moved[..., [k]] for k in range(len(shares))]
 
 
 def _own_course(search: Search, fit: Fit, j: int) -> Array:

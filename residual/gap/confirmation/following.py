@@ -6,6 +6,8 @@ old law imitate it. One of them that changes with a measured state then explains
 
 from __future__ import annotations
 
+import numpy as np
+
 from residual.gap.confirmation.constancy import FEW
 from residual.gap.confirmation.drift import beside
 from residual.gap.data.levels import levels
@@ -51,15 +53,10 @@ def _explains_more(search: Search, key: Key, number: int, other: int) -> bool:
     """Whether a set without a member leaves clearly less if another one changes with a level."""
     fitter, rest = search.fitter, all_but(key, number)
     assert isinstance(fitter, SmoothFitter)
-    if rest not in search.tried:
+    found = [level.course for level in levels(search.simulator, fitter.samples)]
+    if rest not in search.tried or not found:
         return False
     fit, own = search.tried[rest], search.tried[key].merit
     least = min(LESS * own, own - tie(search, key, rest))
-    candidate = search.candidates[other]
-    return any(
-        beside(
-            fit, [beside_starts(fit, fitter.columns(fit, [candidate], level.course)[..., :1])],
-            fitter.cap,
-        ).loss < least
-        for level in levels(search.simulator, fitter.samples)
-    )  # fmt: skip
+    moved = beside_starts(fit, fitter.columns(fit, [search.candidates[other]], np.stack(found)))
+    return any(beside(fit, [moved[..., [k]]], fitter.cap).loss < least for k in range(len(found)))

@@ -77,10 +77,10 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
             return number, f"{channel.name} would have {left / usual:.2g} of its strength"
         if turned_round(host.effects, channel.name):
             return number, f"{channel.name} would act the other way"
-        curve = _turned_by_a_curve(host.effects, channel.name, samples.actions[:, j])
+        found = host.effects[len(model.simulator.effects) :]
+        curve = _turned_by_a_curve(found, channel.name, samples.actions[:, j])
         if curve is not None:
-            number = curve - len(model.simulator.effects)
-            return number, f"{channel.name} would act the other way in a part of its range"
+            return curve, f"{channel.name} would act the other way in a part of its range"
     return len(model.chosen), ""
 
 

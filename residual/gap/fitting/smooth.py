@@ -135,7 +135,8 @@ class SmoothFitter:
 
         A candidate acts for one sample interval from every row, and the change it makes is
         carried linearly along the window: one batch serves all windows, and none runs away.
-        ``share`` is how much it acts from each row, (n,); fully by default.
+        ``share`` is how much it acts from each row, (n,), fully by default; or several of them,
+        (k, n), for each of which the first trial alone has a column.
         """
         if not candidates:
             return np.zeros((*fit.projected.shape, 0))
@@ -163,11 +164,15 @@ class SmoothFitter:
                 moved.append(after.transpose(1, 2, 0))
                 shown.append(still)
         start, acts = np.zeros((width, 0)), np.concatenate(moved, axis=2)
-        acts = acts if share is None else acts * share[:, None, None]
+        seen = np.concatenate(shown, axis=2)
+        if share is not None and share.ndim == 2:
+            acts, seen = (some[..., :1] * share.T[:, None, :] for some in (acts, seen))
+        elif share is not None:
+            acts = acts * share[:, None, None]
         response = carry(windows, inner.slope.by_state, start, acts)
         columns = observe(samples, windows, inner.slope, response, self.sigma)
         measured = samples.measured
-        direct = np.concatenate(shown, axis=2)[:, measured][windows.index] / self.sigma[:, None]
+        direct = seen[:, measured][windows.index] / self.sigma[:, None]
         columns = columns + direct * self.valid[..., None]
         return columns.reshape(len(windows), -1, columns.shape[-1])
 
