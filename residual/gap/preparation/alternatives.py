@@ -47,10 +47,12 @@ class Convention:
 
     @property
     def turned(self) -> bool:
-        """Whether nothing but the zero of an angle is another one."""
-        factors, offsets = np.hstack([self.states, self.inputs])
-        quarters = np.isin(np.abs(self.states[1]), np.abs(QUARTERS[1:]))
-        return bool((factors == 1).all() and quarters.sum() == 1 == np.count_nonzero(offsets))
+        """Whether nothing but the zero of an angle is another one, and perhaps its direction."""
+        (factors, offsets), (gains, biases) = self.states, self.inputs
+        quarters = np.isin(np.abs(offsets), np.abs(QUARTERS[1:]))
+        alike = (np.abs(factors) == 1).all() and (gains == 1).all()
+        places = np.count_nonzero(offsets) + np.count_nonzero(biases)
+        return bool(alike and quarters.sum() == 1 == places)
 
     @property
     def exchanged(self) -> bool:

@@ -32,6 +32,7 @@ from residual.gap.preparation.alternatives import (
 )
 from residual.logs.units import other_units
 from sims.effects.base import Effect
+from sims.effects.sensor import SensorOffset
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -110,7 +111,7 @@ def still_open(conventions: Conventions, adequate: bool, found: Sequence[Effect]
         found: Its effects.
     """
     zero = conventions.reason == "zero"
-    return not (zero and adequate) or any(effect.enters == "sensor" for effect in found)
+    return not (zero and adequate) or any(isinstance(e, SensorOffset) for e in found)
 
 
 def other_sign(simulator: HostSimulator, found: Sequence[Effect]) -> Conventions | None:

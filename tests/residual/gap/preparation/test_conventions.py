@@ -12,6 +12,7 @@ import pytest
 from residual.gap import find_gap
 from residual.gap.beside import Conventions
 from residual.gap.data.samples import Samples
+from residual.gap.preparation.alternatives import conventions
 from residual.gap.preparation.conventions import beyond_scale, otherwise, still_open
 from residual.gap.preparation.prepare import prepare
 from residual.logs import read_logs
@@ -22,6 +23,7 @@ from sims.effects import (
     LinearSpring,
     ParameterChange,
     SensorOffset,
+    SensorScale,
 )
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
@@ -308,10 +310,16 @@ def test_what_is_explained_does_not_hang_by_a_zero():
     run = log()
     turned = dataclasses.replace(run, states=run.states + np.array([np.pi, 0.0]))
     simulator = PendulumEquation(dt=0.02)
-    told = otherwise(simulator, prepare(simulator, [turned], 0.5).fitter)
+    fitter = prepare(simulator, [turned], 0.5).fitter
+    told, samples = otherwise(simulator, fitter), fitter.samples
     assert told is not None and told.reason == "zero"
     friction, offset = CoulombFriction("pivot", 0.01), SensorOffset("angle", np.pi)
     assert still_open(told, False, [friction]) and still_open(told, True, [offset])
-    assert not still_open(told, True, [friction])
+    assert not still_open(told, True, [friction, SensorScale("angle", 0.01)])
+    # With its direction it is a zero, too; a direction alone is none.
+    kinds = {one.says: one.turned for one in conventions(simulator, samples, ())}
+    zeros = {says for says, turned in kinds.items() if turned}
+    assert "`offset: 3.14159` and `scale: -1` for angle and rate" in zeros
+    assert "`scale: -1` for angle and rate" not in zeros and "`scale: -1` for voltage" not in zeros
     # A unit that is wrong is made up for by a gain, down to the noise.
     assert still_open(Conventions(("`unit: mV` for voltage",), 9.0), True, [friction])
