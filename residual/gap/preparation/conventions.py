@@ -54,6 +54,8 @@ HIDDEN, CLEARLY = 0.1, 4.0
 #: Times the declared scale of an input from which on it is asked whether it is in another unit, and
 #: how near to that scale it has to be then; what is declared if nothing is.
 BEYOND, NEAR, UNDECLARED = 100.0, 10.0, 1.0
+#: Offset of an angle from which on another quarter turn is nearer than its zero.
+NEXT = np.pi / 4
 #: Windows that are looked at: all rows at once, and row by row.
 AT_ONCE, BY_ROW = 120, 20
 #: Error of a window in those units beyond which it is just wrong.
@@ -111,7 +113,8 @@ def still_open(conventions: Conventions, adequate: bool, found: Sequence[Effect]
         found: Its effects.
     """
     zero = conventions.reason == "zero"
-    return not (zero and adequate) or any(isinstance(e, SensorOffset) for e in found)
+    zeros = [float(np.max(np.abs(e.offset))) for e in found if isinstance(e, SensorOffset)]
+    return not (zero and adequate) or max(zeros, default=0.0) > NEXT
 
 
 def other_sign(simulator: HostSimulator, found: Sequence[Effect]) -> Conventions | None:

@@ -316,6 +316,7 @@ def test_what_is_explained_does_not_hang_by_a_zero():
     friction, offset = CoulombFriction("pivot", 0.01), SensorOffset("angle", np.pi)
     assert still_open(told, False, [friction]) and still_open(told, True, [offset])
     assert not still_open(told, True, [friction, SensorScale("angle", 0.01)])
+    assert not still_open(told, True, [SensorOffset("angle", 0.01)])
     # With its direction it is a zero, too; a direction alone is none.
     kinds = {one.says: one.turned for one in conventions(simulator, samples, ())}
     zeros = {says for says, turned in kinds.items() if turned}
