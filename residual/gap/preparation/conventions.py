@@ -96,8 +96,7 @@ def otherwise(
     if further is not None and BETTER * least > _error(simulator, fitter, further):
         return None
     alike = plainest([one for error, one in errors if error < ALIKE * least])
-    zero = all(one.turned for one in alike)
-    reason: Literal["zero", "forecasts"] = "zero" if zero else "forecasts"
+    reason: Literal["zero", "forecasts"] = "zero" if best.turned else "forecasts"
     return Conventions(tuple(one.says for one in alike), own / least, reason)
 
 
