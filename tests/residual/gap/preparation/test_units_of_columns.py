@@ -1,4 +1,4 @@
-"""Columns of a room that a log has otherwise than said: kelvin, thousandths, a relay upside down."""
+"""Columns of a room that a log has otherwise: kelvin, Fahrenheit, thousandths, upside down."""
 
 from __future__ import annotations
 
