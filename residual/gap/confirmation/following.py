@@ -7,6 +7,7 @@ old law imitate it. One of them that changes with a measured state then explains
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from residual.gap.confirmation.constancy import FEW
 from residual.gap.confirmation.drift import beside
@@ -18,6 +19,8 @@ from residual.gap.search.significance import tie
 from sims.effects.actuator import ActuatorGain
 from sims.effects.curve import Curve
 from sims.effects.parameter import ParameterChange
+
+Array = NDArray[np.float64]
 
 #: Part of the loss that it has to leave at most.
 LESS = 0.95
@@ -37,26 +40,29 @@ def by_another_law(search: Search, key: Key) -> frozenset[int]:
     found: set[int] = set()
     if not isinstance(search.fitter, SmoothFitter) or len(search.fitter.blocks) < FEW:
         return frozenset()
-    for number in key:
+    courses = [level.course for level in levels(search.simulator, search.fitter.samples)]
+    for number in key if courses else ():
         for other in all_but(key, number):
             effect = search.candidates[other].effect
             if not isinstance(effect, ParameterChange | ActuatorGain):
                 continue
-            if not {number, other} <= found and _explains_more(search, key, number, other):
+            if {number, other} <= found:
+                continue
+            if _explains_more(search, key, number, other, np.stack(courses)):
                 found |= {number, other}
     # A curve follows whatever a law that is not the true one leaves.
     curves = {n for n in key if isinstance(search.candidates[n].effect, Curve)}
     return frozenset(found | curves if found else found)
 
 
-def _explains_more(search: Search, key: Key, number: int, other: int) -> bool:
-    """Whether a set without a member leaves clearly less if another one changes with a level."""
+def _explains_more(search: Search, key: Key, number: int, other: int, courses: Array) -> bool:
+    """Whether a set without a member leaves clearly less if another one changes over one of the
+    courses, (k, n)."""
     fitter, rest = search.fitter, all_but(key, number)
     assert isinstance(fitter, SmoothFitter)
-    found = [level.course for level in levels(search.simulator, fitter.samples)]
-    if rest not in search.tried or not found:
+    if rest not in search.tried:
         return False
     fit, own = search.tried[rest], search.tried[key].merit
     least = min(LESS * own, own - tie(search, key, rest))
-    moved = beside_starts(fit, fitter.columns(fit, [search.candidates[other]], np.stack(found)))
-    return any(beside(fit, [moved[..., [k]]], fitter.cap).loss < least for k in range(len(found)))
+    moved = beside_starts(fit, fitter.columns(fit, [search.candidates[other]], courses))
+    return any(beside(fit, [moved[..., [k]]], fitter.cap).loss < least for k in range(len(courses)))

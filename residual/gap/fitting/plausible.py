@@ -68,6 +68,7 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
         return unsupported
     before = Model(given).inputs(samples, np.zeros((1, 0)))[0]
     after = model.inputs(samples, theta[None])[0]
+    chosen = host.effects[len(model.simulator.effects) :]
     for j, channel in enumerate(host.action_channels):
         usual = float(before[..., j, 0].std())
         left = float(after[..., j, 0].std())
@@ -77,8 +78,7 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
             return number, f"{channel.name} would have {left / usual:.2g} of its strength"
         if turned_round(host.effects, channel.name):
             return number, f"{channel.name} would act the other way"
-        found = host.effects[len(model.simulator.effects) :]
-        curve = _turned_by_a_curve(found, channel.name, samples.actions[:, j])
+        curve = _turned_by_a_curve(chosen, channel.name, samples.actions[:, j])
         if curve is not None:
             return curve, f"{channel.name} would act the other way in a part of its range"
     return len(model.chosen), ""
