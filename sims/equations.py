@@ -12,14 +12,10 @@ import numpy as np
 
 from sims.authored import by_joint, force_is_added, joint_of, mobility
 from sims.effects.base import Effect
-from sims.effects.exchange import Exchange
-from sims.effects.flexible import ELSEWHERE, flexible_parts
-from sims.effects.friction import DryFriction
-from sims.effects.inertia import AddedInertia
-from sims.effects.limit import RateLimit
-from sims.effects.store import SecondStore, stores
+from sims.effects.flexible import ELSEWHERE
 from sims.host import HostSimulator, Joint
-from sims.motion import Acceleration, DriveForce, Motion, carrying, substep_ends
+from sims.hosted import motion_of
+from sims.motion import Motion, substep_ends
 from sims.rows import State
 from sims.simulator import Array, Parameter
 from sims.sliding import move
@@ -71,37 +67,6 @@ class _Equations(HostSimulator):
 
     def _arrange(self) -> None:
         """Where joints stand among the state channels."""
-
-    def _moved(
-        self, names: Sequence[str], acceleration: Acceleration, drive_force: DriveForce,
-        span: Array | None = None,
-    ) -> Motion:  # fmt: skip
-        """How it moves with its effects, on joints in the order of ``names``; see ``Motion``."""
-        forces = [(names.index(e.joint), e) for e in self.joint_effects()]
-        there = [e for e in self.effects if not e.absent]
-        limits = [e for e in there if isinstance(e, RateLimit)]
-        flows: list[tuple[int, int, Exchange | SecondStore]] = [
-            (names.index(e.pair[0]), names.index(e.pair[1]), e)
-            for e in there
-            if isinstance(e, Exchange)
-        ]
-        flows += [(names.index(e.joint), len(names) + i, e) for i, e in enumerate(stores(self))]
-        states = len(names) + len(stores(self))
-        parts = [(names.index(e.joint), states + i, e) for i, e in enumerate(flexible_parts(self))]
-        added = {f"{e} {i}": e for i, e in enumerate(there) if isinstance(e, AddedInertia)}
-        inertia = {name: e.inertia for name, e in added.items()}
-        return Motion(
-            carrying(acceleration, {name: names.index(e.joint) for name, e in added.items()}),
-            drive_force,
-            SimpleNamespace(**self.parameter_values(), **inertia),
-            smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
-            dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
-            plays=tuple((names.index(e.joint), e) for e in self.plays()),
-            capped=tuple((names.index(e.joint), e) for e in limits),
-            flows=tuple(flows),
-            parts=tuple(parts),
-            span=span,
-        )
 
 
 class EquationOfMotion(_Equations):
@@ -232,7 +197,10 @@ class EquationOfMotion(_Equations):
             found = self.drive_force(q.T, v.T, u.T, p)
             return by_joint(found, q.shape, "drive_force")
 
-        return self._moved([joint.name for joint in self.joints], acceleration, drive_force, span)
+        names = [joint.name for joint in self.joints]
+        places = {str(joint.position): (0, j) for j, joint in enumerate(self.joints)}
+        places |= {str(joint.rate): (1, j) for j, joint in enumerate(self.joints)}
+        return motion_of(self, names, places, acceleration, drive_force, span)
 
 
 class FirstOrderSystem(_Equations):
@@ -281,7 +249,8 @@ class FirstOrderSystem(_Equations):
             return np.concatenate([change + f[: len(names)], f[len(names) :]])
 
         # Nothing has play, so nobody asks for a drive force.
-        motion = self._moved(names, rates, lambda q, v, u, p: np.zeros_like(v))
+        places = {name: (1, i) for i, name in enumerate(names)}
+        motion = motion_of(self, names, places, rates, lambda q, v, u, p: np.zeros_like(v))
         x = np.asarray(states, float).T
         own, inputs = len(x) - 2 * len(motion.parts), np.asarray(inputs, float)
         state = State(

@@ -53,8 +53,9 @@ class Changing:
         nominal: What it is in the simulator.
         unit: Of these; ``"1"`` for the share of a gain.
         taken: Part of the squared residual that this would take off.
-        over: The channel that it follows, ``|name|`` if that one's size; empty along the records.
-        low, high, over_unit: The ends of that channel.
+        over: The channel that it follows; empty along the records.
+        of_size: Whether it follows that channel's size.
+        low, high, over_unit: The ends of that channel, or of its size.
     """
 
     label: str
@@ -67,6 +68,7 @@ class Changing:
     low: float = 0.0
     high: float = 0.0
     over_unit: str = ""
+    of_size: bool = False
 
 
 @dataclasses.dataclass(frozen=True)

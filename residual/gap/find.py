@@ -142,7 +142,7 @@ def find_gap(
         tell("do the records differ?")
         ask = asked and conventions is None and not clock.late
         differ = unlike(answer) if ask else ()
-        over_time = changing(answer) if ask else None
+        over_time = changing(answer, known.in_vain) if ask else None
         clock.lap("confirm")
 
         table, judged = summed_up(answer), NOT_JUDGED

@@ -22,12 +22,14 @@ from residual.gap.answer.lone import (
     left_stretch,
     lone_stretch,
 )
+from residual.gap.answer.varying import no_surer, worth_varying
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.log import Log
 from residual.gap.longer import longer_horizon
 from residual.gap.preparation.prepare import Prepared, finely
 from residual.gap.search.redundant import by_points
 from sims.effects.base import Effect
+from sims.effects.parameter_curve import ParameterCurve
 
 if TYPE_CHECKING:
     from residual.gap.inquiry import Inquiry
@@ -41,11 +43,13 @@ class Confirmed:
         prepared: The windows that the answer is of.
         answer: What stays after confirmation.
         says: What is to be said of how it was found.
+        in_vain: Parameters that follow a channel, asked for and not named.
     """
 
     prepared: Prepared
     answer: Answer
     says: tuple[str, ...]
+    in_vain: tuple[ParameterCurve, ...] = ()
 
     def and_says(self, text: str) -> Confirmed:
         """The same with one more thing to say."""
@@ -72,6 +76,7 @@ class OnceMore:
         known = self.without_lone_stretch(known)
         lone = bool(known.says)
         known = self.with_parameters_free(known)
+        known = self.with_varying(known)
         known = self.with_curves(known)
         known = self.with_parts(known)
         known = self.over_longer_forecasts(known)
@@ -113,6 +118,19 @@ class OnceMore:
         self.inquiry.tell("once more with parameters free within their tolerance")
         second = self.inquiry.asked_again(known, self.tolerance, beside)
         return dataclasses.replace(known, answer=second) if better(second, answer) else known
+
+    def with_varying(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found with parameters that follow what was measured, if they take
+        most of what is left."""
+        answer, what = known.answer, "a parameter that changes with a state or an input"
+        offered = self.inquiry.offered
+        curves = worth_a_curve(answer, offered.curves)
+        varying = worth_varying(answer, curves, offered.by_label)
+        found = self._with_more(known, varying, what, what)
+        if found.answer is not answer:
+            return dataclasses.replace(found, answer=no_surer(found.answer, answer))
+        late = found.says != known.says
+        return found if late else dataclasses.replace(found, in_vain=tuple(varying))
 
     def with_curves(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with curves by points if they take most of what is left."""

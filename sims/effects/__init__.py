@@ -43,6 +43,7 @@ from sims.effects.library import library as library
 from sims.effects.library import typical as typical
 from sims.effects.limit import RateLimit as RateLimit
 from sims.effects.parameter import ParameterChange as ParameterChange
+from sims.effects.parameter_curve import ParameterCurve as ParameterCurve
 from sims.effects.sensor import SensorEffect as SensorEffect
 from sims.effects.sensor import SensorOffset as SensorOffset
 from sims.effects.sensor import SensorScale as SensorScale

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from sims.effects.base import Effect
 
 Value = Any  # float, or an array with one entry per row
-Along = Literal["rate", "position", "input"]
+Along = Literal["rate", "position", "input", "channel"]
 
 
 class Curve(Effect, abc.ABC):

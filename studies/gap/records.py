@@ -70,9 +70,8 @@ def on_the_way(changing: Changing) -> str:
         return (
             f"it looks as if {effect_name(changing.label)} changed {_over(changing)}, from about "
             f"{begin} at {minus(low)} to {end} at {minus(high)} ({nominal} in the simulator), "
-            f"which would take {percent(changing.taken)} of the squared residual off; no effect "
-            "makes a parameter follow what is measured, so it is not added: let the simulator "
-            "change it"
+            f"which would take {percent(changing.taken)} of the squared residual off; it is not "
+            "added: if that may be so, let the simulator change it"
         )
     return (
         f"it looks as if {effect_name(changing.label)} went from about {begin} where records begin "
@@ -84,9 +83,8 @@ def on_the_way(changing: Changing) -> str:
 
 def _over(changing: Changing) -> str:
     """With which channel it changes; empty along the records."""
-    name = changing.over.strip("|")
-    sized = "the size of " if name != changing.over else ""
-    return f"with {sized}{name}" if name else ""
+    sized = "the size of " if changing.of_size else ""
+    return f"with {sized}{changing.over}" if changing.over else ""
 
 
 def _values(changing: Changing) -> list[str]:

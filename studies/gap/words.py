@@ -12,6 +12,7 @@ from residual.gap import GapResult
 from residual.gap.result import Gap, Number, Span
 from sims.effects.base import Effect
 from sims.effects.library import library
+from sims.effects.parameter_curve import ParameterCurve
 
 KINDS = {
     "confirmed": "confirmed",
@@ -45,6 +46,9 @@ def effect_name(label: str) -> str:
     if " with " in label:
         return " with ".join(map(effect_name, label.split(" with ")))
     name, _, where = label.partition("@")
+    if name == ParameterCurve.name:
+        parameter, _, channel = where.partition(" over ")
+        return f"{parameter.replace('_', ' ')} that changes with {channel}"
     words = name.replace("_", " ")
     for person in PEOPLE:
         words = words.replace(person.lower(), person)

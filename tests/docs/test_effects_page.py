@@ -14,6 +14,7 @@ from sims.simulator import Channel
 
 PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
 PLACES = {"joint": "joint", "actuator": "input", "channel": "measured channel"}
+PLACES["parameter"] = "parameter by a state or an input"
 
 
 class Tank(FirstOrderSystem):
@@ -64,9 +65,10 @@ CURVES = [
 OTHERS = [
     effects.StateCurve("level"), effects.RateLimit("pivot"),
     effects.FlexiblePart("pivot"), effects.FlexibleJoint("pivot"), effects.AddedInertia("pivot"),
+    effects.ParameterCurve("mass", "voltage"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
-LIBRARY = {e.name: e for e in reversed(HOSTED) if e.enters != "parameter"}
+LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}
 
 
 @pytest.mark.parametrize("effect", LIBRARY.values(), ids=str)

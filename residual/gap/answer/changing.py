@@ -8,7 +8,7 @@ not stand out either: the gap stays, and has no name.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,49 +33,62 @@ from residual.gap.search.sets import Key, Search
 from sims.effects.actuator import ActuatorGain
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
+from sims.effects.parameter_curve import ParameterCurve
 
 Array = NDArray[np.float64]
 
-#: Part of what is left, without its change along the records, that it may leave.
+#: Part of what is left beyond noise, without its change, that it may leave.
 HALF = 0.5
 #: Times that a change of what is named has to leave more.
 CLEARLY = 1.5
 
 
-def changing(answer: Answer) -> Changing | None:
+def changing(answer: Answer, in_vain: Collection[ParameterCurve] = ()) -> Changing | None:
     """The parameter or gain whose change along the records, or with what was measured, would take
     most of what is left off.
 
-    It has to take off half of what it leaves as a constant, more than chance, more than a push that
-    drifts, and clearly more than a change along the records of what is named: of that both ends are
-    told anyway. With a measured channel that has to be clearly more than along the records.
+    Of what is beyond noise it has to take off half of what it leaves as a constant, more than
+    chance, more than a push that drifts, and clearly more than a change along the records of what
+    is named: of that both ends are told anyway. With a measured channel that has to be clearly more
+    than along the records.
+
+    Args:
+        answer: What was named.
+        in_vain: Parameters that follow a channel, asked for in full and not named.
     """
+    search = answer.found.search
+    courses = [one for one in courses_of(answer) if not any(one.makes(curve) for curve in in_vain)]
+    return next((one.told(search, search.tried[answer.key]) for one in courses), None)
+
+
+def courses_of(answer: Answer) -> list[Course]:
+    """What ``changing`` is chosen of, best first: several only of those with a channel."""
     found, search, key = answer.found, answer.found.search, answer.key
     fitter, fit = search.fitter, search.tried[answer.key]
     if not isinstance(fitter, SmoothFitter) or len(fitter.blocks) < FEW or found.adequate:
-        return None
+        return []
     if fitter.left(fit, found.floor).ratio < NOTABLE:
-        return None
-    over_time = _best(search, key, [None], named=False)
-    courses = list(levels(search.simulator, fitter.samples))
-    over_level = _best(search, key, courses, named=True) if courses else None
-    own = [
+        return []
+    by_noise = fitter.noise_alone(found.floor.sigma)
+    over_time = _clear(search, key, [None], by_noise, named=False)
+    levelled = list(levels(search.simulator, fitter.samples))
+    over_level = _clear(search, key, levelled, by_noise, named=True) if levelled else []
+
+    def clearly_below(losses: Iterable[float]) -> list[float]:
+        return [by_noise + max(loss - by_noise, 0.0) / CLEARLY for loss in losses]
+
+    own = (
         beside(fit, [_own_course(search, fit, j)], fitter.cap).loss
         for j in range(search.numbers(key))
-    ]
-    least = min([Drift(search).least(key), *(loss / CLEARLY for loss in own)])
-    if over_time is not None and over_time.fall.loss >= least:
-        over_time = None
-    if over_level is not None:
-        told = [over_time.fall.loss] if over_time else []
-        if over_level.fall.loss >= min([least, *(loss / CLEARLY for loss in told)]):
-            over_level = None
-    best = over_level or over_time
-    return best.told(search, fit) if best else None
+    )
+    least = min([Drift(search).least(key), *clearly_below(own)])
+    over_time = [one for one in over_time if one.fall.loss < least][:1]
+    least = min([least, *clearly_below(one.fall.loss for one in over_time)])
+    return [one for one in over_level if one.fall.loss < least] or over_time
 
 
 @dataclasses.dataclass(frozen=True)
-class _Course:
+class Course:
     """A parameter or gain that changes over a course.
 
     Attributes:
@@ -89,6 +102,14 @@ class _Course:
     free: int | None
     level: Level | None
     fall: Fall
+
+    def makes(self, curve: ParameterCurve) -> bool:
+        """Whether it is of the parameter and channel of a curve."""
+        level, effect = self.level, self.one.effect
+        if level is None or not isinstance(effect, ParameterChange):
+            return False
+        own = effect.parameter, level.channel, level.of_size
+        return own == (curve.parameter, curve.over, curve.of_size)
 
     def told(self, search: Search, fit: Fit) -> Changing:
         """Its ends."""
@@ -105,20 +126,24 @@ class _Course:
         if level is None:
             return told
         return dataclasses.replace(
-            told, over=level.name, low=level.low, high=level.high, over_unit=level.unit
-        )
+            told, over=level.channel, of_size=level.of_size, low=level.low, high=level.high,
+            over_unit=level.unit,
+        )  # fmt: skip
 
 
-def _best(search: Search, key: Key, courses: Sequence[Level | None], named: bool) -> _Course | None:
-    """What leaves least over one of the courses, of what is clear and leaves half at most.
+def _clear(
+    search: Search, key: Key, courses: Sequence[Level | None], by_noise: float, named: bool
+) -> list[Course]:
+    """What is clear over one of the courses and leaves half at most, what leaves least first.
 
     Args:
         courses: Levels, or None for along the records.
+        by_noise: What noise alone leaves.
         named: Whether parameters and gains that are named are asked, too.
     """
     fitter, fit = search.fitter, search.tried[key]
     assert isinstance(fitter, SmoothFitter)
-    pool, best = _pool(search, () if named else key), None
+    pool, found = _pool(search, () if named else key), []
     along = [along_records(search) if one is None else one.course for one in courses]
     for one in pool:
         free = _place(fit, one)
@@ -129,13 +154,13 @@ def _best(search: Search, key: Key, courses: Sequence[Level | None], named: bool
             if level is None and free is not None:
                 course = _own_course(search, fit, free)
             moved = beside(fit, [*given, course], fitter.cap)
-            if moved.loss > HALF * fixed.loss or (best and moved.loss >= best.fall.loss):
+            if moved.loss - by_noise > HALF * (fixed.loss - by_noise):
                 continue
             chance = CHANCE / (len(pool) * len(courses))
             more = np.concatenate([*given, course], axis=2)
             if clear_number(fit, fitter.blocks.block, more, chance):
-                best = _Course(one, free, level, moved)
-    return best
+                found.append(Course(one, free, level, moved))
+    return sorted(found, key=lambda course: course.fall.loss)
 
 
 def _pool(search: Search, key: Key) -> list[Candidate]:

@@ -16,6 +16,7 @@ from residual.gap.confirmation.size import may_vanish
 from residual.gap.confirmation.tolerance import allow_for_parameters
 from residual.gap.fitting.contract import Left
 from residual.gap.fitting.forecasts import main_channel, noise_floor
+from residual.gap.fitting.plausible import stands_still
 from residual.gap.search.choice import better_fit
 from residual.gap.search.comparisons import material
 from residual.gap.search.exchange import add_exchanged, add_without_each
@@ -111,6 +112,8 @@ def confirm(
             lost = made
         if not lost and found.adequate and key and material(search, key, ()):
             lost = made  # what fits the noise of one part may forecast nothing of another
+        if not lost and key and not found.adequate and stands_still(fit, search.fitter):
+            lost = made  # it only switches off what the simulator has wrong
         if not lost:
             made = allow_for_parameters(
                 search, key, made, found.adequate, parameter_tolerance, until

@@ -12,12 +12,12 @@ DOUBTS: dict[Doubt, str] = {
     "drift": "a push that grows steadily along the records, as of a room that warms, would do as "
     "well",
     "one_way": "motion goes one way only, so that a part of it may be a constant load",
-    "law": "the law may be another one: a parameter that changes with what was measured explains "
-    "more",
+    "law": "the law may be another one, to which a parameter that changes with what was measured "
+    "comes near",
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
-    "clock": "late time stamps, an input that is held, or a filter in a sensor, of about half a "
-    "sample, would do as well",
+    "clock": "the log does not tell its time well enough: late time stamps, an input that is held, "
+    "a filter in a sensor, or an input that came on earlier would do as well",
     "conventions": "it has to be seen first whether the log counts as the simulator does",
     "cut_off": "it has to be seen first whether the simulator is meant to cut an input or a state "
     "off where it does",

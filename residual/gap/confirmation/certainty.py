@@ -15,6 +15,7 @@ from residual.gap.confirmation.drift import Drift
 from residual.gap.confirmation.following import by_another_law
 from residual.gap.confirmation.numerics import STEADY, at_half_step, in_the_limit, survives
 from residual.gap.confirmation.one_way import may_hold_a_load
+from residual.gap.confirmation.timing import untimed
 from residual.gap.fitting.intervals import bounded, deviations, ended
 from residual.gap.fitting.plausible import doubtful_sensor
 from residual.gap.search.comparisons import AT_ONE, no_match
@@ -34,11 +35,6 @@ FORM, CHANCE = 1.2, 0.975
 HOPELESS = 3.0
 #: Standard errors by which forecasts must be worse without the effect.
 WORSE = 2.0
-#: Part of the time between samples below which a delay or lag is no more certain than the log's
-#: clock: time stamps, and filters in sensors, are as late.
-BRIEF = 0.5
-#: The same of an input that is said to run straight: a line half a sample late is nearly a step.
-HELD = 0.75
 #: Blocks below which forms within a family are not told apart, and below which nothing is sure.
 FEW, TOO_FEW = 8, 4
 
@@ -62,7 +58,7 @@ def claims(
     fit = search.tried[key]
     half = 1.96 * deviations(fit, search.fitter.blocks)
     limits = in_the_limit(fit.theta, numerics)
-    found, drift, other_law = [], Drift(search), by_another_law(search, key)
+    found, drift, other_law = [], Drift(search), by_another_law(search, key, adequate)
     for place, number in enumerate(key):
         own = [int(j) for j in np.flatnonzero(fit.model.owner == place)]
         label = search.candidates[number].label
@@ -93,7 +89,7 @@ def claims(
                 ),
                 any(ended(fit, j) for j in (strengths if curved else own)),
                 taken,
-                brief=brief(search, number, fit.theta[own]),
+                brief=untimed(search, number, fit.theta[own]),
                 sensor=not adequate and not twins and of_doubtful_sensor(search, key, place),
                 by_fit=by_fit(search, key, number),
                 creeps=creeps(search, key, number),
@@ -264,23 +260,6 @@ def steady(search: Search, key: Key, j: int, least: float = 0.0) -> bool:
     """
     value, folds = search.tried[key].theta[j], search.validated[key].thetas[:, j]
     return bool((np.abs(folds - value) <= STEADY * max(abs(value), least)).all())
-
-
-def brief(search: Search, number: int, values: Array) -> bool:
-    """Whether an effect of the actuator is a time too short for the log's own clock."""
-    candidate = search.candidates[number]
-    if candidate.effect.enters != "actuator":
-        return False
-    runs = search.fitter.samples.recorded
-    clock = float(np.median(np.concatenate([run.durations for run in runs])))
-    inputs = {channel.name: channel.hold for channel in search.simulator.action_channels}
-    acting = getattr(candidate.effect, "actuators", ())
-    straight = any(inputs[name] == "linear" for name in acting)
-    shortest = HELD if straight else BRIEF
-    return any(
-        knob.unit == "s" and 0 < abs(value) < shortest * clock
-        for knob, value in zip(candidate.knobs, values, strict=True)
-    )
 
 
 def of_doubtful_sensor(search: Search, key: Key, place: int) -> bool:

@@ -19,6 +19,7 @@ from residual.gap.search.significance import tie
 from sims.effects.actuator import ActuatorGain
 from sims.effects.curve import Curve
 from sims.effects.parameter import ParameterChange
+from sims.effects.parameter_curve import ParameterCurve
 
 Array = NDArray[np.float64]
 
@@ -26,20 +27,24 @@ Array = NDArray[np.float64]
 LESS = 0.95
 
 
-def by_another_law(search: Search, key: Key) -> frozenset[int]:
+def by_another_law(search: Search, key: Key, adequate: bool) -> frozenset[int]:
     """Members of a set in whose place a parameter or gain beside them leaves clearly less if it
     changes in proportion to what was measured, those parameters, and curves beside them.
 
     In the linear picture, so that it is as many numbers for one. What strikes the ground is not
-    asked.
+    asked. A parameter that follows a channel comes near to many a law; it is the true one where
+    nothing is left.
 
     Args:
         search: With the set, and what is left of it without each member.
         key: The set.
+        adequate: Whether it leaves no more than noise.
     """
     found: set[int] = set()
+    if not adequate:
+        found |= {n for n in key if isinstance(search.candidates[n].effect, ParameterCurve)}
     if not isinstance(search.fitter, SmoothFitter) or len(search.fitter.blocks) < FEW:
-        return frozenset()
+        return frozenset(found)
     courses = [level.course for level in levels(search.simulator, search.fitter.samples)]
     for number in key if courses else ():
         for other in all_but(key, number):

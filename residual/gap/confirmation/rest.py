@@ -7,7 +7,7 @@ would begin earlier; but a step test is often logged from the step on, and begin
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,14 @@ from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.search.sets import Key, Search
 from residual.trajectories import Trajectory
-from sims.effects.actuator import ActuatorLag, Delay
+from sims.effects.actuator import ActuatorGain, ActuatorLag, Delay
+from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
+
+#: Gains and parameters that are tried beside lags.
+STRENGTHS = 6
 
 
 def from_rest(simulator: HostSimulator, runs: Sequence[Trajectory]) -> list[Trajectory]:
@@ -38,7 +42,8 @@ def fits_better_from_rest(
     search: Search, key: Key, runs: Sequence[Trajectory]
 ) -> list[Trajectory] | None:
     """The runs, those taken to have begun from rest that fit clearly better so, with what was found
-    and a lag of every input; None if none does.
+    and a lag of every input, or with lags in place of its delays, or the other way round; None if
+    none does.
 
     Args:
         search: Fitted sets.
@@ -51,18 +56,17 @@ def fits_better_from_rest(
     ordered = in_order(runs, fitter.samples.stride)
     if all(run.before is None for run in from_rest(search.simulator, ordered)):
         return None
-    lagging = _with_lags(search, key)
-    if lagging is None:
-        return None
-    model, theta = search.model(lagging[0]), lagging[1]
-    usual = fitter.fit(model, theta, search.tried[key])
-    chosen = each_as_it_fits(fitter, usual, ordered)
-    if all(run.before is None for run in chosen):
-        return None
-    least = min(usual.merit, search.tried[key].merit)
+    least, best = search.tried[key].merit, None
+    for wider, theta in _with_lags(search, key):
+        model = search.model(wider)
+        usual = fitter.fit(model, theta, search.tried[key])
+        least = min(least, usual.merit)
+        chosen = each_as_it_fits(fitter, usual, ordered)
+        if any(run.before is not None for run in chosen):
+            begun = beginning_as(fitter, chosen).fit(model, theta, search.tried[key]).merit
+            best = (begun, chosen) if best is None or begun < best[0] else best
     needed = max(CLEARER * least, fitter.tie(search.tried[()]))
-    begun = beginning_as(fitter, chosen).fit(model, theta, search.tried[key])
-    return chosen if least - begun.merit > needed else None
+    return best[1] if best and least - best[0] > needed else None
 
 
 def each_as_it_fits(
@@ -96,15 +100,31 @@ def beginning_as(fitter: SmoothFitter, ordered: Sequence[Trajectory]) -> SmoothF
     )
 
 
-def _with_lags(search: Search, key: Key) -> tuple[Key, Array] | None:
+def _with_lags(search: Search, key: Key) -> Iterator[tuple[Key, Array]]:
     """A set with a lag at every input that it leaves without memory, or a delay where lags are not
-    asked for, and where its fit begins; None if it holds none then."""
-    chosen = [search.candidates[number].effect for number in key]
-    remembers = {e.where for e in chosen if isinstance(e, ActuatorLag | Delay)}
-    more: dict[str, tuple[int, Array]] = {}
-    for kind in (ActuatorLag, Delay):
-        for number, candidate in enumerate(search.candidates[: search.screened]):
-            where = candidate.effect.where
-            if isinstance(candidate.effect, kind) and where not in remembers:
-                more.setdefault(where, (number, candidate.trials[0].values[0]))
-    return search.merged(key, list(more.values())) if more or remembers else None
+    asked for, and where its fit begins; the same with lags in place of delays, and the other way
+    round; none if there are neither. Then lags beside one gain or parameter, whatever was found:
+    taken to have gone on before, a step from rest leads to other names."""
+    chosen = {number: search.candidates[number].effect for number in key}
+    remember = {n: e for n, e in chosen.items() if isinstance(e, ActuatorLag | Delay)}
+    screened = list(enumerate(search.candidates[: search.screened]))
+    for dropped in [(), tuple(remember)] if remember else [()]:
+        gone = {(type(chosen[n]), chosen[n].where) for n in dropped}
+        kept = {e.where for n, e in remember.items() if n not in dropped}
+        more: dict[str, tuple[int, Array]] = {}
+        for kind in (ActuatorLag, Delay):
+            for number, one in screened:
+                where = one.effect.where
+                if isinstance(one.effect, kind) and where not in kept and (kind, where) not in gone:
+                    more.setdefault(where, (number, one.trials[0].values[0]))
+        if more or (remember and not dropped):
+            yield search.merged(key, list(more.values()), drop=dropped)
+    lags = [(n, one) for n, one in screened if isinstance(one.effect, ActuatorLag)]
+    strengths = [
+        (n, 0.01 * one.trials[0].values[0])
+        for n, one in screened
+        if isinstance(one.effect, ActuatorGain | ParameterChange)
+    ]
+    for strength in strengths[:STRENGTHS] if lags else ():
+        lagging = [(n, one.trials[0].values[0]) for n, one in lags]
+        yield search.merged((), [*lagging, strength])

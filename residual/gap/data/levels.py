@@ -22,16 +22,19 @@ class Level:
     """A channel as a course from -1/2 to 1/2.
 
     Attributes:
-        name: The channel, ``|name|`` if its size counts.
-        unit: Of it.
+        channel, unit: Its name and unit.
+        of_size: Whether its size counts.
         low, high: Its values at the two ends.
+        reach: Its least and its greatest value.
         course: By row, (n,).
     """
 
-    name: str
+    channel: str
     unit: str
+    of_size: bool
     low: float
     high: float
+    reach: tuple[float, float]
     course: Array
 
 
@@ -40,12 +43,14 @@ def levels(simulator: HostSimulator, samples: Samples) -> Iterator[Level]:
     states, inputs = simulator.physical_channels, simulator.action_channels
     columns = [(states[column], samples.seen[:, column]) for column in samples.measured]
     for channel, column in (*columns, *zip(inputs, samples.actions.T, strict=True)):
-        found = {channel.name: column}
+        sizes = {False: column}
         if np.nanmin(column) < 0:
-            found[f"|{channel.name}|"] = np.abs(column)
-        for name, values in found.items():
-            low, high = (float(end) for end in np.nanquantile(values, ENDS))
+            sizes[True] = np.abs(column)
+        for of_size, values in sizes.items():
+            low, high, *reach = map(float, np.nanquantile(values, [*ENDS, 0.0, 1.0]))
             if high > low:
                 course = np.clip((values - low) / (high - low), 0.0, 1.0) - 0.5
                 course = np.where(np.isfinite(course), course, 0.0)
-                yield Level(name, channel.unit, low, high, course)
+                yield Level(
+                    channel.name, channel.unit, of_size, low, high, (reach[0], reach[1]), course
+                )

@@ -38,6 +38,8 @@ THROUGH = 0.1
 #: Residual over noise of the nominal simulator that has to be explained, and of what explains it;
 #: or the residual of that as a part of the motion itself.
 FAR, CLOSE, UNMOVED = 3.0, 1.5, 0.2
+#: Part of the measured variation below which a forecast stands still.
+STILL = 0.3
 #: Part of the largest command by which an input is negative by chance, and of the time.
 SLIGHTLY, SELDOM = 0.02, 0.05
 #: Part of two effects that is left of both together, below which they undo each other.
@@ -166,6 +168,29 @@ def _motion(fitter: SmoothFitter) -> Array:
     square = np.maximum((t**2).sum(axis=1, keepdims=True), 1e-300)
     bends = x - t * (t * x).sum(axis=1, keepdims=True) / square
     return np.sqrt((bends**2).sum(axis=(0, 1)) / np.maximum(valid.sum(axis=(0, 1)), 1))
+
+
+def stands_still(fit: Fit, fitter: Fitter) -> bool:
+    """Whether what a fit foretells hardly moves where the measured does, within the windows.
+
+    Args:
+        fit: Of a set of effects.
+        fitter: Of the fit.
+    """
+    if not isinstance(fitter, SmoothFitter):
+        return False
+    samples, windows, valid = fitter.samples, fitter.blocks.windows, fitter.valid
+    seen = np.where(valid, samples.seen[windows.index][..., samples.measured], 0.0)
+    left = fit.projected.reshape(seen.shape) * fitter.sigma
+    moved, foretold = (_within(one, valid) for one in (seen, seen - left))
+    return bool((foretold < STILL * moved).all())
+
+
+def _within(paths: Array, valid: NDArray[np.bool_]) -> Array:
+    """How far paths (W, L, m) vary around their mean in each window, (m,)."""
+    count = np.maximum(valid.sum(axis=1, keepdims=True), 1)
+    around = np.where(valid, paths - (paths * valid).sum(axis=1, keepdims=True) / count, 0.0)
+    return np.sqrt((around**2).sum(axis=(0, 1)) / np.maximum(valid.sum(axis=(0, 1)), 1))
 
 
 def doubtful_sensor(effect: Effect, simulator: HostSimulator, samples: Samples) -> bool:

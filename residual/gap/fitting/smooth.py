@@ -208,6 +208,10 @@ class SmoothFitter:
         count = np.maximum(self.valid.sum(axis=(0, 1)), 1)
         return np.sqrt(square.sum(axis=(0, 1)) / count) * self.sigma / sigma
 
+    def noise_alone(self, sigma: Array) -> float:
+        """Loss where nothing but noise ``sigma``, (m,), is left."""
+        return float((self.valid.sum(axis=(0, 1)) * (sigma / self.sigma) ** 2).sum())
+
     def _quiet_in_every_fold(self, fit: Fit, floor: Floor) -> bool:
         """Whether no fold of the data has a residual beyond noise."""
         windows = self.blocks.windows

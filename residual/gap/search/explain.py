@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -18,6 +19,7 @@ from residual.gap.search.beam import extend, improves, run
 from residual.gap.search.choice import Choice, choose
 from residual.gap.search.continuation import add_handed_over
 from residual.gap.search.exchange import add_exchanged, add_pairs_exchanged
+from residual.gap.search.pairs import every_two
 from residual.gap.search.reasons import reasons
 from residual.gap.search.redundant import curves_in_place
 from residual.gap.search.sets import Key, Proposals, Search, Twins
@@ -38,6 +40,8 @@ WORTH = 1.3
 RIVALS, EXCHANGES = 10, 3
 #: Effects tried in place of each at the least.
 LEAST = 2
+#: Sets that are weighed anew where there is no time to search again.
+LAST = 4
 #: Sets that a new search begins with, and their error over that of the best.
 SEEDS, HOPEFUL = 12, 3.0
 
@@ -107,36 +111,46 @@ def explain(
             for not being asked.
         twins: Exact twins of what may be missing, by label.
     """
-    seeds: Proposals = {}
-    key: Key = ()
-    for _ in range(ROUNDS):
+
+    def begun(fitter: Fitter, floor: Noise) -> Search:
         search = Search(simulator, pool, fitter, effort, tell, until, beside, twins, floor.sigma)
         if len(search.currency.groups) > 1 and not simulator.has_contacts:
             alone = noise_floor(fitter, search.nominal, floor.sigma)
             search.currency = search.currency.only_where_wrong(alone)
+        return search
+
+    seeds: Proposals = {}
+    for _ in range(ROUNDS):
+        search = begun(fitter, floor)
         if not seeds:
             if earlier is not None:
                 search.add(carried(earlier, search))
             search.add(curves_in_place(search, near_best(search)))
         run(search, seeds, functools.partial(_quiet, search, floor))
-        key = choose(search).key
-        fresh, floor = weigh(fitter, search.tried[key])
+        if not (seeds or simulator.has_contacts or _quiet(search, floor, search.best())):
+            every_two(search)
+        best = near_best(search)
+        fresh, floor = weigh(fitter, search.tried[best[0]])
         ratio = fresh.sigma / fitter.sigma
         alike = (ratio > 1 / WORTH).all() and (ratio < WORTH).all()
-        finer = fresh.samples.substeps > fitter.samples.substeps
-        if search.late or (alike and not finer):
+        if alike and fresh.samples.substeps <= fitter.samples.substeps:
             break
-        seeds = {k: search.own(k) for k in {*near_best(search), key} if k}
+        seeds = {key: search.own(key) for key in best if key}
+        if search.late:
+            # No time for another search, but for what was found in the weights that it earns.
+            search = begun(fresh, floor)
+            search.add(dict(itertools.islice(seeds.items(), LAST)))
+            break
         fitter = fresh
     return settle(search, floor)
 
 
 def near_best(search: Search) -> list[Key]:
-    """The sets worth trying again, best first: those that forecast best, and that fit best."""
+    """The sets worth trying again: what is chosen, those that forecast best, and that fit best."""
     best = sorted(search.usable(), key=search.error)[:SEEDS]
     good = [key for key in best if search.error(key) <= HOPEFUL * search.error(best[0])]
     fit = sorted(search.usable(), key=lambda key: search.tried[key].merit)[: search.effort.beam]
-    return list(dict.fromkeys([*good, *fit]))
+    return list(dict.fromkeys([choose(search).key, *good, *fit]))
 
 
 def carried(earlier: Search, search: Search) -> Proposals:

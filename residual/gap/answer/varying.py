@@ -1,0 +1,93 @@
+"""Parameters that may follow a state or an input: when to ask for their curves."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.answer.changing import courses_of
+from residual.gap.answer.confirmed import Answer
+from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.screening import beside_starts
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.model.candidates import candidates
+from sims.effects.curve import Curve
+from sims.effects.parameter import ParameterChange
+from sims.effects.parameter_curve import ParameterCurve
+
+Array = NDArray[np.float64]
+
+#: Times what the best of them leaves, up to which others are asked for, and how many at the most.
+NEARLY, MOST = 2.0, 4
+#: Part of what one does that lies beyond a curve by points, below which it is that curve.
+BEYOND = 0.1
+
+
+def worth_varying(
+    answer: Answer, curves: Sequence[Curve], offered: Collection[str]
+) -> list[ParameterCurve]:
+    """The parameters that follow a channel in the linear picture, to ask for.
+
+    Those that do what a curve by points does are left to that: a damper that follows its own speed
+    is a friction by speed.
+
+    Args:
+        answer: What was found with the effects on offer.
+        curves: Curves by points that are asked for, too.
+        offered: Labels of the effects that may be missing.
+    """
+    search = answer.found.search
+    courses = [one for one in courses_of(answer) if one.level is not None]
+    if not courses or not search.simulator.written_out:
+        return []
+    found: list[ParameterCurve] = []
+    for one in courses:
+        level, effect = one.level, one.one.effect
+        near = one.fall.loss <= NEARLY * courses[0].fall.loss
+        asked = isinstance(effect, ParameterChange) and str(effect) in offered
+        if level is not None and near and asked:
+            curve = ParameterCurve(effect.where, level.channel, of_size=level.of_size)
+            found.append(curve.suited_to(*level.reach))
+    assert isinstance(search.fitter, SmoothFitter)
+    fitter, fit = search.fitter, search.tried[answer.key]
+    laws = [_moved(fitter, fit, curve) for curve in curves] if found else []
+    own = [one for one in found if not _is_one_of(_moved(fitter, fit, one), laws)]
+    return own[:MOST]
+
+
+def no_surer(answer: Answer, earlier: Answer) -> Answer:
+    """An answer in which a parameter follows a channel, nothing surer than before where more than
+    noise is left: it takes the shape of whatever is missing, and what it leaves others that of it.
+    """
+    if answer.found.adequate:
+        return answer
+    known = earlier.found.search.candidates
+    sure = {known[claim.number].label for claim in earlier.claims if claim.sure}
+    labels = answer.found.search.candidates
+    claims = tuple(
+        dataclasses.replace(
+            claim, other_law=claim.other_law or labels[claim.number].label not in sure
+        )
+        for claim in answer.claims
+    )
+    return dataclasses.replace(answer, claims=claims)
+
+
+def _moved(fitter: SmoothFitter, fit: Fit, curve: Curve) -> Array:
+    """What a curve does at each of its points, one column each."""
+    pool = candidates(fit.model.simulator, [curve], fitter.samples)
+    columns = beside_starts(fit, fitter.columns(fit, pool))
+    return columns.reshape(-1, columns.shape[-1])
+
+
+def _is_one_of(moved: Array, laws: Sequence[Array]) -> bool:
+    """Whether all that columns do lies within what one of the laws can do."""
+    size = np.linalg.norm(moved)
+    for law in laws:
+        left = moved - law @ np.linalg.lstsq(law, moved, rcond=1e-10)[0] if law.size else moved
+        if np.linalg.norm(left) <= BEYOND * size:
+            return True
+    return False

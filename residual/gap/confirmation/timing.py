@@ -1,0 +1,39 @@
+"""Whether a log tells time well enough for what an effect makes of it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.search.sets import Search
+
+Array = NDArray[np.float64]
+
+#: Samples below which a time is too short for late stamps and filters to be told apart from it.
+BRIEF = 0.5
+#: The same of an input that runs straight from sample to sample: half a sample late it is nearly a
+#: step, as if it were held.
+HELD = 0.75
+
+
+def untimed(search: Search, number: int, values: Array) -> bool:
+    """Whether an effect of the actuator is a time too short for the log's own clock, or of an input
+    that never changes, of which nobody knows when it came on.
+
+    Args:
+        search: Holds the log.
+        number: The effect's.
+        values: Its fitted numbers.
+    """
+    candidate = search.candidates[number]
+    times = [abs(v) for k, v in zip(candidate.knobs, values, strict=True) if k.unit == "s" and v]
+    if candidate.effect.enters != "actuator" or not times:
+        return False
+    runs = search.fitter.samples.recorded
+    clock = float(np.median(np.concatenate([run.durations for run in runs])))
+    inputs = {channel.name: j for j, channel in enumerate(search.simulator.action_channels)}
+    acting = [inputs[name] for name in getattr(candidate.effect, "actuators", ())]
+    if acting and not any(np.ptp(run.actions[:, acting], axis=0).any() for run in runs):
+        return True
+    straight = any(search.simulator.action_channels[j].hold == "linear" for j in acting)
+    return min(times) < (HELD if straight else BRIEF) * clock

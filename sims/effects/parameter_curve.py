@@ -1,0 +1,83 @@
+"""A physical parameter that changes with a state or an input."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from sims.effects.base import Effect, Quantity, number, place
+from sims.effects.curve import Along, CurveBetween
+from sims.effects.joint import Value
+from sims.effects.parameter import ParameterChange
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
+
+
+@dataclasses.dataclass(frozen=True)
+class ParameterCurve(CurveBetween):
+    """A declared parameter is larger than the simulator says by what a channel makes of it.
+
+    ``first``, ``second`` and ``third`` are the changes at ``low``, in the middle and at ``high`` of
+    the channel ``over``, or of its size; between them runs the parabola through the three, beyond
+    the ends it stays what it is there, and the parameter stays within its bounds. A resistance
+    that rises as it warms, a damper that is stiffer in the middle. The channel counts as it truly
+    is at that instant, an input as it comes out of the actuator. In control, what a parameter
+    follows is called its scheduling variable (Toth, Modeling and Identification of Linear
+    Parameter-Varying Systems, 2010, 1.1).
+    """
+
+    parameter: str
+    over: str
+    first: Value = number(parameter=1, share=0.1)
+    second: Value = number(parameter=1, share=0.1)
+    third: Value = number(parameter=1, share=0.1)
+    low: Value = number(-1.0, role="fixed", channel=1)
+    high: Value = number(1.0, role="fixed", channel=1)
+    of_size: bool = False
+
+    name: ClassVar[str] = "parameter_curve"
+    sentence: ClassVar[str] = "A physical parameter that changes with a state or an input."
+    enters: ClassVar = "parameter"
+    needs: ClassVar[str] = "small and large values of what it changes with"
+    along: ClassVar[Along] = "channel"
+    gives: ClassVar[str] = "change"
+
+    @property
+    def where(self) -> str:
+        """The parameter and what it follows."""
+        return f"{self.parameter} over {self.by}"
+
+    @property
+    def by(self) -> str:  # type: ignore[override]
+        """The channel, ``|name|`` if its size counts."""
+        return f"|{self.over}|" if self.of_size else self.over
+
+    def contains(self, other: Effect) -> bool:
+        """A parameter that is off by a constant is a case of it."""
+        return isinstance(other, ParameterChange) and other.parameter == self.parameter
+
+    def changed(self, value: Value, x: Value, simulator: HostSimulator) -> Value:
+        """The parameter, ``value`` in the simulator, where the channel is ``x``, by row."""
+        bounds = simulator.parameters[self.parameter]
+        return np.clip(value + self.at(np.abs(x) if self.of_size else x), bounds.low, bounds.high)
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """Unit and size of the parameter, and unit and scale of the channel."""
+        if not simulator.written_out:
+            raise ValueError(f"{self.name} needs a system that is written as equations")
+        channels = {c.name: c for c in (*simulator.physical_channels, *simulator.action_channels)}
+        channel = place("channel", self.over, channels)
+        size = ParameterChange(self.parameter).measures(simulator)["parameter"]
+        return {"parameter": size, "channel": (channel.unit, channel.scale)}
+
+    def quantities(self, simulator: HostSimulator) -> dict[str, Quantity]:
+        """As for every effect; bounds keep the parameter within its own."""
+        found = super().quantities(simulator)
+        own = ParameterChange(self.parameter).quantities(simulator)["change"]
+        within = {name: dataclasses.replace(found[name], low=own.low, high=own.high)
+                  for name in self.strengths()}  # fmt: skip
+        return {**found, **within}

@@ -1,0 +1,112 @@
+"""What acts in a system that is written out as equations: its effects beside what its author wrote.
+
+States are joints first and rows last, as in ``sims.rows``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+from sims.effects.exchange import Exchange
+from sims.effects.flexible import flexible_parts
+from sims.effects.friction import DryFriction
+from sims.effects.inertia import AddedInertia
+from sims.effects.limit import RateLimit
+from sims.effects.parameter_curve import ParameterCurve
+from sims.effects.store import SecondStore, stores
+from sims.host import HostSimulator
+from sims.motion import Acceleration, DriveForce, Motion, carrying
+from sims.simulator import Array
+
+#: Where a channel stands: among positions (0), rates (1) or inputs (2), and its row there.
+Places = Mapping[str, tuple[int, int]]
+
+
+def motion_of(
+    host: HostSimulator,
+    names: Sequence[str],
+    places: Places,
+    acceleration: Acceleration,
+    drive_force: DriveForce,
+    span: Array | None = None,
+) -> Motion:
+    """How a system moves with its effects.
+
+    Args:
+        host: The system.
+        names: Its joints, in the order of rows.
+        places: Where its state channels stand.
+        acceleration, drive_force, span: See ``Motion``.
+    """
+    there = [effect for effect in host.effects if not effect.absent]
+    forces = [(names.index(e.joint), e) for e in host.joint_effects()]
+    flows: list[tuple[int, int, Exchange | SecondStore]] = [
+        (names.index(e.pair[0]), names.index(e.pair[1]), e)
+        for e in there
+        if isinstance(e, Exchange)
+    ]
+    flows += [(names.index(e.joint), len(names) + i, e) for i, e in enumerate(stores(host))]
+    states = len(names) + len(stores(host))
+    parts = [(names.index(e.joint), states + i, e) for i, e in enumerate(flexible_parts(host))]
+    added = {f"{e} {i}": e for i, e in enumerate(there) if isinstance(e, AddedInertia)}
+    inertia = {name: e.inertia for name, e in added.items()}
+    inputs = {channel.name: (2, k) for k, channel in enumerate(host.action_channels)}
+    curves = [e for e in there if isinstance(e, ParameterCurve)]
+    follow = _Following(host, curves, {**places, **inputs})
+    return Motion(
+        carrying(
+            follow.in_place(acceleration), {name: names.index(e.joint) for name, e in added.items()}
+        ),
+        follow.in_place(drive_force),
+        SimpleNamespace(**host.parameter_values(), **inertia, **follow.numbers()),
+        smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
+        dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
+        plays=tuple((names.index(e.joint), e) for e in host.plays()),
+        capped=tuple((names.index(e.joint), e) for e in there if isinstance(e, RateLimit)),
+        flows=tuple(flows),
+        parts=tuple(parts),
+        span=span,
+    )
+
+
+class _Following:
+    """Parameters that follow a state or an input.
+
+    The numbers of their curves are kept among the parameters, which are cut to rows as they are.
+    """
+
+    def __init__(
+        self, host: HostSimulator, curves: Sequence[ParameterCurve], places: Places
+    ) -> None:
+        self._host, self._curves, self._places = host, curves, places
+
+    def numbers(self) -> dict[str, Any]:
+        """Numbers of the curves by a name of their own."""
+        return {
+            f"{i} {field}": getattr(curve, field)
+            for i, curve in enumerate(self._curves)
+            for field in curve.numbers()
+        }
+
+    def in_place(self, written: Callable[..., Array]) -> Callable[..., Array]:
+        """What the author wrote, (q, v, u, ..., parameters), with parameters as they are there."""
+        if not self._curves:
+            return written
+
+        def varied(q: Array, v: Array, u: Array, *rest: Any) -> Array:
+            *given, p = rest
+            return written(q, v, u, *given, self._there((q, v, u), p))
+
+        return varied
+
+    def _there(self, at: tuple[Array, Array, Array], p: SimpleNamespace) -> SimpleNamespace:
+        values = dict(vars(p))
+        for i, curve in enumerate(self._curves):
+            own = {field: values[f"{i} {field}"] for field in curve.numbers()}
+            kind, row = self._places[curve.over]
+            values[curve.parameter] = curve.with_values(**own).changed(
+                values[curve.parameter], at[kind][row], self._host
+            )
+        return SimpleNamespace(**values)
