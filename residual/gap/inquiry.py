@@ -69,6 +69,7 @@ class Inquiry:
         return explain(
             simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort,
             seldom(self.tell), self.clock.search_until, beside, earlier, twins,
+            every_pair=earlier is None and not more,
         )  # fmt: skip
 
     def other_hold(

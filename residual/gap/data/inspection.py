@@ -219,9 +219,10 @@ def sums(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[F
                 found.append(Finding("derived", other.name, says, {}, "warning"))
             elif summed_up(values, rates, durations):
                 says = (
-                    f"is the running sum of {other.name}, noise included, and no measurement of "
-                    f"its own: its error grows with time. Declare it by integrates={other.name!r} "
-                    "on its channel, or leave it out of the log's columns"
+                    f"is the running sum of {other.name}, noise included, so that one of the two "
+                    "is no measurement of its own. If it was summed up, its error grows with time: "
+                    f"declare it by integrates={other.name!r} on its channel. If {other.name} was "
+                    "computed from it, leave that out of the log's columns"
                 )
                 found.append(Finding("integral", channel.name, says, {}, "warning"))
     return found

@@ -94,6 +94,7 @@ def explain(
     beside: Sequence[Candidate] = (),
     earlier: Search | None = None,
     twins: Twins | None = None,
+    every_pair: bool = True,
 ) -> Explanation:
     """Search, weigh the channels by what is left, search again, until nothing changes.
 
@@ -110,6 +111,7 @@ def explain(
         earlier: A search without these; its best sets are tried, too, so that none of them loses
             for not being asked.
         twins: Exact twins of what may be missing, by label.
+        every_pair: Whether every two effects are tried where there are few.
     """
 
     def begun(fitter: Fitter, floor: Noise) -> Search:
@@ -127,7 +129,8 @@ def explain(
                 search.add(carried(earlier, search))
             search.add(curves_in_place(search, near_best(search)))
         run(search, seeds, functools.partial(_quiet, search, floor))
-        if not (seeds or simulator.has_contacts or _quiet(search, floor, search.best())):
+        in_pairs = every_pair and not (seeds or simulator.has_contacts)
+        if in_pairs and not _quiet(search, floor, search.best()):
             every_two(search)
         best = near_best(search)
         fresh, floor = weigh(fitter, search.tried[best[0]])
