@@ -17,7 +17,7 @@ DOUBTS: dict[Doubt, str] = {
     "numerics": "its size changes with the integration step or with how the input is held",
     "at_bound": "its size lies at its bound",
     "clock": "the log does not tell its time well enough: late time stamps, an input that is held, "
-    "a filter in a sensor, or an input that came on earlier would do as well",
+    "a filter in a sensor, or an input that came on later would do as well",
     "conventions": "it has to be seen first whether the log counts as the simulator does",
     "cut_off": "it has to be seen first whether the simulator is meant to cut an input or a state "
     "off where it does",

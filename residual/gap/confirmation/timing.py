@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.search.sets import Search
+from sims.effects.actuator import Delay
 
 Array = NDArray[np.float64]
 
@@ -17,8 +18,8 @@ HELD = 0.75
 
 
 def untimed(search: Search, number: int, values: Array) -> bool:
-    """Whether an effect of the actuator is a time too short for the log's own clock, or of an input
-    that never changes, of which nobody knows when it came on.
+    """Whether an effect of the actuator is a time too short for the log's own clock, or delays an
+    input that never changes, of which nobody knows when it came on.
 
     Args:
         search: Holds the log.
@@ -33,7 +34,8 @@ def untimed(search: Search, number: int, values: Array) -> bool:
     clock = float(np.median(np.concatenate([run.durations for run in runs])))
     inputs = {channel.name: j for j, channel in enumerate(search.simulator.action_channels)}
     acting = [inputs[name] for name in getattr(candidate.effect, "actuators", ())]
-    if acting and not any(np.ptp(run.actions[:, acting], axis=0).any() for run in runs):
+    changes = any(np.ptp(run.actions[:, acting], axis=0).any() for run in runs)
+    if isinstance(candidate.effect, Delay) and not changes:
         return True
     straight = any(search.simulator.action_channels[j].hold == "linear" for j in acting)
     return min(times) < (HELD if straight else BRIEF) * clock
