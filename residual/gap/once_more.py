@@ -21,6 +21,7 @@ from residual.gap.answer.lone import (
     few_stretches,
     left_stretch,
     lone_stretch,
+    off_stretch,
 )
 from residual.gap.answer.varying import no_surer, worth_varying
 from residual.gap.fitting.smooth import SmoothFitter
@@ -83,7 +84,8 @@ class OnceMore:
         if lone:
             return known
         rest = left_stretch(known.answer)
-        says = rest.says(left_out=False) if rest else few_stretches(known.answer)
+        few = few_stretches(known.answer) or off_stretch(known.answer)
+        says = rest.says(left_out=False) if rest else few
         return known.and_says(says) if says else known
 
     def without_lone_stretch(self, known: Confirmed) -> Confirmed:

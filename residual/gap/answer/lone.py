@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from residual.gap.answer.confirmed import Answer
 from residual.gap.data.blocks import ENOUGH
 from residual.gap.fitting.contract import Fitter
+from residual.gap.fitting.forecasts import main_channel, noise_floor
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.fitting.validation import by_block
 from residual.gap.search.comparisons import takes_off
@@ -31,6 +32,9 @@ HARDLY = 0.7
 MUCH = 0.1
 #: Part of what is left that lies in a few blocks, how few of all that is, and how many are listed.
 NEARLY_ALL, FEW, LISTED = 0.8, 1 / 3, 4
+#: Error over that by noise of a block in which a simulator is clearly off, and up to which most are
+#: as good as right.
+OFF, NEAR = 2.0, 1.3
 #: Part of the motion over that of the error, from which on it may be the motion that is not known.
 MOVES = 0.5
 
@@ -115,6 +119,28 @@ def left_stretch(answer: Answer) -> Stretch | None:
     if left[block] <= MOST * left.sum() or left[block] < MUCH * stakes.sum():
         return None
     return _stretch(answer, block, left, beside=True)
+
+
+def off_stretch(answer: Answer) -> str:
+    """A sentence on the block in which the simulator is clearly off where the log as a whole shows
+    next to nothing; none if there is none, or something was named."""
+    if answer.key or not _many_blocks(answer):
+        return ""
+    search, floor = answer.found.search, answer.found.floor
+    alone = noise_floor(search.fitter, search.tried[()], floor.sigma)
+    measured, squares = search.fitter.samples.measured, search.before.squares
+    main = main_channel(search.simulator, measured, squares, alone)
+    times = np.sqrt(squares[:, main] / np.maximum(alone[:, main], 1e-300))
+    times = np.where(np.isfinite(times), times, 0.0)
+    block = int(np.argmax(times))
+    if times[block] < OFF or np.median(times) > NEAR:
+        return ""
+    one = _stretch(answer, block, squares[:, main])
+    return (
+        f"{one.run} from {moment(one.begin)} to {moment(one.end)}: the simulator errs "
+        f"{times[block]:.2g} times as much there as by noise, and elsewhere hardly more than that. "
+        "What is missing may show in motion of that kind alone: log more of it"
+    )
 
 
 def few_stretches(answer: Answer) -> str:

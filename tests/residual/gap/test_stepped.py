@@ -85,3 +85,15 @@ def test_when_an_input_came_on_that_never_changes_is_not_certain(late):
     timed = [v for v in result.verdicts if v.effect == "delay"]
     assert all(v.kind != "confirmed" for v in timed)
     assert timed and all("clock" in v.doubts for v in timed if v.kind == "ambiguous")
+
+
+def test_a_gap_that_a_single_stretch_shows_is_told():
+    """A step, and then nothing for long: forecasts err little more than by noise, all in all."""
+    times = 0.02 * np.arange(500)
+    duties = np.where(times < 0.2, 0.0, 1.0)
+    speeds = 20.0 * (1 - np.exp(-np.maximum(times - 0.2, 0.0) / 0.26))
+    noisy = speeds + 0.6 * np.random.default_rng(5).standard_normal(len(times))
+    result = find_gap(Wheel(), wheel(noisy, duties))
+    assert [v.kind for v in result.verdicts if v.kind != "needs_data"] == ["no_gap"]
+    (told,) = [text for text in result.quality if "as much there as by noise" in text]
+    assert told.startswith("run 0 from 0 s to ")
