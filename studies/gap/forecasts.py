@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 from residual.gap import GapResult
 from residual.gap.result import Gap, Rollout, Verdict
 from residual.trajectories import moment
-from sims.effects import Curve, CurveFromZero
+from sims.effects import Curve, CurveFromZero, ParameterCurve
 from studies.gap.figures import curve, drawn, lags, profile, rollout, shrinking
 from studies.gap.words import (
     CROSS_VALIDATED,
@@ -106,12 +106,16 @@ def curves(result: GapResult, folder: Path) -> list[Section]:
 
 def _curve(drawing: Drawing, verdict: Verdict, effect: Curve) -> Figure:
     what = f"{capitalized(drawn(effect))} at {verdict.where} by {effect.by}"
+    lacking = f"No law in the library comes near what was measured at {verdict.where}"
+    if isinstance(effect, ParameterCurve):
+        what = f"Change of {effect.parameter.replace('_', ' ')} with {effect.by}"
+        lacking = f"As a constant, {effect.parameter} leaves clearly more than noise"
     zero = " and zero" if isinstance(effect, CurveFromZero) else ""
     return Figure(
         drawing,
         f"{what}: what was found, with 95 % intervals.",
-        f"No law in the library comes near what was measured at {verdict.where}: this curve "
-        f"through {len(verdict.parameters)} points{zero} takes most of what they leave.",
+        f"{lacking}: this curve through {len(verdict.parameters)} points{zero} takes most of that "
+        "off.",
         heading=what,
     )
 
