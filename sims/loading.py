@@ -20,6 +20,7 @@ from simgap_files import safe_yaml
 from sims.effects.base import Effect
 from sims.effects.library import curves_in, library, parts_in
 from sims.effects.parameter import ParameterChange
+from sims.effects.parameter_curve import ParameterCurve
 from sims.host import HostSimulator
 from sims.model_files import model_settings, names_model
 from sims.simulator import Hold, Simulator
@@ -129,9 +130,10 @@ def chosen_effects(
         simulator: What hosts them.
         wanted: ``"library"``; effects of the library by name, ``"viscous_friction"`` or, at one
             place, ``"viscous_friction@pivot"``, parameters as ``"mass"``; a curve by points, as
-            ``"friction_curve"``, or a ``"flexible_part"``; a class of your own by
-            import path, ``"my_file.FanTorque"``, at every place that can host it or at one; or
-            ``class_path`` and ``init_args``; or an effect itself.
+            ``"friction_curve"`` or ``"parameter_curve@resistance over temp"``, or a
+            ``"flexible_part"``; a class of your own by import path, ``"my_file.FanTorque"``, at
+            every place that can host it or at one; or ``class_path`` and ``init_args``; or an
+            effect itself.
 
     Raises:
         ValueError: Something is not known, or cannot act in this simulator.
@@ -152,6 +154,9 @@ def chosen_effects(
             own = [e for e in (*known.values(), *reserve) if entry in (e.name, str(e))]
             if not own and entry in simulator.parameters:
                 own = [ParameterChange(entry)]
+            if name == ParameterCurve.name:
+                own = [ParameterCurve.named(where)]
+                own[0].measures(simulator)
             if not own and "." in name:
                 own = _placed(simulator, name, where)
         if not own:
@@ -177,10 +182,10 @@ def _placed(simulator: HostSimulator, path: str, where: str) -> list[Effect]:
     kind = _class(path)
     found, refused = [], ""
     for place in dict.fromkeys(places):
-        effect = kind(place)  # type: ignore[call-arg]
         try:
+            effect = kind(place)  # type: ignore[call-arg]
             effect.quantities(simulator)
-        except ValueError as error:
+        except (ValueError, TypeError) as error:  # no such place, or it wants more than that
             refused = str(error)
             continue
         found.append(effect)

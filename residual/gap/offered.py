@@ -13,6 +13,7 @@ from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.flexible import FlexiblePart
 from sims.effects.library import curves_in, library, parts_in
+from sims.effects.parameter_curve import ParameterCurve
 from sims.loading import LIBRARY, chosen_effects
 
 
@@ -58,7 +59,12 @@ class Offered:
         offered = chosen_effects(log.simulator, list(wanted))
         # Those by name have no range yet: the log gives it.
         without_range = curves_in(log.simulator)
-        asked = [e for e in offered if isinstance(e, Curve) and e in without_range]
+        asked = [
+            e
+            for e in offered
+            if isinstance(e, Curve)
+            and (e in without_range or (isinstance(e, ParameterCurve) and not e.ranged))
+        ]
         if asked and log.simulator.has_contacts:
             raise ValueError(
                 f"{asked[0]} is not looked for in what strikes the ground: leave it out of effects"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
@@ -55,6 +55,28 @@ class ParameterCurve(CurveBetween):
     def by(self) -> str:  # type: ignore[override]
         """The channel, ``|name|`` if its size counts."""
         return f"|{self.over}|" if self.of_size else self.over
+
+    @classmethod
+    def named(cls, where: str) -> Self:
+        """One by its place in words, ``"resistance over temp"`` or ``"drag over |wind|"``.
+
+        Raises:
+            ValueError: It is no parameter over a channel.
+        """
+        parameter, over, channel = where.partition(" over ")
+        if not over:
+            raise ValueError(
+                f"{cls.name}@{where}: write {cls.name}@PARAMETER over CHANNEL, |CHANNEL| if its "
+                "size counts"
+            )
+        sized = channel.startswith("|") and channel.endswith("|")
+        return cls(parameter, channel.strip("|") if sized else channel, of_size=sized)
+
+    @property
+    def ranged(self) -> bool:
+        """Whether it was told between which values its points lie."""
+        ends = {f.name: f.default for f in dataclasses.fields(self)}
+        return self.reach != (ends["low"], ends["high"])
 
     def contains(self, other: Effect) -> bool:
         """A parameter that is off by a constant is a case of it."""

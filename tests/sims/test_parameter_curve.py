@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from sims import Channel, EquationOfMotion, FirstOrderSystem, Parameter
 from sims.effects import ParameterChange, ParameterCurve, SecondStore
-from sims.loading import effect_settings
+from sims.loading import chosen_effects, effect_settings
 from sims.pendulum import Pendulum
 
 
@@ -110,6 +110,21 @@ def test_it_is_named_by_parameter_and_channel_and_kept_in_a_file():
     settings = effect_settings(curve)
     assert settings["class_path"] == "sims.effects.ParameterCurve"
     assert ParameterCurve(**settings["init_args"]) == curve
+
+
+def test_it_is_asked_for_by_parameter_and_channel():
+    swing = Swing()
+    (curve,) = chosen_effects(swing, ["parameter_curve@damping over |rate|"])
+    assert curve == ParameterCurve("damping", "rate", of_size=True)
+    for wanted, says in (
+        ("parameter_curve", "write parameter_curve@PARAMETER over CHANNEL"),
+        ("parameter_curve@damping", "write parameter_curve@PARAMETER over CHANNEL"),
+        ("parameter_curve@mass over rate", "no parameter 'mass'"),
+        ("parameter_curve@damping over heat", "no channel 'heat'"),
+        ("sims.effects.ParameterCurve@damping", "cannot act in Swing"),
+    ):
+        with pytest.raises(ValueError, match=says):
+            chosen_effects(swing, [wanted])
 
 
 def test_what_it_needs_is_said():

@@ -13,12 +13,14 @@ import numpy as np
 
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.left import much_is_left
+from residual.gap.data.levels import levels
 from residual.gap.fitting.smooth import SmoothFitter
 from sims.effects.actuator import ActuatorEffect, StaticActuatorEffect
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.curves import StateCurve
 from sims.effects.library import curves_in, library
+from sims.effects.parameter_curve import ParameterCurve
 from sims.host import HostSimulator
 
 #: Part of the values of a log between which a curve lies, where they were not measured.
@@ -101,6 +103,10 @@ def _values(curve: Curve, fitter: SmoothFitter, simulator: HostSimulator) -> tup
         acting = [inputs.index(name) for name in curve.actuators]
         commands = fitter.samples.actions[:, acting]
         return float(commands.min()), float(commands.max())
+    if isinstance(curve, ParameterCurve):
+        own = curve.over, curve.of_size
+        reach = {(one.channel, one.of_size): one.reach for one in levels(simulator, fitter.samples)}
+        return reach.get(own, (0.0, 0.0))
     joint = next(joint for joint in simulator.joints if joint.name == curve.where)
     names = [channel.name for channel in simulator.physical_channels]
     column = names.index(joint.rate if curve.along == "rate" and joint.rate else joint.position)

@@ -146,7 +146,7 @@ def _unused(
             return []
     says = (
         f"{simulator.name} stays the same whatever it is, although it changes in the log: use it "
-        "in the simulator, or leave it out there"
+        "in the simulator, or leave it there only for parameters that may change with it"
     )
     return [Finding("unused", channel.name, says, {}, "warning")]
 

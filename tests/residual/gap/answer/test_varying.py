@@ -1,6 +1,7 @@
 """A parameter that follows what was measured is named and added; it is not certain beside more."""
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 from trolley import Trolley
 from trolley import record as trolley
@@ -81,11 +82,22 @@ def test_a_parameter_that_nobody_asks_for_is_no_curve():
     assert not any(isinstance(effect, ParameterCurve) for effect in result.effects)
 
 
+def test_it_can_be_asked_for_over_what_the_log_holds():
+    records = [motor(seed, 0.0039) for seed in (1, 2)]
+    asked = "parameter_curve@resistance over temp"
+    result = find_gap(Motor(), records, effects=[asked, "coulomb_friction"])
+    (curve,) = result.effects
+    seen = np.concatenate([record.states[:, 1] for record in records])
+    assert str(curve) == asked
+    assert curve.reach == pytest.approx((seen.min(), seen.max()), rel=0.01)
+
+
 def test_beside_what_has_no_name_it_is_not_certain():
     records = [motor(seed, 0.0039, ripple=3e-3) for seed in (3, 4)]
-    result = find_gap(Motor(), records, effects=ASKED)
-    curves = [v for v in result.verdicts if v.effect == ParameterCurve.name]
-    assert all(v.kind == "ambiguous" and "law" in v.doubts for v in curves)
+    result = find_gap(Motor(), records, effects=("resistance", "coulomb_friction"))
+    (verdict,) = [v for v in result.verdicts if v.effect == ParameterCurve.name]
+    assert verdict.kind == "ambiguous" and "law" in verdict.doubts
+    assert "unexplained" in [v.kind for v in result.verdicts]
 
 
 def test_a_resistance_that_stays_is_no_curve():
