@@ -204,7 +204,8 @@ class OnceMore:
             return known
         if self._late:
             return known.and_says(
-                f"what is left may be {lacking}: there was no time to look, give more --minutes"
+                f"what is left may be {lacking}: there was no time to look, give more --minutes "
+                "(half of them are for searching, the rest is for confirming)"
             )
         self.inquiry.tell(f"once more with {what}")
         beside, offered = known.answer.found.search.beside, [*_curves(known), *more]
