@@ -23,8 +23,8 @@ from sims.effects.parameter_curve import ParameterCurve
 
 Array = NDArray[np.float64]
 
-#: Part of the loss that it has to leave at most.
-LESS = 0.95
+#: Part of the loss that it has to leave at most, and beside a remainder, which may favour either.
+LESS, CLEARLY_LESS = 0.95, 0.8
 
 
 def by_another_law(search: Search, key: Key, adequate: bool) -> frozenset[int]:
@@ -53,21 +53,24 @@ def by_another_law(search: Search, key: Key, adequate: bool) -> frozenset[int]:
                 continue
             if {number, other} <= found:
                 continue
-            if _explains_more(search, key, number, other, np.stack(courses)):
+            least = LESS if adequate else CLEARLY_LESS
+            if _explains_more(search, key, number, other, np.stack(courses), least):
                 found |= {number, other}
     # A curve follows whatever a law that is not the true one leaves.
     curves = {n for n in key if isinstance(search.candidates[n].effect, Curve)}
     return frozenset(found | curves if found else found)
 
 
-def _explains_more(search: Search, key: Key, number: int, other: int, courses: Array) -> bool:
-    """Whether a set without a member leaves clearly less if another one changes over one of the
-    courses, (k, n)."""
+def _explains_more(
+    search: Search, key: Key, number: int, other: int, courses: Array, part: float
+) -> bool:
+    """Whether a set without a member leaves that part at most if another one changes over one of
+    the courses, (k, n)."""
     fitter, rest = search.fitter, all_but(key, number)
     assert isinstance(fitter, SmoothFitter)
     if rest not in search.tried:
         return False
     fit, own = search.tried[rest], search.tried[key].merit
-    least = min(LESS * own, own - tie(search, key, rest))
+    least = min(part * own, own - tie(search, key, rest))
     moved = beside_starts(fit, fitter.columns(fit, [search.candidates[other]], courses))
     return any(beside(fit, [moved[..., [k]]], fitter.cap).loss < least for k in range(len(courses)))

@@ -38,4 +38,4 @@ def untimed(search: Search, number: int, values: Array) -> bool:
     if isinstance(candidate.effect, Delay) and not changes:
         return True
     straight = any(search.simulator.action_channels[j].hold == "linear" for j in acting)
-    return min(times) < (HELD if straight else BRIEF) * clock
+    return bool(min(times) < (HELD if straight else BRIEF) * clock)

@@ -55,7 +55,7 @@ def records(rows=400, count=2):
 
 
 def test_a_curve_that_turns_commands_round_is_told_and_not_certain():
-    answer = find_gap(Battery(), records())
+    answer = find_gap(Battery(), records(), minutes=4)
     named = {verdict.label: verdict for verdict in answer.verdicts if verdict.parameters}
     curve = named["input_curve@current"]
     assert curve.kind == "ambiguous" and "extreme" in curve.doubts
