@@ -84,8 +84,9 @@ class OnceMore:
         if lone:
             return known
         rest = left_stretch(known.answer)
-        few = few_stretches(known.answer) or off_stretch(known.answer)
-        says = rest.says(left_out=False) if rest else few
+        if rest:
+            return known.and_says(rest.says(left_out=False))
+        says = few_stretches(known.answer) or off_stretch(known.answer)
         return known.and_says(says) if says else known
 
     def without_lone_stretch(self, known: Confirmed) -> Confirmed:

@@ -57,7 +57,8 @@ def changing(answer: Answer, in_vain: Collection[ParameterCurve] = ()) -> Changi
         in_vain: Parameters that follow a channel, asked for in full and not named.
     """
     search = answer.found.search
-    courses = [one for one in courses_of(answer) if not any(one.makes(curve) for curve in in_vain)]
+    asked = {str(curve) for curve in in_vain}
+    courses = [one for one in courses_of(answer) if str(one.curve) not in asked]
     return next((one.told(search, search.tried[answer.key]) for one in courses), None)
 
 
@@ -103,13 +104,14 @@ class Course:
     level: Level | None
     fall: Fall
 
-    def makes(self, curve: ParameterCurve) -> bool:
-        """Whether it is of the parameter and channel of a curve."""
+    @property
+    def curve(self) -> ParameterCurve | None:
+        """It as an effect, over all that was measured; None of a gain, and along the records."""
         level, effect = self.level, self.one.effect
         if level is None or not isinstance(effect, ParameterChange):
-            return False
-        own = effect.parameter, level.channel, level.of_size
-        return own == (curve.parameter, curve.over, curve.of_size)
+            return None
+        curve = ParameterCurve(effect.parameter, level.channel, of_size=level.of_size)
+        return curve.suited_to(*level.reach)
 
     def told(self, search: Search, fit: Fit) -> Changing:
         """Its ends."""

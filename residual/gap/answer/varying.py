@@ -15,7 +15,6 @@ from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
 from sims.effects.curve import Curve
-from sims.effects.parameter import ParameterChange
 from sims.effects.parameter_curve import ParameterCurve
 
 Array = NDArray[np.float64]
@@ -43,14 +42,8 @@ def worth_varying(
     courses = [one for one in courses_of(answer) if one.level is not None]
     if not courses or not search.simulator.written_out:
         return []
-    found: list[ParameterCurve] = []
-    for one in courses:
-        level, effect = one.level, one.one.effect
-        near = one.fall.loss <= NEARLY * courses[0].fall.loss
-        asked = isinstance(effect, ParameterChange) and str(effect) in offered
-        if level is not None and near and asked:
-            curve = ParameterCurve(effect.where, level.channel, of_size=level.of_size)
-            found.append(curve.suited_to(*level.reach))
+    near = [one for one in courses if one.fall.loss <= NEARLY * courses[0].fall.loss]
+    found = [one.curve for one in near if one.curve and one.curve.parameter in offered]
     assert isinstance(search.fitter, SmoothFitter)
     fitter, fit = search.fitter, search.tried[answer.key]
     laws = [_moved(fitter, fit, curve) for curve in curves] if found else []

@@ -76,8 +76,8 @@ def _late(host: HostSimulator, samples: Samples, own: int) -> tuple[int, str] | 
             changes = np.flatnonzero((np.diff(held, axis=0) != 0).any(axis=1))
             left = np.cumsum(run.durations[::-1])[::-1][changes]
             arrive.append(left > effect.time)
-        changes = np.concatenate([[], *arrive])
-        if changes.size and changes.mean() <= ARRIVING:
+        in_time = np.concatenate([[], *arrive])
+        if in_time.size and in_time.mean() <= ARRIVING:
             return number, "most of what is commanded would come after its record has ended"
     return None
 
