@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sims.host import Joint
-from sims.simulator import ANGLES, Array, Channel
+from sims.simulator import Array, Channel
 
 
 def by_joint(found: Any, shape: tuple[int, ...], what: str, column: str = "q") -> Array:
@@ -38,8 +38,8 @@ def joint_of(rate: Channel, channels: Sequence[Channel]) -> Joint:
             f"channel {rate.name!r} has rate_of={rate.rate_of!r}, expected the name of its "
             f"position, one of {names or 'none that is declared'}"
         )
-    turns = position.angle or position.unit in ANGLES
-    return Joint(position.name, position.name, rate.name, "N m" if turns else "N")
+    force = "N" if position.turn is None else "N m"
+    return Joint(position.name, position.name, rate.name, force)
 
 
 def force_is_added(

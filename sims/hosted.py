@@ -5,6 +5,7 @@ States are joints first and rows last, as in ``sims.rows``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +14,7 @@ from sims.effects.exchange import Exchange
 from sims.effects.flexible import flexible_parts
 from sims.effects.friction import DryFriction
 from sims.effects.inertia import AddedInertia
+from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
 from sims.effects.parameter_curve import ParameterCurve
 from sims.effects.store import SecondStore, stores
@@ -41,7 +43,7 @@ def motion_of(
         acceleration, drive_force, span: See ``Motion``.
     """
     there = [effect for effect in host.effects if not effect.absent]
-    forces = [(names.index(e.joint), e) for e in host.joint_effects()]
+    forces = [(names.index(e.joint), e.where_turn_is(_turn(host, e))) for e in host.joint_effects()]
     flows: list[tuple[int, int, Exchange | SecondStore]] = [
         (names.index(e.pair[0]), names.index(e.pair[1]), e)
         for e in there
@@ -69,6 +71,13 @@ def motion_of(
         parts=tuple(parts),
         span=span,
     )
+
+
+def _turn(host: HostSimulator, effect: JointEffect) -> float:
+    """A whole turn in the unit of the joint that an effect acts on."""
+    positions = {joint.name: joint.position for joint in host.joints}
+    there = next(c for c in host.state_channels if c.name == positions[effect.joint])
+    return there.turn or math.tau
 
 
 class _Following:

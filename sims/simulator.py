@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 Hold = Literal["zero", "linear"]
 
-#: Units of angles.
-ANGLES = ("rad", "deg", "rev")
+#: Units of angles, and what a whole turn is in each.
+TURNS: Mapping[str, float] = {"rad": math.tau, "deg": 360.0, "rev": 1.0}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,6 +64,11 @@ class Channel:
                 "write the simulator in rad (a log may stay as it is, see its unit: under states), "
                 "or leave angle=True out and let the channel go on over whole turns"
             )
+
+    @property
+    def turn(self) -> float | None:
+        """A whole turn in the channel's unit; None of what does not turn."""
+        return TURNS.get(self.unit)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -131,7 +131,7 @@ def find_gap(
         with clock.besides():
             prepared, found, on_more = on_more_windows(prepared, found, clock.confirm_until, tell)
         chosen = [found.search.candidates[number].effect for number in found.key]
-        if conventions and not still_open(conventions, found.adequate, chosen):
+        if conventions and not still_open(conventions, simulator, found.adequate, chosen):
             conventions = None
         clock.lap("search")
 

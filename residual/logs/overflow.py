@@ -13,7 +13,7 @@ from residual.logs.checks import Finding
 from residual.logs.layout import LogFormat, named_column
 from residual.logs.timing import Run
 from residual.logs.units import find_unit
-from sims.simulator import Channel
+from sims.simulator import TURNS, Channel
 
 Array = NDArray[np.float64]
 
@@ -97,8 +97,8 @@ def jumps_by(values: Array, unit: str, factor: float) -> Jump | None:
         found += [
             Jump(float(2**bits), f"{2**bits}, as a counter of {bits} bits does,") for bits in BITS
         ]
-    if unit == "rad":
-        found.append(Jump(2 * np.pi / abs(factor), "a whole turn"))
+    if unit in TURNS:
+        found.append(Jump(TURNS[unit] / abs(factor), "a whole turn"))
     found = [jump for jump in found if np.ptp(values) < jump.period * (1 + 1e-6)]
     return next((jump for jump in found if _goes_on(steps, jump.period)), None)
 

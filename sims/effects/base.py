@@ -134,6 +134,7 @@ class Effect(abc.ABC):
         looks_like: What outside the library moves a system in the same way if the effect is in all
             its inputs, in words.
         creeps: True if it is a constant that is seldom one for long, as zeros of sensors are.
+        compound: True if its strengths are parts of one size, so that any one of them may be zero.
     """
 
     name: ClassVar[str]
@@ -147,6 +148,7 @@ class Effect(abc.ABC):
     holds_still: ClassVar[bool] = False
     drives: ClassVar[bool] = False
     creeps: ClassVar[bool] = False
+    compound: ClassVar[bool] = False
     looks_like: ClassVar[str] = ""
 
     @property

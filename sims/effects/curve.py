@@ -26,6 +26,7 @@ class Curve(Effect, abc.ABC):
         gives: What it gives there, in such words.
     """
 
+    compound: ClassVar[bool] = True
     along: ClassVar[Along]
     by: ClassVar[str]
     gives: ClassVar[str]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -43,6 +44,10 @@ class JointEffect(Effect):
     @abc.abstractmethod
     def force(self, q: Value, v: Value) -> Value:
         """Force on the joint, in its unit, at position ``q`` and rate ``v``, by row."""
+
+    def where_turn_is(self, turn: float) -> Self:
+        """The same where a whole turn is ``turn`` in the unit of ``q``, if it depends on turns."""
+        return self
 
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of force, position and rate at the joint."""
@@ -194,11 +199,16 @@ class Cogging(JointEffect):
     name: ClassVar[str] = "cogging"
     sentence: ClassVar[str] = "A torque that repeats a whole number of times per turn."
     needs: ClassVar[str] = "slow motion over a good part of a turn"
+    compound: ClassVar[bool] = True
     follows_rate: ClassVar[bool] = False
 
     def force(self, q: Value, v: Value) -> Value:
         """Torque at angle ``q``."""
         return self.sine * np.sin(self.order * q) + self.cosine * np.cos(self.order * q)
+
+    def where_turn_is(self, turn: float) -> Self:
+        """The same of an angle that counts otherwise, so that the order is no whole number."""
+        return dataclasses.replace(self, order=self.order * (math.tau / turn))
 
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """As for every joint effect; the joint has to turn."""
@@ -206,6 +216,6 @@ class Cogging(JointEffect):
         joint = next(joint for joint in simulator.joints if joint.name == self.joint)
         channels = {channel.name: channel for channel in simulator.state_channels}
         position = channels[joint.position]
-        if not (position.angle or position.unit == "rad"):
+        if position.turn is None:
             raise ValueError(f"cogging needs a joint that turns; {self.joint!r} slides")
         return found

@@ -11,7 +11,7 @@ import numpy as np
 
 from sims.effects.base import Effect, number, place
 from sims.effects.joint import Value
-from sims.simulator import ANGLES
+from sims.simulator import TURNS
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
@@ -84,4 +84,4 @@ def follows_command(simulator: HostSimulator, joint: str) -> bool:
 
 def _kind(unit: str) -> str:
     """A unit, or one for all that measure angles."""
-    return "rad" if unit in ANGLES else unit
+    return "rad" if unit in TURNS else unit

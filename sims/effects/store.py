@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from sims.effects.base import Effect, number, place
 from sims.effects.joint import Value
-from sims.simulator import ANGLES, Channel
+from sims.simulator import Channel
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
@@ -58,7 +58,7 @@ class SecondStore(Effect):
 def is_stored(channel: Channel) -> bool:
     """Whether a state may be of something that is stored: no angle, no speed, and no coordinate
     that nothing depends on."""
-    moves = channel.angle or channel.unit in ANGLES or channel.unit == "rpm"
+    moves = channel.turn is not None or channel.unit == "rpm"
     return not (moves or channel.invariant or channel.unit.endswith("/s"))
 
 

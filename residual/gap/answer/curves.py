@@ -22,11 +22,10 @@ from sims.effects.curves import StateCurve
 from sims.effects.library import curves_in, library
 from sims.effects.parameter_curve import ParameterCurve
 from sims.host import HostSimulator
+from sims.simulator import TURNS
 
 #: Part of the values of a log between which a curve lies, where they were not measured.
 MOST = 0.99
-#: Angle beyond which a force by angle would count turns.
-TURN = 2 * np.pi
 
 
 def curves_for(simulator: HostSimulator, offered: Collection[str]) -> tuple[Curve, ...]:
@@ -92,8 +91,10 @@ def _of_its_kind(curve: Curve, effect: Effect) -> bool:
 
 def _counts_turns(curve: Curve, simulator: HostSimulator, width: float) -> bool:
     """Whether a force by angle spans more than one turn."""
-    by_angle = curve.along == "position" and curve.measures(simulator)["position"][0] == "rad"
-    return by_angle and width > TURN
+    if curve.along != "position":
+        return False
+    turn = TURNS.get(curve.measures(simulator)["position"][0])
+    return turn is not None and width > turn
 
 
 def _values(curve: Curve, fitter: SmoothFitter, simulator: HostSimulator) -> tuple[float, float]:

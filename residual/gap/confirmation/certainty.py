@@ -22,7 +22,6 @@ from residual.gap.search.comparisons import AT_ONE, no_match
 from residual.gap.search.exchange import exchanged, split
 from residual.gap.search.sets import Key, Search, all_but
 from residual.gap.search.significance import BETTER, score, tie
-from sims.effects.curve import Curve
 
 Array = NDArray[np.float64]
 
@@ -65,9 +64,8 @@ def claims(
         form, alike, rivals = near(search, key, number, adequate)
         twins = tuple(name for name in groups.get(label, ()) if name != label)
         strengths = [j for j in own if fit.model.knobs[j].strength] or own
-        # A point of a curve may well lie near zero.
-        curved = isinstance(search.candidates[number].effect, Curve)
-        least = float(np.abs(fit.theta[strengths]).max()) if curved else 0.0
+        compound = search.candidates[number].effect.compound
+        least = float(np.abs(fit.theta[strengths]).max()) if compound else 0.0
         numbers = {fit.model.knobs[j].field: bounded(fit, j, half[j], numerics) for j in own}
         for j, ends in on_the_way(search, key, number).items():
             field = fit.model.knobs[j].field
@@ -87,7 +85,7 @@ def claims(
                     survives(fit.theta[j], half[j], [n[j] for n in limits], least)
                     for j in strengths
                 ),
-                any(ended(fit, j) for j in (strengths if curved else own)),
+                any(ended(fit, j) for j in (strengths if compound else own)),
                 taken,
                 brief=untimed(search, number, fit.theta[own]),
                 sensor=not adequate and not twins and of_doubtful_sensor(search, key, place),

@@ -63,9 +63,10 @@ def on_the_way(search: Search, key: Key, number: int) -> dict[int, tuple[float, 
         return {}
     if len(fitter.blocks) < FEW:
         return {}
-    course, found = along_windows(search), {}
-    for j in _strengths(fit, key.index(number)):
-        if change := change_over(fit, fitter.blocks.block, j, course, CHANCE):
+    course, found, own = along_windows(search), {}, _strengths(fit, key.index(number))
+    least = float(np.abs(fit.theta[own]).max()) if effect.compound else 0.0
+    for j in own:
+        if change := change_over(fit, fitter.blocks.block, j, course, CHANCE, least):
             knob, size = fit.model.knobs[j], float(fit.theta[j])
             begin, end = np.clip([size - change / 2, size + change / 2], knob.low, knob.high)
             found[j] = (float(begin), float(end))
@@ -106,13 +107,15 @@ def _courses(search: Search) -> Iterator[Array]:
             yield own.astype(float)
 
 
-def change_over(fit: Fit, block: NDArray[np.int64], j: int, course: Array, chance: float) -> float:
+def change_over(
+    fit: Fit, block: NDArray[np.int64], j: int, course: Array, chance: float, least: float = 0.0
+) -> float:
     """How much a number changes over a course over the windows; 0 if it does not clearly do so, or
-    by less than a part of itself.
+    by less than a part of itself, or of ``least``, the size that it is a part of.
     """
     column = (fit.by_knob[..., j] * course[:, None])[..., None]
     change = clear_number(fit, block, column, chance)
-    return change if abs(change) > SAME * abs(float(fit.theta[j])) else 0.0
+    return change if abs(change) > SAME * max(abs(float(fit.theta[j])), least) else 0.0
 
 
 def clear_number(fit: Fit, block: NDArray[np.int64], more: Array, chance: float) -> float:

@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 FAR, NEAR = 50.0, 4.0
 #: A scale that nobody declared.
 UNDECLARED = 1.0
-#: A turn by unit, how nearly a jump has to be one, and the share of it that no other step reaches.
-TURNS, ALMOST, SMALL = {"deg": 360.0, "rad": 2 * np.pi}, 0.03, 0.3
+#: How nearly a jump has to be a turn, and the share of it that no other step reaches.
+ALMOST, SMALL = 0.03, 0.3
 
 
 def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
@@ -86,7 +86,7 @@ def wrapped(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
     """Angles that jump by a turn, of channels that do not say that they are angles."""
     found = []
     for channel, runs in measured(simulator, trajectories):
-        turn = TURNS.get(channel.unit)
+        turn = channel.turn
         if turn is None or channel.angle:
             continue
         steps = [np.abs(np.diff(values)) for values in runs]

@@ -101,7 +101,8 @@ def within_reach(
     if column not in samples.measured:
         return known
     low, high = measured_range(samples, column)
-    scale = simulator.physical_channels[column].scale
+    channel = simulator.physical_channels[column]
+    scale, turn = channel.scale, channel.turn
     reach = max(1.0, max(abs(low), abs(high)) / scale)
     beyond = max(high - low, scale)
     found = {}
@@ -109,9 +110,9 @@ def within_reach(
         quantity = known.get(field.name)
         if quantity is None:
             continue
-        if quantity.integer and field.metadata["dimension"] == {"turn": 1}:
+        if turn is not None and field.metadata["dimension"] == {"turn": 1}:
             # Of less than a whole period no law is to be seen: it could pass for any force.
-            whole = tuple(times for times in quantity.starts if times * (high - low) >= 2 * np.pi)
+            whole = tuple(times for times in quantity.starts if times * (high - low) >= turn)
             quantity = dataclasses.replace(quantity, starts=whole)
         if quantity.role == "shape" and field.metadata["dimension"] == {"position": 1}:
             quantity = dataclasses.replace(

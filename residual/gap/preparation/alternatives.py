@@ -17,8 +17,8 @@ from sims.simulator import Channel
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
-#: Zeros from which angles are counted.
-QUARTERS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
+#: Zeros from which angles are counted, in turns.
+QUARTERS = (0.0, 0.25, 0.5, -0.25)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,6 +31,7 @@ class Convention:
         inputs: The same of every input, (2, n_a).
         states_from: Which column every state is read from, (n_s,).
         inputs_from: The same of every input, (n_a,).
+        turned: Whether nothing but the zero of an angle is another one, and perhaps its direction.
     """
 
     says: str
@@ -38,21 +39,13 @@ class Convention:
     inputs: Array
     states_from: Places
     inputs_from: Places
+    turned: bool = False
 
     @property
     def sign(self) -> bool:
         """Whether nothing but signs is another one."""
         factors, offsets = np.hstack([self.states, self.inputs])
         return bool((factors == -1).any() and (np.abs(factors) == 1).all() and not offsets.any())
-
-    @property
-    def turned(self) -> bool:
-        """Whether nothing but the zero of an angle is another one, and perhaps its direction."""
-        (factors, offsets), (gains, biases) = self.states, self.inputs
-        quarters = np.isin(np.abs(offsets), np.abs(QUARTERS[1:]))
-        alike = (np.abs(factors) == 1).all() and (gains == 1).all()
-        places = np.count_nonzero(offsets) + np.count_nonzero(biases)
-        return bool(alike and quarters.sum() == 1 == places)
 
     @property
     def exchanged(self) -> bool:
@@ -131,15 +124,17 @@ def _turned(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
     """Counted the other way round, or from a quarter or half turn away."""
     channels = [simulator.physical_channels[i] for i in joint]
     first = channels[0]
-    turns = (first.angle or first.unit == "rad") and first.kind == "position"
+    turn = first.turn if first.kind == "position" else None
     found = []
-    for sign, zero in itertools.product((1.0, -1.0), QUARTERS if turns else QUARTERS[:1]):
+    for sign, share in itertools.product((1.0, -1.0), QUARTERS[: 1 if turn is None else None]):
+        zero = share * (turn or 0.0)
         changes = [f"`offset: {zero:.6g}`"] if zero else []
         changes += ["`scale: -1`"] if sign < 0 else []
         names = [channel.name for channel in (channels if sign < 0 else channels[:1])]
         if changes:
             says = f"{' and '.join(changes)} for {' and '.join(names)}"
-            found.append(_of_states(simulator, says, joint, sign, zero))
+            plain = _of_states(simulator, says, joint, sign, zero)
+            found.append(dataclasses.replace(plain, turned=bool(zero)))
     return found
 
 
@@ -233,4 +228,4 @@ def as_said(simulator: HostSimulator) -> Convention:
     """As the log is said to count."""
     sizes = len(simulator.physical_channels), len(simulator.action_channels)
     states, inputs = (np.vstack([np.ones(n), np.zeros(n)]) for n in sizes)
-    return Convention("", states, inputs, *(np.arange(n) for n in sizes))
+    return Convention("", states, inputs, np.arange(sizes[0]), np.arange(sizes[1]))

@@ -9,6 +9,7 @@ changed.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Collection, Sequence
 from typing import Literal
 
@@ -54,8 +55,8 @@ HIDDEN, CLEARLY = 0.1, 4.0
 #: Times the declared scale of an input from which on it is asked whether it is in another unit, and
 #: how near to that scale it has to be then; what is declared if nothing is.
 BEYOND, NEAR, UNDECLARED = 100.0, 10.0, 1.0
-#: Offset of an angle from which on another quarter turn is nearer than its zero.
-NEXT = np.pi / 4
+#: Offset of an angle, in turns, from which on another quarter turn is nearer than its zero.
+NEXT = 0.125
 #: Windows that are looked at: all rows at once, and row by row.
 AT_ONCE, BY_ROW = 120, 20
 #: Error of a window in those units beyond which it is just wrong.
@@ -100,7 +101,9 @@ def otherwise(
     return Conventions(tuple(one.says for one in alike), own / least, reason)
 
 
-def still_open(conventions: Conventions, adequate: bool, found: Sequence[Effect]) -> bool:
+def still_open(
+    conventions: Conventions, simulator: HostSimulator, adequate: bool, found: Sequence[Effect]
+) -> bool:
     """Whether conventions are to be asked for in spite of what was found.
 
     What stands upright in a loop runs away in every forecast that misses something, and would err
@@ -108,11 +111,17 @@ def still_open(conventions: Conventions, adequate: bool, found: Sequence[Effect]
 
     Args:
         conventions: With which the nominal simulator forecasts better.
+        simulator: The nominal simulator.
         adequate: Whether what was found leaves only noise.
         found: Its effects.
     """
     zero = conventions.reason == "zero"
-    zeros = [float(np.max(np.abs(e.offset))) for e in found if isinstance(e, SensorOffset)]
+    turns = {channel.name: channel.turn for channel in simulator.physical_channels}
+    zeros = [
+        float(np.max(np.abs(e.offset))) / (turns.get(e.channel) or math.tau)
+        for e in found
+        if isinstance(e, SensorOffset)
+    ]
     return not (zero and adequate) or max(zeros, default=0.0) > NEXT
 
 

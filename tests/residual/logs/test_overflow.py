@@ -96,3 +96,9 @@ def test_a_period_that_the_times_contradict_is_refused(tmp_path):
     assert read_logs([path], COUNTS, (), LogFormat(period=0.01)).trajectories
     with pytest.raises(LogError, match=r"period is 0\.02 s, .* 0\.01 s apart: leave out period"):
         read_logs([path], COUNTS, (), LogFormat(period=0.02))
+
+
+def test_an_encoder_in_degrees_goes_on_over_its_turns():
+    turning = np.cumsum(np.full(200, 7.0)) % 360.0
+    assert jumps_by(turning, "deg", 1.0).period == 360.0
+    assert jumps_by(turning, "m", 1.0) is None

@@ -194,13 +194,15 @@ def test_what_is_explained_does_not_hang_by_a_zero():
     told, samples = otherwise(simulator, fitter), fitter.samples
     assert told is not None and told.reason == "zero"
     friction, offset = CoulombFriction("pivot", 0.01), SensorOffset("angle", np.pi)
-    assert still_open(told, False, [friction]) and still_open(told, True, [offset])
-    assert not still_open(told, True, [friction, SensorScale("angle", 0.01)])
-    assert not still_open(told, True, [SensorOffset("angle", 0.01)])
+    assert still_open(told, simulator, False, [friction])
+    assert still_open(told, simulator, True, [offset])
+    assert not still_open(told, simulator, True, [friction, SensorScale("angle", 0.01)])
+    assert not still_open(told, simulator, True, [SensorOffset("angle", 0.01)])
     # With its direction it is a zero, too; a direction alone is none.
     kinds = {one.says: one.turned for one in conventions(simulator, samples, ())}
     zeros = {says for says, turned in kinds.items() if turned}
     assert "`offset: 3.14159` and `scale: -1` for angle and rate" in zeros
     assert "`scale: -1` for angle and rate" not in zeros and "`scale: -1` for voltage" not in zeros
     # A unit that is wrong is made up for by a gain, down to the noise.
-    assert still_open(Conventions(("`unit: mV` for voltage",), 9.0), True, [friction])
+    mistaken = Conventions(("`unit: mV` for voltage",), 9.0)
+    assert still_open(mistaken, simulator, True, [friction])
