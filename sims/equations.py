@@ -6,7 +6,7 @@ import abc
 import dataclasses
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -60,6 +60,13 @@ class _Equations(HostSimulator):
         if effects:
             hosted = self.with_effects(effects)
             self.effects, self.state_channels = hosted.effects, hosted.state_channels
+
+    def with_scales(self, scales: Mapping[str, float]) -> Self:
+        """See ``HostSimulator.with_scales``; joints that are not named go with their states."""
+        changed = super().with_scales(scales)
+        if not hasattr(type(self), "joints"):
+            changed.joints = changed._own_joints()
+        return changed
 
     @abc.abstractmethod
     def _own_joints(self) -> tuple[Joint, ...]:

@@ -86,10 +86,8 @@ class HostSimulator(Simulator):
         return None
 
     def smooth_states(self, n: int, rng: np.random.Generator) -> Array:
-        """Random physical states where a small change has a small effect, (n, n_physical).
-
-        By default within the scales of the channels, angles anywhere; away from contacts.
-        """
+        """Random physical states where a small change has a small effect, (n, n_physical): within
+        the scales of the channels, angles anywhere, away from contacts."""
         return np.stack([random_values(c, n, rng) for c in self.physical_channels], axis=1)
 
     def for_motion(self, paths: Sequence[Array]) -> Self:
@@ -135,6 +133,15 @@ class HostSimulator(Simulator):
             effect.measures(changed)
         changed.state_channels += tuple(memory_channels(changed))
         return changed
+
+    def with_scales(self, scales: Mapping[str, float]) -> Self:
+        """A copy whose physical states are of other typical sizes, by name."""
+        changed = copy.copy(self)
+        changed.state_channels = tuple(
+            dataclasses.replace(channel, scale=scales.get(channel.name, channel.scale))
+            for channel in self.physical_channels
+        )
+        return changed.with_effects(self.effects)
 
     def with_parameters(self, **values: float | Array) -> Self:
         """A copy with some parameters changed.
@@ -255,20 +262,17 @@ class HostSimulator(Simulator):
             actions: shape (T, n_a), the command at the start of each sample interval.
             durations: shape (T,), lengths of the intervals in seconds.
             substeps: Sub-steps per interval; by default the simulator's own.
-            hold: Whether a command is held over its interval (``"zero"``) or runs straight to
-                the next (``"linear"``): one for all inputs or one for each; by default what
-                every channel says.
+            hold: How commands run between samples, see ``Channel``: one for all inputs or one
+                for each; by default what every channel says.
             before: shape (k, n_a), earlier commands, as far apart as the first interval is
                 long; without them the input is taken to have had its first value.
-            rises: Whether to tell how the input runs within sub-steps too. ``integrate`` is
-                then more accurate after jumps between sub-steps, with lags, and with
-                ``hold="linear"``.
+            rises: Whether to tell how the input runs within sub-steps, too: ``integrate`` is
+                then more accurate after jumps, with lags, and with ``hold="linear"``.
             begins: Rows at which another record begins: nothing from before is remembered.
 
         Returns:
-            Mean input of each sub-step, shape (T, substeps, n_a), or, if values of actuator
-            effects are arrays of length V, (V, T, substeps, n_a); with ``rises`` a last
-            axis of 2 is added, for mean and rise.
+            Mean input of each sub-step, shape (T, substeps, n_a), with V values of actuator
+            effects (V, T, substeps, n_a); with ``rises`` a last axis of 2, for mean and rise.
 
         Raises:
             ValueError: The shapes do not fit, or a duration is not positive.
@@ -284,15 +288,10 @@ class HostSimulator(Simulator):
         return through_sensors(self, states, forward=False)
 
     def augment(self, states: ArrayLike, actions: ArrayLike | None = None) -> Array:
-        """Physical states with a sensible memory of the effects appended.
+        """Physical states (n, n_physical) with a sensible memory of the effects appended, (n, n_s).
 
-        Args:
-            states: shape (n, n_physical).
-            actions: shape (n, n_a): the command that has been applied so far; zero if None.
-
-        Returns:
-            shape (n, n_s). Delays hold that command, lags have reached it, and every play is
-            closed on the side that the drive pushes to.
+        Delays hold the command ``actions`` (n, n_a) that has been applied so far (None: zero), lags
+        have reached it, and every play is closed on the side that the drive pushes to.
         """
         states = np.asarray(states, float)
         if actions is None:

@@ -18,6 +18,10 @@ Hold = Literal["zero", "linear"]
 TURNS: Mapping[str, float] = {"rad": math.tau, "deg": 360.0, "rev": 1.0}
 
 
+#: Scale of a channel that declares none.
+UNDECLARED = 1.0
+
+
 @dataclasses.dataclass(frozen=True)
 class Channel:
     """One named, unit-carrying column of a state or an action.
@@ -50,7 +54,7 @@ class Channel:
     kind: Literal["position", "rate", "input", "other", "memory"]
     angle: bool = False
     rate_of: str | None = None
-    scale: float = 1.0
+    scale: float = UNDECLARED
     low: float = -math.inf
     high: float = math.inf
     invariant: bool = False

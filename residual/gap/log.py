@@ -10,6 +10,7 @@ import numpy as np
 from residual.gap.data.copies import shared
 from residual.gap.data.examine import examine
 from residual.gap.data.excerpt import excerpt
+from residual.gap.data.scales import in_measured_scales
 from residual.gap.preparation.horizon import held_by_records, usual_horizon
 from residual.gap.preparation.numerics import stride_for
 from residual.gap.preparation.prepare import Prepared, prepare
@@ -70,6 +71,7 @@ def look(
         for copy, first in shared(held, trajectories)[:1]
     ]
     every = examined.trajectories
+    simulator = in_measured_scales(simulator, every)
     length = (
         held_by_records(simulator, every, horizon) if horizon else usual_horizon(simulator, every)
     )

@@ -50,7 +50,9 @@ def kinematics(
             continue
         (scale, error), (other, _) = seen.scale(seen.integral), seen.scale(seen.roughly)
         # Two rules that disagree say that the sampling is too coarse for this check.
-        if abs(scale - other) < 0.25 * abs(scale - 1) and abs(scale - 1) > max(4 * error, 0.005):
+        agree = abs(scale - other) < 0.25 * abs(scale - 1)
+        clear = abs(scale - 1) > max(4 * error, 0.005)
+        if agree and clear and not seen.by_zero(scale, error):
             says = (
                 f"changes {scale:.4f} times as much as the integral of {channel.name}: "
                 f"{channel.name} was multiplied by {scale:.4f}"
@@ -121,6 +123,15 @@ class _Stretches:
         step = float(np.median([np.median(run.durations) for run in runs]))
         moved, integral, roughly, faster = np.array(rows).T
         return cls(moved, integral, roughly, faster, of_x, of_v, step)
+
+    def by_zero(self, scale: float, error: float) -> bool:
+        """Whether a scale is that of a rate whose zero is off, so that another one is found of how
+        stretches differ."""
+        middle = self.moved.mean(), self.integral.mean()
+        centred = dataclasses.replace(self, moved=self.moved - middle[0])
+        own, its = centred.scale(self.integral - middle[1])
+        apart = max(4 * float(np.hypot(error, its)), 0.25 * abs(scale - 1))
+        return bool(np.isfinite(its) and abs(own - scale) > apart)
 
     def scale(self, z: Array) -> tuple[float, float]:
         """Change of the position per integral of the rate, with its standard error."""

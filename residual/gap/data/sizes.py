@@ -12,15 +12,13 @@ from residual.logs.checks import Finding
 from residual.logs.units import other_units
 from residual.trajectories import Trajectory, moment
 from sims.host import HostSimulator
-from sims.simulator import Channel
+from sims.simulator import UNDECLARED, Channel
 
 Array = NDArray[np.float64]
 
 #: Times the size that a channel declares, or part of it, from which on another unit is asked after,
 #: and how near to that size values have to be in it.
 FAR, NEAR = 50.0, 4.0
-#: A scale that nobody declared.
-UNDECLARED = 1.0
 #: How nearly a jump has to be a turn, and the share of it that no other step reaches.
 ALMOST, SMALL = 0.03, 0.3
 

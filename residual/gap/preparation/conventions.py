@@ -35,6 +35,7 @@ from residual.logs.units import other_units
 from sims.effects.base import Effect
 from sims.effects.sensor import SensorOffset
 from sims.host import HostSimulator
+from sims.simulator import UNDECLARED
 
 Array = NDArray[np.float64]
 
@@ -53,8 +54,8 @@ ABSURD = 1.25
 #: what swings by itself hides a reversed input.
 HIDDEN, CLEARLY = 0.1, 4.0
 #: Times the declared scale of an input from which on it is asked whether it is in another unit, and
-#: how near to that scale it has to be then; what is declared if nothing is.
-BEYOND, NEAR, UNDECLARED = 100.0, 10.0, 1.0
+#: how near to that scale it has to be then.
+BEYOND, NEAR = 100.0, 10.0
 #: Offset of an angle, in turns, from which on another quarter turn is nearer than its zero.
 NEXT = 0.125
 #: Windows that are looked at: all rows at once, and row by row.

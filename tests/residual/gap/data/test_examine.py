@@ -277,3 +277,12 @@ def test_a_coarse_encoder_is_no_reason_to_blame_the_rate(step):
     noisy = coarse + np.random.default_rng(0).standard_normal(coarse.shape) * np.array([0.0, 0.02])
     coarse = dataclasses.replace(run, states=noisy)
     assert kinematics(PendulumEquation(), [coarse])[1] == []
+
+
+@pytest.mark.parametrize("bias", [0.3, -0.8])
+def test_a_rate_whose_zero_is_off_is_not_on_another_scale(bias):
+    """A gyro's bias is an effect of the library; a scale that makes up for it would hide it."""
+    (run,) = swings(1.0)
+    wandering = run.states + np.stack([0.5 * run.times, np.full(501, 0.5 + bias)], axis=1)
+    logs = [dataclasses.replace(run, states=wandering)]
+    assert kinematics(PendulumEquation(), logs) == (logs, [])
