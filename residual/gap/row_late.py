@@ -21,6 +21,7 @@ from residual.gap.model.model import Model
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.search.explain import Explanation
 from residual.trajectories import Trajectory
+from sims.effects.actuator import ActuatorLag, Delay
 from sims.host import HostSimulator
 
 #: Times that forecasts have to be better with inputs a row earlier to ask, and to say so.
@@ -77,7 +78,7 @@ def a_row_earlier(
     tell("every input a row earlier fits better: once more so")
     again = explained(nominal, ready)
     after = forecast_error(again.search, again.key)
-    if BETTER**2 * after >= before:
+    if BETTER**2 * after >= before or _late_by_a_row(again, earlier.runs):
         return read
     if again.adequate or CLEARLY**2 * after < before:
         says = (
@@ -100,6 +101,18 @@ def _error(ready: Prepared, nominal: HostSimulator, found: Explanation) -> float
         squares = validate(ready.fitter, again).squares
         errors.append(in_spreads(ready.fitter.samples, squares))
     return min(errors)
+
+
+def _late_by_a_row(found: Explanation, runs: Sequence[Trajectory]) -> bool:
+    """Whether what was found with inputs a row earlier makes one of them late by that row again."""
+    row = float(np.median(np.concatenate([run.durations for run in runs])))
+    fit = found.search.tried[found.key]
+    added = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
+    return any(
+        isinstance(effect, Delay | ActuatorLag)
+        and any(getattr(effect, name) >= row for name in effect.strengths())
+        for effect in added
+    )
 
 
 def _shifted(runs: Sequence[Trajectory]) -> tuple[Trajectory, ...]:

@@ -9,6 +9,7 @@ from oven import GAIN, SLOW, Oven
 from residual.gap import find_gap, row_late
 from residual.gap.beside import Conventions
 from residual.trajectories import Trajectory
+from sims.effects import ActuatorLag, Delay
 from studies.gap import lead
 
 ROWS, HOLD, STEP = 400, 10, 5.0
@@ -54,12 +55,17 @@ def test_another_time_constant_is_no_late_row():
     assert any(v.effect == "slow" for v in result.verdicts if v.kind == "confirmed")
 
 
-def answers(monkeypatch, before, after, adequate=False):
+def answers(monkeypatch, before, after, adequate=False, effects=()):
     """What is made of errors as the log is said to be and with inputs a row earlier."""
-    found = SimpleNamespace(search="said", key=(), adequate=False)
-    again = SimpleNamespace(search="earlier", key=(), adequate=adequate)
+    model = SimpleNamespace(simulator=Oven(), bind=lambda theta: Oven(effects=effects))
+    fit = SimpleNamespace(model=model, theta=np.zeros(0))
+    searches = [SimpleNamespace(name=name, tried={(): fit}) for name in ("said", "earlier")]
+    found, again = (
+        SimpleNamespace(search=search, key=(), adequate=enough)
+        for search, enough in zip(searches, (False, adequate), strict=True)
+    )
     errors = {"said": before, "earlier": after}
-    monkeypatch.setattr(row_late, "forecast_error", lambda search, key: errors[search])
+    monkeypatch.setattr(row_late, "forecast_error", lambda search, key: errors[search.name])
     monkeypatch.setattr(row_late, "_error", lambda *given: after)
     monkeypatch.setattr(row_late, "prepare", lambda *given: "ready")
     log = SimpleNamespace(runs=(record(True),), recorded=(record(True),), apart=(), horizon=1.0)
@@ -81,6 +87,13 @@ def test_clearly_better_is_read_so_a_little_better_is_told_first_and_else_nothin
     for after in (0.6, 1.2):
         same = answers(monkeypatch, 1.0, after, adequate=True)
         assert same.conventions is None and not same.says and same.prepared == "as said"
+
+
+@pytest.mark.parametrize("kind", [Delay, ActuatorLag])
+def test_what_is_late_by_a_row_again_was_not_logged_a_row_late(monkeypatch, kind):
+    """A filter in a sensor was a delay by a row and more, of inputs taken a row earlier."""
+    assert not answers(monkeypatch, 1.0, 0.3, effects=[kind("duty", 1.4 * STEP)]).says
+    assert answers(monkeypatch, 1.0, 0.3, effects=[kind("duty", 0.4 * STEP)]).says
 
 
 def test_what_is_told_first_names_the_columns():
