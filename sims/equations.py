@@ -12,7 +12,7 @@ import numpy as np
 
 from sims.authored import by_joint, force_is_added, joint_of, mobility
 from sims.effects.base import Effect
-from sims.effects.flexible import ELSEWHERE
+from sims.effects.pull import ELSEWHERE
 from sims.host import HostSimulator, Joint
 from sims.hosted import motion_of
 from sims.motion import Motion, substep_ends

@@ -38,6 +38,7 @@ from sims.effects.joint import JointEffect as JointEffect
 from sims.effects.joint import LinearSpring as LinearSpring
 from sims.effects.joint import ProportionalLoss as ProportionalLoss
 from sims.effects.joint import QuadraticDrag as QuadraticDrag
+from sims.effects.joint import Unbalance as Unbalance
 from sims.effects.joint import ViscousFriction as ViscousFriction
 from sims.effects.library import library as library
 from sims.effects.library import typical as typical

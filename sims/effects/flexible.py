@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 #: Control periods that one swing usually takes.
 SWING = 10.0
-#: Places, in scales of a position, at which forces on a joint are compared.
-ELSEWHERE = (-0.7, 0.0, 0.4, 1.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -88,20 +86,6 @@ class FlexibleJoint(FlexiblePart):
         """Times its own part that it feels of the forces by position: all of them."""
         ratio = np.asarray(self.ratio, float)
         return np.divide(1 + ratio, ratio, out=np.zeros(ratio.shape), where=ratio > 0)
-
-
-def pulled_by_position(simulator: HostSimulator, joint: str) -> bool:
-    """Whether a force on a joint at rest depends on where it is, as gravity on an arm does."""
-    plain = simulator.with_effects(())
-    place = next(one for one in plain.joints if one.name == joint)
-    names = [channel.name for channel in plain.state_channels]
-    if place.rate in (None, place.position):
-        return False
-    states = np.zeros((len(ELSEWHERE), len(names)))
-    column = names.index(place.position)
-    states[:, column] = plain.state_channels[column].scale * np.array(ELSEWHERE)
-    after = plain.step(states, np.zeros((len(states), len(plain.action_channels))))
-    return bool(np.ptp(after[:, names.index(str(place.rate))]) > 0)
 
 
 def flexible_parts(simulator: HostSimulator) -> list[FlexiblePart]:

@@ -217,5 +217,35 @@ class Cogging(JointEffect):
         channels = {channel.name: channel for channel in simulator.state_channels}
         position = channels[joint.position]
         if position.turn is None:
-            raise ValueError(f"cogging needs a joint that turns; {self.joint!r} slides")
+            raise ValueError(f"it needs a joint that turns; {self.joint!r} slides")
         return found
+
+
+@dataclasses.dataclass(frozen=True)
+class Unbalance(JointEffect):
+    """Torque of a weight off the axis, which gravity pulls down: ``sine sin(q) + cosine cos(q)``.
+
+    It is ``sqrt(sine^2 + cosine^2)`` at most, and hangs at rest at ``atan2(cosine, -sine)``.
+    """
+
+    sine: Value = number(force=1, share=0.1)
+    cosine: Value = number(force=1, share=0.1)
+
+    name: ClassVar[str] = "unbalance"
+    sentence: ClassVar[str] = "A weight off the axis of what turns, which gravity pulls down."
+    needs: ClassVar[str] = "a quarter of a turn or more"
+    compound: ClassVar[bool] = True
+    follows_rate: ClassVar[bool] = False
+
+    def parts(self) -> tuple[JointEffect, ...]:
+        """A torque that repeats once per turn."""
+        return (Cogging(self.joint, self.sine, self.cosine, 1.0),)
+
+    def force(self, q: Value, v: Value) -> Value:
+        """Torque at angle ``q`` in rad."""
+        return self.parts()[0].force(q, v)
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """As for cogging."""
+        found = Cogging(self.joint).measures(simulator)
+        return {kind: measure for kind, measure in found.items() if kind != "turn"}

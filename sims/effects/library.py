@@ -22,7 +22,7 @@ from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.curves import CURVES
 from sims.effects.exchange import Exchange, like_states
-from sims.effects.flexible import FlexibleJoint, FlexiblePart, pulled_by_position
+from sims.effects.flexible import FlexibleJoint, FlexiblePart
 from sims.effects.friction import (
     CoulombFriction,
     DirectionalFriction,
@@ -37,10 +37,12 @@ from sims.effects.joint import (
     LinearSpring,
     ProportionalLoss,
     QuadraticDrag,
+    Unbalance,
     ViscousFriction,
 )
 from sims.effects.limit import RateLimit, follows_command
 from sims.effects.parameter import ParameterChange
+from sims.effects.pull import pulled_by_position, pulled_by_turn
 from sims.effects.sensor import SensorOffset, SensorScale
 from sims.effects.store import SecondStore
 
@@ -59,6 +61,7 @@ JOINT_EFFECTS: tuple[type[Effect], ...] = (
     ProportionalLoss,
     SecondStore,
     Cogging,
+    Unbalance,
     Backlash,
 )
 ACTUATOR_EFFECTS: tuple[type[Effect], ...] = (
@@ -104,6 +107,8 @@ def library(simulator: HostSimulator) -> tuple[Effect, ...]:
             known = effect.quantities(simulator)
         except ValueError:
             continue
+        if kind is Unbalance and pulled_by_turn(simulator, where):
+            continue  # what pulls by direction has parameters of its own
         typical = {
             name: quantity.starts[len(quantity.starts) // 2]
             for name, quantity in known.items()

@@ -61,11 +61,11 @@ CURVES = [
     for kind in effects.CURVES
     if kind is not effects.StateCurve
 ]
-# Asked for where a command is followed, which a voltage is not.
+# Asked for where a command is followed, which a voltage is not, or where nothing hangs.
 OTHERS = [
     effects.StateCurve("level"), effects.RateLimit("pivot"),
     effects.FlexiblePart("pivot"), effects.FlexibleJoint("pivot"), effects.AddedInertia("pivot"),
-    effects.ParameterCurve("mass", "voltage"),
+    effects.ParameterCurve("mass", "voltage"), effects.Unbalance("pivot"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}

@@ -15,16 +15,18 @@ from residual.gap.model.reach import (
     full_command,
     greatest_rate,
     measured_range,
+    shows_weight,
     within_reach,
 )
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect, Quantity
 from sims.effects.curve import Curve
 from sims.effects.exchange import Exchange
-from sims.effects.flexible import ELSEWHERE, FlexiblePart
-from sims.effects.joint import JointEffect
+from sims.effects.flexible import FlexiblePart
+from sims.effects.joint import JointEffect, Unbalance
 from sims.effects.library import typical
 from sims.effects.limit import RateLimit
+from sims.effects.pull import ELSEWHERE
 from sims.effects.sensor import SensorEffect
 from sims.effects.store import SecondStore
 from sims.host import HostSimulator
@@ -152,6 +154,8 @@ def candidates(
         if isinstance(effect, RateLimit):
             reach = BEYOND * greatest_rate(effect, simulator, samples)
         if _follows_unseen(effect, simulator, measured):
+            continue
+        if isinstance(effect, Unbalance) and not shows_weight(effect, simulator, samples):
             continue
         known = within_reach(effect, effect.quantities(simulator), simulator, samples)
         whole = {n: q for n, q in known.items() if q.integer and q.role == "shape"}
