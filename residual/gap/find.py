@@ -16,6 +16,7 @@ from residual.gap.answer.confirmed import matters
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.records import stands_for, unlike
 from residual.gap.clock import Clock
+from residual.gap.confirmation.numerics import times_better
 from residual.gap.fitting.contract import Fitter
 from residual.gap.inquiry import Inquiry
 from residual.gap.log import look, settle
@@ -131,7 +132,9 @@ def find_gap(
         with clock.besides():
             prepared, found, on_more = on_more_windows(prepared, found, clock.confirm_until, tell)
         chosen = [found.search.candidates[number].effect for number in found.key]
-        if conventions and not still_open(conventions, simulator, found.adequate, chosen):
+        if conventions and not still_open(
+            conventions, simulator, found.adequate, chosen, times_better(found.search, found.key)
+        ):
             conventions = None
         clock.lap("search")
 

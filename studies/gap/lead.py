@@ -56,8 +56,8 @@ def _conventions(result: GapResult) -> str:
         "forecasts": errs,
         "zero": errs,
         "sign": f"what fits acts the other way, as with {changes}",
-        "scale": f"an input is {other.times:.0f} times the scale that its channel declares, as "
-        f"without {changes}",
+        "scale": f"a channel is {other.times:.0f} times the scale that it declares, as without "
+        f"{changes}",
         "row": f"with {' and '.join(other.changes)} a row earlier in the log, what is found errs "
         f"{other.times:.2g} times less, as where rows hold the command that led to them",
     }[other.reason]

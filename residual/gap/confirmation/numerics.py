@@ -74,6 +74,12 @@ def forecast_error(search: Search, key: Key) -> float:
     return in_spreads(search.fitter.samples, search.validated[key].squares)
 
 
+def times_better(search: Search, key: Key) -> float:
+    """Times that forecasts with a set are better than those of the nominal simulator."""
+    nominal = forecast_error(search, ()) if () in search.validated else np.inf
+    return float(np.sqrt(nominal / max(forecast_error(search, key), 1e-300)))
+
+
 def in_spreads(samples: Samples, squares: Array) -> float:
     """Squared errors (B, m) in units of the spread of each channel, all averaged."""
     spread = np.nanvar(samples.seen[:, samples.measured], axis=0)

@@ -80,8 +80,10 @@ def conventions(
             found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
     joints = _measured_joints(simulator, samples)
     for seen in joints:
-        found += _turned(simulator, seen) + _in_other_units(simulator, seen, converted)
-    return found + _exchanged(simulator, joints)
+        found += _turned(simulator, seen) + _in_other_units(simulator, seen)
+        for says, unit in _misread(simulator.physical_channels[seen[0]], converted):
+            found.append(_of_states(simulator, says, seen[:1], unit.factor, unit.offset))
+    return found + _all_in_other_units(simulator, joints) + _exchanged(simulator, joints)
 
 
 def _measured_joints(simulator: HostSimulator, samples: Samples) -> list[list[int]]:
@@ -138,9 +140,7 @@ def _turned(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
     return found
 
 
-def _in_other_units(
-    simulator: HostSimulator, joint: Sequence[int], converted: Collection[str]
-) -> list[Convention]:
+def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
     """A position and its rate in units that go together."""
     channels = [simulator.physical_channels[i] for i in joint]
     found = []
@@ -152,8 +152,29 @@ def _in_other_units(
         if len(said) == len(channels):
             says = f"{' and '.join(said)} ({_beside_a_unit(unit)})"
             found.append(_of_states(simulator, says, joint, unit.factor, unit.offset))
-    for says, unit in _misread(channels[0], converted):
-        found.append(_of_states(simulator, says, joint[:1], unit.factor, unit.offset))
+    return found
+
+
+def _all_in_other_units(
+    simulator: HostSimulator, joints: Sequence[Sequence[int]]
+) -> list[Convention]:
+    """All states of one unit in another one: who logs one temperature in K logs them all so."""
+    alike: dict[tuple[str, ...], list[Sequence[int]]] = {}
+    for joint in joints:
+        units = tuple(simulator.physical_channels[i].unit for i in joint)
+        alike.setdefault(units, []).append(joint)
+    found = []
+    for group in alike.values():
+        each = [_in_other_units(simulator, joint) for joint in group]
+        for ones in zip(*each, strict=True) if len(group) > 1 else ():
+            states = np.vstack(
+                [
+                    np.prod([one.states[0] for one in ones], axis=0),
+                    np.sum([one.states[1] for one in ones], axis=0),
+                ]
+            )
+            says = " and ".join(one.says for one in ones)
+            found.append(dataclasses.replace(ones[0], says=says, states=states))
     return found
 
 

@@ -53,11 +53,13 @@ ABSURD = 1.25
 #: Error from which on a sign or an exchange is asked after that makes it so many times smaller:
 #: what swings by itself hides a reversed input.
 HIDDEN, CLEARLY = 0.1, 4.0
-#: Times the declared scale of an input from which on it is asked whether it is in another unit, and
-#: how near to that scale it has to be then.
+#: Times the declared scale of a channel from which on another unit is asked after, and how near to
+#: that scale it has to be then.
 BEYOND, NEAR = 100.0, 10.0
 #: Offset of an angle, in turns, from which on another quarter turn is nearer than its zero.
 NEXT = 0.125
+#: Part of what was found makes forecasts better by, from which on another zero does so, too.
+NEARLY = 0.33
 #: Windows that are looked at: all rows at once, and row by row.
 AT_ONCE, BY_ROW = 120, 20
 #: Error of a window in those units beyond which it is just wrong.
@@ -103,18 +105,24 @@ def otherwise(
 
 
 def still_open(
-    conventions: Conventions, simulator: HostSimulator, adequate: bool, found: Sequence[Effect]
+    conventions: Conventions,
+    simulator: HostSimulator,
+    adequate: bool,
+    found: Sequence[Effect],
+    times: float,
 ) -> bool:
     """Whether conventions are to be asked for in spite of what was found.
 
     What stands upright in a loop runs away in every forecast that misses something, and would err
-    less if it hung. What is explained down to the noise without a sensor's zero does not.
+    less if it hung. What is explained down to the noise without a sensor's zero does not, unless
+    another zero alone does nearly as much: effects are found that make up for it.
 
     Args:
         conventions: With which the nominal simulator forecasts better.
         simulator: The nominal simulator.
         adequate: Whether what was found leaves only noise.
         found: Its effects.
+        times: That they make forecasts better.
     """
     zero = conventions.reason == "zero"
     turns = {channel.name: channel.turn for channel in simulator.physical_channels}
@@ -123,7 +131,8 @@ def still_open(
         for e in found
         if isinstance(e, SensorOffset)
     ]
-    return not (zero and adequate) or max(zeros, default=0.0) > NEXT
+    settled = zero and adequate and conventions.times < NEARLY * times
+    return not settled or max(zeros, default=0.0) > NEXT
 
 
 def other_sign(simulator: HostSimulator, found: Sequence[Effect]) -> Conventions | None:
@@ -138,10 +147,18 @@ def other_sign(simulator: HostSimulator, found: Sequence[Effect]) -> Conventions
 
 
 def beyond_scale(simulator: HostSimulator, samples: Samples) -> Conventions | None:
-    """Units of an input that is far beyond the scale that its channel declares, and would be near
-    it in another unit; None if there is none."""
-    for channel, values in zip(simulator.action_channels, samples.actions.T, strict=True):
-        times = float(np.abs(values).max()) / channel.scale
+    """Units of a channel that is far beyond the scale that it declares, and would be near it in
+    another unit; None if there is none. Of states how far they range counts: a zero is no unit."""
+    states = simulator.physical_channels
+    names = {states[i].name for i in samples.measured}
+    ranged = [
+        (states[i], np.ptp(samples.seen[np.isfinite(samples.seen[:, i]), i]))
+        for i in samples.measured
+        if not (states[i].angle or states[i].invariant or states[i].rate_of in names)
+    ]
+    acting = zip(simulator.action_channels, np.abs(samples.actions).max(axis=0), strict=True)
+    for channel, size in (*acting, *ranged):
+        times = float(size) / channel.scale
         if channel.scale == UNDECLARED or times < BEYOND:
             continue
         units = [(name, times * unit.factor) for name, unit in other_units(channel.unit)]
