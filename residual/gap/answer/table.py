@@ -138,8 +138,8 @@ def held_out(gap: Gap, fitter: Fitter, before: Fit, after: Fit, floor: Array) ->
     main = by_channel[name]
     steps = (Step("", main.before), Step("all that was found", main.after))
     return dataclasses.replace(
-        gap, channel=name, unit=main.unit, before=main.before, after=main.after,
-        noise_floor=main.noise_floor, steps=steps, by_channel=by_channel,
+        gap, channel=name, unit=main.unit, horizon_s=fitter.seconds, before=main.before,
+        after=main.after, noise_floor=main.noise_floor, steps=steps, by_channel=by_channel,
         blocks=len(fitter.blocks), folds=1,
         no_better=no_better(squares[0][:, place], squares[1][:, place], floor[:, place]),
     )  # fmt: skip

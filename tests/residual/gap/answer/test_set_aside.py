@@ -92,3 +92,18 @@ def test_what_cannot_act_there_is_not_judged():
     assert (gain.kind, gain.doubts) == ("confirmed", ())
     assert found.held_out.denies
     assert "makes little difference" in lead(found)
+
+
+def test_how_far_their_forecasts_go_is_told_of_them(runs):
+    """Read more rarely, they end elsewhere."""
+    rare = [
+        dataclasses.replace(
+            run, times=run.times[::3], states=run.states[::3], actions=run.actions[:-1:3]
+        )
+        for run in runs[4:]
+    ]
+    step = float(np.median(rare[0].durations))
+    found = ask(runs[:4], rare)
+    told = found.held_out.horizon_s
+    assert told == pytest.approx(step * round(told / step))
+    assert found.gap.horizon_s != pytest.approx(step * round(found.gap.horizon_s / step))

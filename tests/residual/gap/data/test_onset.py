@@ -89,6 +89,10 @@ def test_a_pendulum_that_is_held_until_it_is_let_go():
     assert told == ["swing"]
     assert 38 <= gone <= 42
     assert left_out(PendulumEquation(), [swing(held=0)]) == ([0], [])
+    (finding,) = [
+        f for f in examine(PendulumEquation(), [swing(held=40)]).findings if f.kind == "onset"
+    ]
+    assert "where its simulator moves, then moves: let go late?" in finding.says
 
 
 def test_what_hangs_at_rest_until_it_is_pushed_is_kept():
