@@ -50,7 +50,8 @@ def enough_substeps(
     """As few sub-steps as change nothing that could be seen, at most ``most``.
 
     The simulator is advanced from rows of the table with so many sub-steps and twice as
-    many; the worst twentieth of the rows decides.
+    many; the worst twentieth of the rows decides. What friction holds begins to move where an input
+    jumps, seldom and far, so that sub-steps are then no longer than recorded intervals.
 
     Args:
         simulator: The nominal simulator, or with what was found.
@@ -69,7 +70,9 @@ def enough_substeps(
         table = dataclasses.replace(samples, substeps=count)
         return Model(simulator).advance(table, states, np.zeros((1, 0)), rows)[0]
 
-    count, coarse = 1, after(1)
+    held = any(effect.holds_still and not effect.absent for effect in simulator.effects)
+    count = min(samples.stride, most) if held else 1
+    coarse = after(count)
     while count < most:
         fine = after(min(2 * count, most))
         change = np.abs(fine - coarse)[:, samples.measured]
