@@ -58,8 +58,9 @@ HIDDEN, CLEARLY = 0.1, 4.0
 BEYOND, NEAR = 100.0, 10.0
 #: Offset of an angle, in turns, from which on another quarter turn is nearer than its zero.
 NEXT = 0.125
-#: Part of what was found makes forecasts better by, from which on another zero does so, too.
-NEARLY = 0.33
+#: Part of what was found makes forecasts better by, from which on another zero does so, too, and
+#: times that it has to be: forecasts that run away are two to three times better where it hangs.
+NEARLY, TENFOLD = 0.33, 10.0
 #: Windows that are looked at: all rows at once, and row by row.
 AT_ONCE, BY_ROW = 120, 20
 #: Error of a window in those units beyond which it is just wrong.
@@ -131,7 +132,7 @@ def still_open(
         for e in found
         if isinstance(e, SensorOffset)
     ]
-    settled = zero and adequate and conventions.times < NEARLY * times
+    settled = zero and adequate and conventions.times < max(NEARLY * times, TENFOLD)
     return not settled or max(zeros, default=0.0) > NEXT
 
 

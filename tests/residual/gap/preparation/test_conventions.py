@@ -200,6 +200,10 @@ def test_what_is_explained_does_not_hang_by_a_zero():
     assert not still_open(told, simulator, True, [SensorOffset("angle", 0.01)], 4000.0)
     # Where another zero does nearly as much as all that was found, that makes up for the zero.
     assert still_open(told, simulator, True, [friction], 2.0 * told.times)
+    # Two or three times better is what runs away would be if it hung, whatever was found.
+    less = dataclasses.replace(told, times=2.7)
+    assert not still_open(less, simulator, True, [friction], 4.0)
+    assert not still_open(less, simulator, True, [], 1.0)
     # With its direction it is a zero, too; a direction alone is none.
     kinds = {one.says: one.turned for one in conventions(simulator, samples, ())}
     zeros = {says for says, turned in kinds.items() if turned}
