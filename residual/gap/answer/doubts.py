@@ -23,6 +23,8 @@ DOUBTS: dict[Doubt, str] = {
     "off where it does",
     "extreme": "a parameter or an input would be more than ten times off, or act the other way, so "
     "see first whether the simulator has it right",
+    "orders": "torques that repeat along a turn fit whatever follows the position, where there are "
+    "several or something has no name",
     "records": "an effect with its own size in each record does better, or may be what this one "
     "stands for",
     "set_aside": "the corrected simulator is worse on the records that were set aside",
@@ -67,6 +69,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "conventions": claim.counted,
         "cut_off": claim.cut_off,
         "extreme": claim.extreme,
+        "orders": claim.orders,
         "records": claim.unlike,
         "set_aside": claim.refuted,
         "no_help": claim.helpless,

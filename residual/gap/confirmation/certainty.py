@@ -22,6 +22,7 @@ from residual.gap.search.comparisons import AT_ONE, no_match
 from residual.gap.search.exchange import exchanged, split
 from residual.gap.search.sets import Key, Search, all_but
 from residual.gap.search.significance import BETTER, score, tie
+from sims.effects.joint import Cogging
 
 Array = NDArray[np.float64]
 
@@ -96,9 +97,18 @@ def claims(
                 one_way=may_hold_a_load(search, key, number, half),
                 other_law=number in other_law,
                 extreme=key in search.extreme,
+                orders=of_many_orders(search, key, number, adequate),
             )
         )
     return sorted(found, key=lambda claim: -claim.share[0])
+
+
+def of_many_orders(search: Search, key: Key, number: int, adequate: bool) -> bool:
+    """Whether an effect repeats along a turn beside a remainder, or another one that does there."""
+    waves = [n for n in key if isinstance(search.candidates[n].effect, Cogging)]
+    there = search.candidates[number].effect.where
+    alone = sum(search.candidates[n].effect.where == there for n in waves) == 1
+    return number in waves and not (adequate and alone)
 
 
 def near(

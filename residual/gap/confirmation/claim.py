@@ -47,6 +47,8 @@ class Claim:
         counted: Whether the log may count otherwise than the simulator does.
         cut_off: Whether the simulator stays the same beyond a value that was recorded.
         extreme: Whether a number of its set is out of all proportion to the simulator's.
+        orders: Whether it repeats along a turn, and is one of several that do, or beside a
+            remainder: together they fit whatever follows the position.
         unlike: Whether it may stand for one effect in a size of its own in each record.
         refuted: Whether the corrected simulator forecasts records that were set aside worse.
         helpless: Whether it, or all that was found, forecasts them no better, though they show more
@@ -78,6 +80,7 @@ class Claim:
     counted: bool = False
     cut_off: bool = False
     extreme: bool = False
+    orders: bool = False
     unlike: bool = False
     refuted: bool = False
     helpless: bool = False
@@ -111,6 +114,7 @@ class Claim:
             self.counted,
             self.cut_off,
             self.extreme,
+            self.orders,
             self.unlike,
             self.refuted,
             self.helpless,

@@ -69,3 +69,37 @@ def test_a_small_swing_names_no_law_that_its_motion_cannot_show():
     assert not any(v.kind == "confirmed" and v.effect in stiffer for v in named.values())
     blind = [v.alternatives for v in found.verdicts if v.kind == "needs_data"]
     assert not {"length", "sensor_offset@angle"} & {name for names in blind for name in names}
+
+
+class Free(Rod):
+    """A shaft that nothing pulls at, driven by a torque."""
+
+    state_channels = (
+        Channel("angle", "rad", "position", scale=5.0),
+        Channel("rate", "rad/s", "rate", rate_of="angle", scale=5.0),
+    )
+    action_channels = (Channel("torque", "N m", "input", low=-2.0, high=2.0),)
+    parameters = {}
+
+    def acceleration(self, q, v, u, force, p):
+        return 40.0 * (u + force) - 3.0 * v
+
+
+def shaft(orders):
+    """It with torques that repeat along a turn, one for each order."""
+    rng = np.random.default_rng(2)
+    torque = np.repeat(rng.uniform(-1.0, 1.0, 40), 20)[:, None]
+    effects = [Cogging("angle", 0.12, 0.05, float(order)) for order in orders]
+    states = Free(effects=effects).rollout(np.zeros(2), torque)
+    states = states + rng.normal(0.0, [2e-3, 3e-2], states.shape)
+    return Trajectory("run", DT * np.arange(len(states)), states, torque)
+
+
+def test_several_orders_together_are_not_certain():
+    """They fit whatever follows the position, as a wind or a path of its own does."""
+    for orders, kind in (((3,), "confirmed"), ((3, 5), "ambiguous")):
+        found = find_gap(Free(), [shaft(orders)])
+        named = [v for v in found.verdicts if v.effect == "cogging" and v.parameters]
+        assert {v.shape["order"] for v in named} == set(orders)
+        assert {v.kind for v in named} == {kind}
+        assert all(("orders" in v.doubts) == (len(orders) > 1) for v in named)
