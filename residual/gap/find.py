@@ -99,6 +99,7 @@ def find_gap(
             that strikes the ground was not measured.
     """
     refuse_unsound(simulator)
+    declared = {channel.name: channel.scale for channel in simulator.physical_channels}
     _refuse_settings(horizon, parameter_tolerance, minutes)
     runs, set_aside = trajectories_of(trajectories), trajectories_of(held_out)
     clock = Clock(minutes)
@@ -173,8 +174,8 @@ def find_gap(
     late = nearly_in_sensors(result.effects, answer.found.search)
     conventions = conventions or other_sign(simulator, result.effects)
     return replace(
-        result, conventions=conventions, cut_off=log.cut_off, unlike=differ, changing=over_time,
-        nearly_late=late,
+        result, corrected=result.corrected.with_scales(declared), conventions=conventions,
+        cut_off=log.cut_off, unlike=differ, changing=over_time, nearly_late=late,
     )  # fmt: skip
 
 

@@ -96,7 +96,10 @@ def test_joints_and_effects_go_with_their_states():
 def test_a_drag_is_named_in_degrees_whether_or_not_sizes_are_declared():
     runs = [record(0), record(1)]
     for simulator in (Turntable(), Declared()):
-        (named,) = [v for v in find_gap(simulator, runs).verdicts if v.kind != "needs_data"]
+        found = find_gap(simulator, runs)
+        (named,) = [v for v in found.verdicts if v.kind != "needs_data"]
         assert (named.kind, named.effect) == ("confirmed", "quadratic_drag")
         number = named.parameters["coefficient"]
         assert number.value == pytest.approx(DRAG, rel=0.03) and number.low <= DRAG <= number.high
+        # What is given back counts as the user's own simulator does.
+        assert found.corrected.physical_channels == simulator.physical_channels
