@@ -86,8 +86,8 @@ class HostSimulator(Simulator):
         return None
 
     def smooth_states(self, n: int, rng: np.random.Generator) -> Array:
-        """Random physical states where a small change has a small effect, (n, n_physical): within
-        the scales of the channels, angles anywhere, away from contacts."""
+        """Random physical states where a small change has a small effect, (n, n_physical); by
+        default within the scales of the channels, angles anywhere; away from contacts."""
         return np.stack([random_values(c, n, rng) for c in self.physical_channels], axis=1)
 
     def for_motion(self, paths: Sequence[Array]) -> Self:

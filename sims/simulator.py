@@ -16,8 +16,6 @@ Hold = Literal["zero", "linear"]
 
 #: Units of angles, and what a whole turn is in each.
 TURNS: Mapping[str, float] = {"rad": math.tau, "deg": 360.0, "rev": 1.0}
-
-
 #: Scale of a channel that declares none.
 UNDECLARED = 1.0
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from residual.gap.confirmation.claim import Claim, other_than
-from residual.gap.confirmation.constancy import creeps, on_the_way
+from residual.gap.confirmation.constancy import creeps, on_the_way, whole_size
 from residual.gap.confirmation.drift import Drift
 from residual.gap.confirmation.following import by_another_law
 from residual.gap.confirmation.numerics import STEADY, at_half_step, in_the_limit, survives
@@ -66,7 +66,7 @@ def claims(
         twins = tuple(name for name in groups.get(label, ()) if name != label)
         strengths = [j for j in own if fit.model.knobs[j].strength] or own
         compound = search.candidates[number].effect.compound
-        least = float(np.abs(fit.theta[strengths]).max()) if compound else 0.0
+        least = whole_size(search, key, number)
         numbers = {fit.model.knobs[j].field: bounded(fit, j, half[j], numerics) for j in own}
         for j, ends in on_the_way(search, key, number).items():
             field = fit.model.knobs[j].field

@@ -63,14 +63,21 @@ def on_the_way(search: Search, key: Key, number: int) -> dict[int, tuple[float, 
         return {}
     if len(fitter.blocks) < FEW:
         return {}
-    course, found, own = along_windows(search), {}, _strengths(fit, key.index(number))
-    least = float(np.abs(fit.theta[own]).max()) if effect.compound else 0.0
-    for j in own:
+    course, found, least = along_windows(search), {}, whole_size(search, key, number)
+    for j in _strengths(fit, key.index(number)):
         if change := change_over(fit, fitter.blocks.block, j, course, CHANCE, least):
             knob, size = fit.model.knobs[j], float(fit.theta[j])
             begin, end = np.clip([size - change / 2, size + change / 2], knob.low, knob.high)
             found[j] = (float(begin), float(end))
     return found
+
+
+def whole_size(search: Search, key: Key, number: int) -> float:
+    """The size that the strengths of a member are parts of; 0 if each stands for itself."""
+    if not search.candidates[number].effect.compound:
+        return 0.0
+    fit = search.tried[key]
+    return float(np.abs(fit.theta[_strengths(fit, key.index(number))]).max())
 
 
 def _strengths(fit: Fit, place: int) -> list[int]:

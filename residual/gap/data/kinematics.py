@@ -127,9 +127,8 @@ class _Stretches:
     def by_zero(self, scale: float, error: float) -> bool:
         """Whether a scale is that of a rate whose zero is off, so that another one is found of how
         stretches differ."""
-        middle = self.moved.mean(), self.integral.mean()
-        centred = dataclasses.replace(self, moved=self.moved - middle[0])
-        own, its = centred.scale(self.integral - middle[1])
+        centred = dataclasses.replace(self, moved=self.moved - self.moved.mean())
+        own, its = centred.scale(self.integral - self.integral.mean())
         apart = max(4 * float(np.hypot(error, its)), 0.25 * abs(scale - 1))
         return bool(np.isfinite(its) and abs(own - scale) > apart)
 

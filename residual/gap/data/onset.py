@@ -172,18 +172,12 @@ def _told(
         return []
     run, begin = waits[0]
     more = f" (and {len(waits) - 1} more so)" if len(waits) > 1 else ""
-    here, then, cause = (
-        (
-            "under inputs that move its simulator",
-            "moves though none changed",
-            "switched on, or let go,",
-        )
-        if run.actions.any()
-        else ("where its simulator moves", "moves", "let go")
-    )
-    says = (
-        f"stands still for {begin.waits:.3g} s {here}, then {then}{more}: {cause} late? "
-        f"What comes before, {begin.onset} samples, is left out"
-    )
+    before = f"stands still for {begin.waits:.3g} s"
+    if run.actions.any():
+        happens = f"{before} under inputs that move its simulator, then moves though none changed"
+        cause = "switched on, or let go, late"
+    else:
+        happens, cause = f"{before} where its simulator moves, then moves", "let go late"
+    says = f"{happens}{more}: {cause}? What comes before, {begin.onset} samples, is left out"
     numbers = {"seconds": begin.waits, "samples": float(begin.onset)}
     return [Finding("onset", run.name, says, numbers, "warning")]
