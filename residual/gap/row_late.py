@@ -107,7 +107,7 @@ def _late_by_a_row(found: Explanation, runs: Sequence[Trajectory]) -> bool:
     """Whether what was found with inputs a row earlier makes one of them late by that row again."""
     row = float(np.median(np.concatenate([run.durations for run in runs])))
     fit = found.search.tried[found.key]
-    added = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
+    added = fit.model.added(fit.theta)
     return any(
         isinstance(effect, Delay | ActuatorLag)
         and any(getattr(effect, name) >= row for name in effect.strengths())

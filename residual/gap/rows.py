@@ -133,12 +133,11 @@ def look(simulator: HostSimulator, runs: list[Trajectory], exact: bool = True) -
     )  # fmt: skip
     key = _in_fewer(found, sets)
     fit = found.search.tried[key]
-    known = len(simulator.effects)
     numbers = zip(fit.model.owner, fit.model.knobs, strict=True)
     spread = deviations(fit, found.search.fitter.blocks)
     left = found.search.fitter.left(fit, found.floor)
     return Named(
-        fit.model.bind(fit.theta).effects[known:],
+        fit.model.added(fit.theta),
         tuple((int(i), knob.field) for i, knob in numbers),
         np.diag(spread**2),
         left.ratio,

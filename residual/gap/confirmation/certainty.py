@@ -273,7 +273,7 @@ def steady(search: Search, key: Key, j: int, least: float = 0.0) -> bool:
 def of_doubtful_sensor(search: Search, key: Key, place: int) -> bool:
     """Whether a member of a set is a sensor that would be wrong as sensors seldom are."""
     fit = search.tried[key]
-    effects = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
+    effects = fit.model.added(fit.theta)
     return doubtful_sensor(effects[place], search.simulator, search.fitter.samples)
 
 

@@ -60,8 +60,9 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
         Its position among the model's effects, their number if it is none of them, and why.
     """
     host, given = model.bind(theta), model.simulator.with_effects(())
-    for number, ratio in _ratios(host, model).items():
-        name = host.effects[len(model.simulator.effects) + number].where
+    chosen = model.added(theta)
+    for number, ratio in _ratios(host, chosen).items():
+        name = chosen[number].where
         small = ratio > FACTOR and _minor(given, name, ratio)
         if not 1 / FACTOR <= ratio <= FACTOR and not small:
             return number, f"{name} would be {ratio:.3g} times its nominal value"
@@ -70,7 +71,6 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
         return unsupported
     before = Model(given).inputs(samples, np.zeros((1, 0)))[0]
     after = model.inputs(samples, theta[None])[0]
-    chosen = host.effects[len(model.simulator.effects) :]
     for j, channel in enumerate(host.action_channels):
         usual = float(before[..., j, 0].std())
         left = float(after[..., j, 0].std())
@@ -105,10 +105,10 @@ def _turned_by_a_curve(effects: Sequence[Effect], actuator: str, commands: Array
     return None
 
 
-def _ratios(host: HostSimulator, model: Model) -> dict[int, float]:
-    """Parameters over their nominal values, by position of their change among a model's effects."""
+def _ratios(host: HostSimulator, chosen: Sequence[Effect]) -> dict[int, float]:
+    """Parameters over their nominal values, by the position of their change among those chosen."""
     found = {}
-    for number, effect in enumerate(host.effects[len(model.simulator.effects) :]):
+    for number, effect in enumerate(chosen):
         if isinstance(effect, ParameterChange):
             nominal = float(np.mean(host.parameters[effect.parameter].value))
             if nominal:
@@ -148,7 +148,7 @@ def told_by_data(fit: Fit, nominal: Fit, fitter: Fitter, noise: Array | None) ->
     if noise is None or not isinstance(fitter, SmoothFitter):
         return False
     host, own = fit.model.bind(fit.theta), len(fit.model.simulator.effects)
-    turned = min(_ratios(host, fit.model).values(), default=1.0) < 0
+    turned = min(_ratios(host, fit.model.added(fit.theta)).values(), default=1.0) < 0
     if by_commands(host, fitter.samples, own) is not None:
         return False
     far, left = (fitter.over_noise(one, noise) for one in (nominal, fit))
@@ -227,7 +227,7 @@ def surprises(fit: Fit, samples: Samples) -> int:
     What a bound has stopped is no optimum: the data would have it elsewhere.
     """
     ended = {int(fit.model.owner[j]) for j in range(len(fit.theta)) if at_bound(fit, j)}
-    own = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
+    own = fit.model.added(fit.theta)
     return sum(effect.surprising or i in ended for i, effect in enumerate(own)) + (
         undone(fit) + _pulling(fit, samples)
     )

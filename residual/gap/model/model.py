@@ -14,6 +14,7 @@ from residual.gap.model.memory import Memory, half_plays
 from residual.gap.model.workers import integrate
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
+from sims.effects.base import Effect
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -87,6 +88,10 @@ class Model:
             theta: Unknowns, (p,), or (V, p) to serve a batch of V times ``each`` rows.
             each: Rows for each vector of unknowns.
         """
+        return self.simulator.with_effects((*self.simulator.effects, *self.added(theta, each)))
+
+    def added(self, theta: Array, each: int = 1) -> tuple[Effect, ...]:
+        """The effects beside the simulator's own, as they were chosen; arguments as of ``bind``."""
         effects = []
         for i, candidate in enumerate(self.chosen):
             own = self.owner == i
@@ -94,7 +99,7 @@ class Model:
                 effects.append(candidate.bind([float(value) for value in theta[own]]))
             else:
                 effects.append(candidate.bind([np.repeat(v, each) for v in theta[:, own].T]))
-        return self.simulator.with_effects((*self.simulator.effects, *effects))
+        return tuple(effects)
 
     def widen(self, samples: Samples, states: Array, theta: Array, without: bool = False) -> Array:
         """Physical states (n, n_physical) with the memory of effects appended that moves with them.

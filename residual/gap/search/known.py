@@ -33,7 +33,7 @@ def departures(search: Search, key: Key) -> float:
     """How much of a fitted set is otherwise than was known: one for each of its effects, and for
     each parameter that is off by more than three times what it is known to; less for less."""
     fit = search.tried[key]
-    own = fit.model.bind(fit.theta).effects[len(fit.model.simulator.effects) :]
+    own = fit.model.added(fit.theta)
     return sum(_departure(search, effect) for effect in own)
 
 

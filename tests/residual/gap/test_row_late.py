@@ -57,7 +57,7 @@ def test_another_time_constant_is_no_late_row():
 
 def answers(monkeypatch, before, after, adequate=False, effects=()):
     """What is made of errors as the log is said to be and with inputs a row earlier."""
-    model = SimpleNamespace(simulator=Oven(), bind=lambda theta: Oven(effects=effects))
+    model = SimpleNamespace(simulator=Oven(), added=lambda theta: effects)
     fit = SimpleNamespace(model=model, theta=np.zeros(0))
     searches = [SimpleNamespace(name=name, tried={(): fit}) for name in ("said", "earlier")]
     found, again = (

@@ -74,7 +74,7 @@ class Toy:
                 theta=np.zeros(len(key)),
                 model=SimpleNamespace(
                     simulator=PendulumEquation(),
-                    bind=lambda _, key=key: SimpleNamespace(effects=[fitted[n] for n in key]),
+                    added=lambda _, key=key: tuple(fitted[n] for n in key),
                 ),
             )
             for key, error in errors.items()
