@@ -45,7 +45,7 @@ def off_policy_class(path: str) -> type[OffPolicyAlgorithm]:
         from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
     except ImportError:
         raise ValueError(
-            f"learner {path!r} needs Stable-Baselines3: pip install stable-baselines3"
+            f"learner {path!r} needs Stable-Baselines3: `pip install stable-baselines3`"
         ) from None
     kind = imported(path, "learner")
     if not (isinstance(kind, type) and issubclass(kind, OffPolicyAlgorithm)):

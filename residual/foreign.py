@@ -35,7 +35,7 @@ def dumped(estimator: Any) -> NDArray[np.uint8]:
         from skops import io
     except ImportError:
         raise TypeError(
-            f"cannot save a {name} without skops: pip install 'simgap[skops]'"
+            f"cannot save a {name} without the package skops: `pip install skops` (extra `skops`)"
         ) from None
     try:
         data = io.dumps(estimator)
@@ -61,7 +61,8 @@ def loaded(data: NDArray[np.uint8], trusted: Sequence[str]) -> Any:
         from skops import io
     except ImportError:
         raise FileError(
-            "holds another library's estimator, which skops reads: pip install 'simgap[skops]'"
+            "holds another library's estimator, which needs the package skops: "
+            "`pip install skops` (extra `skops`)"
         ) from None
     content = np.asarray(data, np.uint8).tobytes()
     try:

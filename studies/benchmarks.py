@@ -71,7 +71,7 @@ def run_suite(target: Path) -> bool:
     if not target.is_file() or not target.stat().st_size:
         raise ChildProcessError(
             "nothing was measured, see above; the benchmarks need the extras: "
-            "pip install 'simgap[test,bench]'"
+            "`pip install -e '.[test,bench]'`"
         )
     return done.returncode == 0
 
@@ -144,8 +144,8 @@ def measure_mujoco() -> dict[str, Any]:
     done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
     if done.returncode:
         raise ChildProcessError(
-            "nothing was measured, see above; the comparison needs pip install 'simgap[mujoco]' "
-            "'mujoco[sysid]'"
+            "nothing was measured, see above; the comparison needs MuJoCo with its own "
+            "identification: `pip install 'mujoco[sysid]'`"
         )
     found: dict[str, Any] = json.loads(done.stdout)
     return found

@@ -13,7 +13,7 @@ stands the oracle: the nominal simulator with the hidden effect, its strength fi
 
 Every set of logs is one trial with a folder of its own. A killed run continues where it stopped
 when the same command is given again; the tables count what is finished. pysindy takes part if it
-is installed (pip install simgap[bench]).
+is installed (`pip install pysindy`).
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def read_hdf5(path: Path) -> Table:
-    """An HDF5 file as a table; needs ``simgap[logs]``.
+    """An HDF5 file as a table; needs the extra ``logs``.
 
     Datasets of shape (n,) are columns, those of shape (n, k) columns ``name.0``, ``name.1``, ...
     Groups that are numbered (``episode_0``, ``data/demo_3``) are trajectories, told apart by a
@@ -35,7 +35,9 @@ def read_hdf5(path: Path) -> Table:
     try:
         import h5py
     except ImportError:
-        raise LogError("HDF5 needs the package h5py: pip install 'simgap[logs]'", path) from None
+        raise LogError(
+            "HDF5 needs the package h5py: `pip install h5py` (extra `logs`)", path
+        ) from None
     episodes: dict[tuple[str, int], Arrays] = {}
     single: Arrays = {}
 

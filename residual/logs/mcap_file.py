@@ -1,4 +1,4 @@
-"""MCAP recordings (JSON, protobuf, ROS 2) as signals; needs ``simgap[logs]``."""
+"""MCAP recordings (JSON, protobuf, ROS 2) as signals; needs the extra ``logs``."""
 
 from __future__ import annotations
 
@@ -76,7 +76,9 @@ def _messages(path: Path) -> Iterator[tuple[str, int, Any]]:
     try:
         reader = importlib.import_module("mcap.reader")
     except ImportError:
-        raise LogError("MCAP needs the package mcap: pip install 'simgap[logs]'", path) from None
+        raise LogError(
+            "MCAP needs the package mcap: `pip install mcap` (extra `logs`)", path
+        ) from None
     size = path.stat().st_size
     _check_chunks(path, size)
     with path.open("rb") as stream:
@@ -133,7 +135,7 @@ def _decoder(encoding: str, path: Path) -> Any:
     except ImportError:
         raise LogError(
             f"holds {encoding} messages, which need the package {package}: "
-            "pip install 'simgap[logs]'",
+            f"`pip install {package}` (extra `logs`)",
             path,
         ) from None
 

@@ -16,7 +16,8 @@ try:
     import mujoco.batch
 except ImportError as missing:  # pragma: no cover - depends on what is installed
     raise ImportError(
-        "MuJoCo models need the package mujoco, 3.17 or newer: pip install 'simgap[mujoco]'"
+        "MuJoCo models need the package mujoco, 3.17 or newer: "
+        "`pip install 'mujoco>=3.17'` (extra `mujoco`)"
     ) from missing
 
 from sims.mujoco.contacts import touching_geoms

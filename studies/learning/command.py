@@ -83,7 +83,10 @@ def run_command(study: Study, arguments: Sequence[str] | None = None) -> None:
 
 def _curves_folder(folder: str | None) -> Path | None:
     if folder and importlib.util.find_spec("tensorboard") is None:
-        fail("TensorBoard is not installed: pip install 'simgap[tensorboard]'")
+        fail(
+            "--tensorboard needs the package tensorboard: "
+            "`pip install tensorboard` (extra `tensorboard`)"
+        )
     return Path(folder).resolve() if folder else None
 
 

@@ -121,7 +121,10 @@ def _dask(scheduler: str) -> Iterator[Run]:
     try:
         import distributed
     except ModuleNotFoundError:
-        raise WorkersError("Dask is not installed: pip install 'simgap[dask]'") from None
+        raise WorkersError(
+            "--backend dask needs the package dask: "
+            "`pip install 'dask[distributed]'` (extra `dask`)"
+        ) from None
     try:
         client = distributed.Client(scheduler, timeout=CONNECT_SECONDS)
     # A TLS scheduler without a certificate of one's own is a TypeError.
@@ -160,7 +163,9 @@ def _ray(scheduler: str) -> Iterator[Run]:
     try:
         import ray
     except ModuleNotFoundError:
-        raise WorkersError("Ray is not installed: pip install 'simgap[ray]'") from None
+        raise WorkersError(
+            "--backend ray needs the package ray: `pip install ray` (extra `ray`)"
+        ) from None
     try:
         if host:  # Ray itself would wait for many minutes
             socket.create_connection((host, int(port)), CONNECT_SECONDS).close()

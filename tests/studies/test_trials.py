@@ -123,9 +123,9 @@ def test_the_plan_names_the_study(tmp_path):
     [
         ("dask", None, "--scheduler"),
         ("dask", "tcp://127.0.0.1:1", "no Dask scheduler at tcp://127.0.0.1:1"),
-        ("ray", "127.0.0.1:1", "no Ray cluster at 127.0.0.1:1|Ray is not installed"),
-        ("ray", "ray://127.0.0.1:1", "no Ray cluster at ray://127.0.0.1:1|Ray is not installed"),
-        ("ray", "nowhere", "no Ray cluster at nowhere|Ray is not installed"),
+        ("ray", "127.0.0.1:1", "no Ray cluster at 127.0.0.1:1|needs the package ray"),
+        ("ray", "ray://127.0.0.1:1", "no Ray cluster at ray://127.0.0.1:1|needs the package ray"),
+        ("ray", "nowhere", "no Ray cluster at nowhere|needs the package ray"),
     ],
 )
 def test_a_cluster_that_is_not_there_is_named(monkeypatch, backend, address, message):
