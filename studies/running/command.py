@@ -30,6 +30,7 @@ from studies.running.classes import (
     without_replaced,
 )
 from studies.running.ending import DEBUG, DEBUG_VARIABLE, TRUST, typed
+from studies.running.spelling import spelled
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 # How jsonargparse begins a list of all classes that it knows.
@@ -81,7 +82,7 @@ class Parser(jsonargparse.ArgumentParser):
         kinds = {o: getattr(a, "_typehint", None) for a in self._actions for o in a.option_strings}
         lists = {name for name, kind in kinds.items() if typing.get_origin(kind) in (list, tuple)}
         self._lists = {action.dest for action in self._actions if action.nargs == "+"}
-        given = _with_lists(list(sys.argv[1:] if args is None else args), lists)
+        given = _with_lists(spelled(sys.argv[1:] if args is None else args, kinds), lists)
         self._words = given
         try:
             for i, text in enumerate(given):
@@ -176,9 +177,8 @@ class Parser(jsonargparse.ArgumentParser):
             return found and _place(given.as_dict()) + found
         for path, (option, content) in _READ.items():
             for keys, inside in _mappings(content, () if option == "config" else (option,)):
-                if found := _not_among(
-                    inside, self._settings_below("".join(f"{k}." for k in keys))
-                ):
+                settings = self._settings_below("".join(f"{k}." for k in keys))
+                if found := _not_among(inside, settings):
                     below = keys if option == "config" else keys[1:]
                     return f"{': '.join([path, *below])}: {found}"
         return ""

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from studies.find_gap import main
+from studies.find_gap import build_parser, main
 from studies.make_log import write_logs
 
 EQUATION = "sims.pendulum_equation.PendulumEquation"
@@ -150,3 +150,12 @@ def test_one_log_of_a_config_needs_no_list(tmp_path, capsys):
         main(["--config", str(config), "--output", str(tmp_path / "out")])
     assert end.value.code == 2
     assert "nowhere.csv" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("joint", ["-", "_"])
+def test_an_option_may_be_spelt_with_either_joint(joint):
+    words = (f"--held{joint}out", "a.csv", "b.csv", f"--parameter{joint}tolerance=0.1")
+    given = build_parser().parse_args(
+        ["--simulator", "sims.Pendulum", "--logs", "c.csv", "--output", "gap", *words]
+    )
+    assert given.held_out == ["a.csv", "b.csv"] and given.parameter_tolerance == 0.1
