@@ -112,7 +112,8 @@ def write_gap(
         result: What was found.
         folder: Made if missing; files of the same names are replaced, others stay.
         config: The settings as plain values; ``config["simulator"]`` holds ``class_path`` and
-            ``init_args`` of the nominal simulator (``sims.loading.simulator_settings``).
+            ``init_args`` of the nominal simulator (``sims.loading.simulator_settings``),
+            ``config["logs"]`` the names of the runs.
         findings: What the reader of the logs had to say.
         seconds: Wall time; by default the sum over the stages.
 

@@ -11,8 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import simgap
 from policy import load_policy
 from studies import find_gap, learn
+from studies.learning.trial import build_parser, resolve
+from studies.running.grids import expand_grid
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial-learn.md"
@@ -88,6 +91,8 @@ def test_the_file_is_short_and_the_command_learns(folder):
 
 
 def test_the_python_call_runs(here, capsys):
+    from cart_pole import CartPole
+
     code = (here / "call.py").read_text()
     few = "from policy import DDPGConfig\n" + (
         code.replace("samples=450, updates=2", "samples=60, updates=1, steps=300, "
@@ -98,6 +103,38 @@ def test_the_python_call_runs(here, capsys):
     runpy.run_path("few.py", run_name="__main__")
     assert "Learnt(system: return on the true system" in capsys.readouterr().out
     assert (here / "report.html").exists() and list((here / "kept").glob("difference-*"))
+    # What was kept is found again, and the files that the page names are read.
+    policy = load_policy(here / "policy.safetensors")
+    np.testing.assert_array_equal(policy.act_on([0.3, -1.2, 3.0, 0.5]).shape, (1,))
+    assert simgap.load(here / "model.safetensors", CartPole()).simulator.dt == 0.04
+    asked = (here / "ask.py").read_text().replace("from call", "from few")
+    assert asked.count("learnt.runs)") == 1
+    few = 'learnt.runs, effects=["viscous_friction@cart"], minutes=0.05)'
+    (here / "ask_few.py").write_text(asked.replace("learnt.runs)", few))
+    runpy.run_path("ask_few.py", run_name="__main__")
+    assert {"gap.json", "corrected.yaml"} <= {path.name for path in (here / "found").iterdir()}
+
+
+def test_the_grid_is_as_many_trials_as_the_page_says(here):
+    (code,) = blocks("yaml")
+    (here / "grid.yaml").write_text(code)
+    parser = build_parser(learn.STUDY)
+    settings = parser.plain(parser.parse_args(["--config", "grid.yaml"]))
+    settings = {name: settings[name] for name in (*learn.STUDY.settings, "grid")}
+    grid = settings.pop("grid")
+    resolved = [resolve(learn.STUDY, trial) for trial in expand_grid(settings, grid)]
+    first = expand_grid(settings, grid[:1])
+    distinct = {json.dumps(trial, sort_keys=True) for trial in resolved}
+    assert (len(first), len(resolved) - len(first), len(distinct)) == (12, 6, 15)
+    assert "3 x 2 x 2 = 12 trials, the second 3 x 2 = 6" in TUTORIAL.read_text()
+
+
+def test_the_table_of_a_grid_is_read(here):
+    rows = "GaussianProcess,{},450,difference,1,450,{}\n"
+    head = "estimator,seed,samples_per_update,name,iteration,true_samples,return_true\n"
+    (here / "results.csv").write_text(head + rows.format(0, -50.0) + rows.format(1, -60.0))
+    printed = run([sys.executable, "read.py", "results.csv"], here)
+    assert re.search(r"GaussianProcess difference +1 +450 +-55\.0 +-60\.0 +2", printed)
 
 
 @pytest.mark.parametrize("learner", ["ddpg", "sac"])
