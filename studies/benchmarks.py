@@ -21,6 +21,7 @@ from simgap_files.atomic import atomic_write_text, read_json
 from studies.reporting.render import render
 from studies.running.command import Parser
 from studies.running.ending import check_output, fail, guarded
+from studies.running.versions import own_version
 from studies.running.workers import ONE_THREAD
 from studies.timing.fit_scaling import write_figure
 from studies.timing.tables import SCALING, mujoco_tables, records, tables
@@ -126,7 +127,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def robots(output: str | None) -> None:
     """Measure MuJoCo models and print the page."""
-    page = f"{render('benchmarks_mujoco.md', **mujoco_tables(measure_mujoco()))}\n"
+    found = mujoco_tables(measure_mujoco())
+    page = f"{render('benchmarks_mujoco.md', version=own_version(), **found)}\n"
     print(page)
     if output:
         atomic_write_text(output, joined(parts_of(output)[0] or "# Benchmarks", page))
