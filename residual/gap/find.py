@@ -13,6 +13,7 @@ from residual.gap.answer.answer import summed_up, told
 from residual.gap.answer.apart import NOT_JUDGED, judged_apart
 from residual.gap.answer.changing import changing
 from residual.gap.answer.confirmed import matters
+from residual.gap.answer.encoders import by_an_encoder
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.records import stands_for, unlike
 from residual.gap.clock import Clock
@@ -157,7 +158,7 @@ def find_gap(
             claims=tuple(
                 replace(
                     claim,
-                    counted=conventions is not None,
+                    counted=conventions is not None or by_an_encoder(claim, log.rescaled),
                     cut_off=bool(log.cut_off),
                     unlike=stands_for(answer, claim, differ),
                     refuted=judged.refuted,

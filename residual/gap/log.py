@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -34,6 +34,8 @@ class Log:
         findings: What was found about the data, in words.
         left_out: What of the data is not searched, in words.
         cut_off: Channels that the simulator cuts off within what was recorded of them.
+        rescaled: Part by which a position moves more than the integral of its rate, which was put
+            on its scale, by name.
     """
 
     simulator: HostSimulator
@@ -45,6 +47,7 @@ class Log:
     findings: list[str]
     left_out: list[str]
     cut_off: tuple[str, ...] = ()
+    rescaled: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def at(self, horizon: float) -> Log:
         """The same for forecasts of another length, which want other rows."""
@@ -76,7 +79,13 @@ def look(
         held_by_records(simulator, every, horizon) if horizon else usual_horizon(simulator, every)
     )
     cut = dict.fromkeys(one.where for one in examined.findings if one.kind == "unanswered")
-    log = Log(simulator, every, every, length, horizon is not None, apart, findings, [], tuple(cut))
+    rescaled = {
+        one.where: one.numbers["scale"] - 1 for one in examined.findings if one.kind == "kinematics"
+    }
+    log = Log(
+        simulator, every, every, length, horizon is not None, apart, findings, [], tuple(cut),
+        rescaled,
+    )  # fmt: skip
     log = log.at(length)
     for says in [*findings, *log.left_out]:
         tell(says)
