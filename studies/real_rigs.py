@@ -5,8 +5,8 @@ what the rig's config in studies/configs/find_gap says, and the logs to fit. Its
 then judged on logs that it has not seen, beside the nominal simulator and beside a repair by hand:
 the nominal simulator with the effects of the rig's answer key, fitted by the same forecasts.
 
-  python -m studies.real_rigs --data ../shared/data
-  python -m studies.real_rigs --data ../shared/data --rigs airtrack heater --output results/rigs
+  python -m studies.real_rigs --data rigs
+  python -m studies.real_rigs --data rigs --rigs airtrack heater --output results/rigs
 """
 
 from __future__ import annotations
@@ -34,7 +34,12 @@ RATIO, SECONDS = 1.5, 120.0
 def build_parser() -> Parser:
     """The command line of this study."""
     parser = Parser(prog="python -m studies.real_rigs", description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="Folder with one folder a rig.")
+    parser.add_argument(
+        "--data",
+        type=Path,
+        required=True,
+        help="Folder with one folder for each rig; docs/real-rigs.md lists their files.",
+    )
     parser.add_argument(
         "--rigs", type=str, nargs="+", default=None, help="Only these, by folder; default: all."
     )
