@@ -77,3 +77,15 @@ def test_a_column_map_from_python_reads_what_the_page_says(tmp_path, monkeypatch
     first, second = names["logs"].trajectories
     assert np.allclose(first.states, np.stack([angle, rate], axis=1)[:30], atol=1e-6)
     assert len(second.times) == 30 and second.actions.max() <= 0.9
+
+
+def test_the_rows_of_blind_logs_add_up_to_its_totals():
+    lines = text("blind-logs.md").splitlines()
+    cells = [[cell.strip(" *") for cell in line.split("|")[1:-1]] for line in lines]
+    rows = [row[2:6] for row in cells if len(row) == 8 and row[2].isdigit()]
+    *batches, total = ([int(cell or 0) for cell in row] for row in rows)
+    assert [sum(column) for column in zip(*batches, strict=True)] == total
+    logs, answers, wrong, size = total
+    said = " ".join(lines)
+    assert f"{answers} answers about {logs} logs. In {wrong} " in said and f"in {size} the" in said
+    assert f"all {wrong}\n" in text("blind-logs.md") and f"all {size}\n" in text("blind-logs.md")
