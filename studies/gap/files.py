@@ -143,7 +143,7 @@ def gap_record(
     findings: Sequence[Finding] = (),
     seconds: float | None = None,
 ) -> dict[str, Any]:
-    """What ``gap.json`` holds (docs/find-gap.md)."""
+    """What ``gap.json`` holds (docs/gap-json.md)."""
     total = sum(result.seconds.values()) if seconds is None else seconds
     return {
         "says": lead(result, config.get("tolerance")),
