@@ -16,7 +16,6 @@ simulator does not know.
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -135,9 +134,7 @@ def run(
     begin = time.perf_counter()
     tell = progress or (lambda _: None)
     parser = build_parser()
-    chosen = parser.parse_object(
-        {**copy.deepcopy(dict(settings)), "output": str(output), "jobs": jobs}
-    )
+    chosen = parser.parse_object({**settings, "output": str(output), "jobs": jobs})
     plain = parser.plain(chosen)
     config = {key: plain[key] for key in (*_FIELDS, "logs", "held_out", "effects")}
     made = parser.instantiate(chosen)

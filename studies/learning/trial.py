@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import importlib.util
 import json
@@ -73,16 +72,14 @@ def build_parser(study: Study) -> Parser:
 def instantiate(study: Study, config: Config) -> Trial:
     """The trial that plain settings describe; exits with one line if they are wrong."""
     parser = build_parser(study)
-    # The parser changes nested lists of what it is given.
-    chosen = parser.instantiate(parser.parse_object(copy.deepcopy(dict(config))))
+    chosen = parser.instantiate(parser.parse_object(config))
     return study.trial(**{name: chosen[name] for name in study.settings})
 
 
 def resolve(study: Study, config: Config) -> dict[str, Any]:
     """``config`` with every default filled in, checked by the parser."""
     parser = build_parser(study)
-    chosen = parser.parse_object(copy.deepcopy(dict(config)))
-    settings = parser.plain(chosen)
+    settings = parser.plain(parser.parse_object(config))
     return {name: settings[name] for name in study.settings}
 
 
