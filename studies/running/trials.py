@@ -183,7 +183,7 @@ def _finished(folder: Path, code: str | None = None) -> bool:
     """Whether results are there, whole and, if a hash is given, of this code."""
     try:
         made_by = read_sealed(folder / RESULTS).get("made_by")
-    except (OSError, ValueError, TypeError, AttributeError):
+    except (OSError, ValueError):
         return False
     return not code or made_by == code
 
