@@ -24,8 +24,8 @@ from residual.gap.model.model import Model
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.host import HostSimulator
+from sims.simulator import Array
 
-Array = NDArray[np.float64]
 #: Savitzky-Golay window in samples; wider ones smear the jumps of the input.
 WINDOW = 5
 #: Smallest share of the residual worth a name, the same as the engine's.

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
-
-Array = NDArray[np.float64]
+from sims.simulator import Array
 
 #: A forecast that leaves its channel by more than this many times its spread is lost; how far
 #: it then goes means nothing.
