@@ -5,8 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import os
-import secrets
-import shutil
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -173,14 +172,13 @@ def gap_record(
 def staged(folder: Path) -> Iterator[Path]:
     """A temporary folder beside ``folder``; its files move there when the block ends well."""
     folder.parent.mkdir(parents=True, exist_ok=True)
-    stage = folder.parent / f".partial-{secrets.token_hex(4)}-{folder.name}"
-    stage.mkdir()
-    try:
+    with tempfile.TemporaryDirectory(
+        f"-{folder.name}", ".partial-", folder.parent, ignore_cleanup_errors=True
+    ) as made:
+        stage = Path(made)
         yield stage
         for source in sorted(path for path in stage.rglob("*") if path.is_file()):
             target = folder / source.relative_to(stage)
             target.parent.mkdir(parents=True, exist_ok=True)
             flush_to_disk(source)
             os.replace(source, target)
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
