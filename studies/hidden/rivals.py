@@ -128,13 +128,10 @@ def one_step(data: Regression, chance: float = 0.05, most: int = 3) -> list[str]
     chosen: list[int] = []
     n = len(data.target)
     while len(chosen) < most:
-        if chosen:
-            fitted = np.linalg.lstsq(unit[:, chosen], data.target, rcond=None)[0]
-            left = data.target - unit[:, chosen] @ fitted
-            q, _ = np.linalg.qr(unit[:, chosen])
-            rest = unit - q @ (q.T @ unit)
-        else:
-            left, rest = data.target, unit
+        fitted = np.linalg.lstsq(unit[:, chosen], data.target, rcond=None)[0]
+        left = data.target - unit[:, chosen] @ fitted
+        q, _ = np.linalg.qr(unit[:, chosen])
+        rest = unit - q @ (q.T @ unit)
         power = (rest**2).sum(axis=0)
         gain = np.where(power > 1e-4, (rest.T @ left) ** 2 / np.maximum(power, 1e-12), 0.0)
         taken = {data.owner[i] for i in chosen}
