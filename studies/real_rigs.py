@@ -73,25 +73,21 @@ def table(results: Sequence[Judged]) -> pd.DataFrame:
 
 def summary(results: Sequence[Judged]) -> str:
     """What was reached, in counts, and every miss in words."""
-    count = len(results)
-    lines = [
-        f"key's effect or its family named: {sum(r.named.enough for r in results)}/{count}",
-        f"error at most {RATIO} times the key's repair: "
-        f"{sum(r.ratio <= RATIO for r in results)}/{count}",
-        f"a confirmed name that the key does not support: "
-        f"{sum(bool(r.named.wrong) for r in results)}/{count}",
-        f"at most {SECONDS:.0f} s of processor time: "
-        f"{sum(r.seconds <= SECONDS for r in results)}/{count}",
-    ]
+    counts = {
+        "key's effect or its family named": sum(r.named.enough for r in results),
+        f"error at most {RATIO} times the key's repair": sum(r.ratio <= RATIO for r in results),
+        "a confirmed name that the key does not support": sum(bool(r.named.wrong) for r in results),
+        f"at most {SECONDS:.0f} s of processor time": sum(r.seconds <= SECONDS for r in results),
+    }
+    lines = [f"{what}: {count}/{len(results)}" for what, count in counts.items()]
     for r in results:
-        if not r.named.enough:
-            lines.append(f"missed: {r.rig}: names {', '.join(r.named.right)}")
-        if r.ratio > RATIO:
-            lines.append(f"missed: {r.rig}: {r.ratio:.2f} times the error of the key's repair")
-        if r.named.wrong:
-            lines.append(f"missed: {r.rig}: confirmed {', '.join(r.named.wrong)}")
-        if r.seconds > SECONDS:
-            lines.append(f"missed: {r.rig}: {r.seconds:.0f} s of processor time")
+        misses = {
+            f"names {', '.join(r.named.right)}": not r.named.enough,
+            f"{r.ratio:.2f} times the error of the key's repair": r.ratio > RATIO,
+            f"confirmed {', '.join(r.named.wrong)}": bool(r.named.wrong),
+            f"{r.seconds:.0f} s of processor time": r.seconds > SECONDS,
+        }
+        lines += [f"missed: {r.rig}: {what}" for what, missed in misses.items() if missed]
     return "\n".join(lines)
 
 
