@@ -25,9 +25,9 @@ from typing import Any, Literal
 from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
+from residual.gap.find import hosting
 from residual.logs import LogData, LogFormat, read_logs
 from residual.step_check import advice
-from sims.contract import refuse_unsound
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect
 from sims.host import HostSimulator
@@ -199,21 +199,6 @@ def not_upstream(effects: Sequence[Effect], hold: Mapping[str, Hold]) -> tuple[E
         return effect.upstream_of_sensor and any(hold.get(name) == "linear" for name in inputs)
 
     return tuple(effect for effect in effects if not recorded(effect))
-
-
-def hosting(simulator: Simulator) -> HostSimulator:
-    """The simulator, if effects can be added to it.
-
-    Raises:
-        ValueError: It hosts none, or is unsound (``sims.contract``).
-    """
-    if isinstance(simulator, HostSimulator):
-        refuse_unsound(simulator)
-        return simulator
-    raise ValueError(
-        f"{type(simulator).__name__} cannot host effects: derive it from EquationOfMotion or "
-        "FirstOrderSystem (sims.equations), or from HostSimulator (sims.host)"
-    )
 
 
 def read(simulator: HostSimulator, logs: Sequence[str], columns: LogFormat) -> LogData:

@@ -40,7 +40,7 @@ from residual.trajectories import Trajectory, trajectories_of
 from sims.contract import refuse_unsound
 from sims.effects.base import Effect
 from sims.host import HostSimulator
-from sims.simulator import Hold
+from sims.simulator import Hold, Simulator
 
 #: Part of the rows that an answer rests on, below which that is told.
 ENOUGH = 0.5
@@ -95,11 +95,11 @@ def find_gap(
     Raises:
         ValueError: There are no trajectories, nothing was measured (in those set aside: nothing
             that was measured in the others), samples are too rare, a setting is no number or beyond
-            its range, the simulator is unsound
-            (``sims.contract``) or returns values that are not finite, or a position of a system
-            that strikes the ground was not measured.
+            its range, the simulator hosts no effects, is unsound (``sims.contract``) or returns
+            values that are not finite, or a position of a system that strikes the ground was not
+            measured.
     """
-    refuse_unsound(simulator)
+    simulator = hosting(simulator)
     declared = {channel.name: channel.scale for channel in simulator.physical_channels}
     _refuse_settings(horizon, parameter_tolerance, minutes)
     runs, set_aside = trajectories_of(trajectories), trajectories_of(held_out)
@@ -178,6 +178,21 @@ def find_gap(
         result, corrected=result.corrected.with_scales(declared), conventions=conventions,
         cut_off=log.cut_off, unlike=differ, changing=over_time, nearly_late=late,
     )  # fmt: skip
+
+
+def hosting(simulator: Simulator) -> HostSimulator:
+    """The simulator, if effects can be added to it.
+
+    Raises:
+        ValueError: It hosts none, or is unsound (``sims.contract``).
+    """
+    if isinstance(simulator, Simulator) and not isinstance(simulator, HostSimulator):
+        raise ValueError(
+            f"{type(simulator).__name__} cannot host effects: derive it from EquationOfMotion or "
+            "FirstOrderSystem (sims.equations), or from HostSimulator (sims.host)"
+        )
+    refuse_unsound(simulator)
+    return simulator
 
 
 def _refuse_settings(horizon: Any, parameter_tolerance: Any, minutes: Any) -> None:
