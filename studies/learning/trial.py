@@ -8,7 +8,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import threadpoolctl
 import torch
 from jsonargparse.typing import NonNegativeFloat
@@ -16,9 +15,7 @@ from jsonargparse.typing import NonNegativeFloat
 from policy.learner import other_name
 from residual.logs.writing import write_log
 from residual.persistence import is_ours, save
-from residual.trajectories import Trajectory
 from simgap_files.npz import write_npz
-from sims.simulator import Simulator
 from studies.learning.described import modules_in, settings_of
 from studies.learning.fingerprint import fingerprint
 from studies.learning.kept import OnDisk
@@ -131,8 +128,10 @@ def run_trial(
     for name, training in learnt.trainings.items():
         training.learner.save(folder / "policies" / f"{name}.safetensors")
         write_npz(folder / "rollouts" / f"{name}.npz", training.episode)
+    nominal = steps.system.nominal
     for run in learnt.runs:
-        _write_run(folder / "samples" / f"{run.name}.csv", steps.system.nominal, run)
+        path = folder / "samples" / f"{run.name}.csv"
+        write_log(path, run, nominal.state_channels, nominal.action_channels)
     saved = []
     for number, model in enumerate(learnt.models, start=1):
         # Another library's estimator needs skops, which may not be there.
@@ -153,14 +152,6 @@ def run_trial(
         "versions": versions(),
         "made_by": made_by,
     }
-
-
-def _write_run(path: Path, simulator: Simulator, run: Trajectory) -> None:
-    """Write a run of true samples as a log whose columns are named as the channels are."""
-    measured = np.asarray(np.isfinite(run.states).any(axis=0))
-    channels = [c for c, seen in zip(simulator.state_channels, measured, strict=True) if seen]
-    names = [channel.name for channel in (*channels, *simulator.action_channels)]
-    write_log(path, names, run.times, run.states[:, measured], run.actions)
 
 
 def code_of_trial(study: Study, config: Config) -> str:
