@@ -28,8 +28,6 @@ from residual.gap import GapResult, find_gap
 from residual.gap.find import hosting
 from residual.logs import LogData, LogFormat, read_logs
 from residual.step_check import advice
-from sims.effects.actuator import ActuatorEffect
-from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Hold, Simulator
@@ -141,7 +139,7 @@ def run(
     study = GapStudy(**{name: made[name] for name in _FIELDS})
     simulator = hosting(study.simulator)
     hold = holds(simulator, study.hold)
-    effects = not_upstream(chosen_effects(simulator, chosen.effects), hold)
+    effects = chosen_effects(simulator, chosen.effects)
     check_output(output)
     # In whatever order the files come, not one digit of the answer changes.
     data = read(simulator, sorted(chosen.logs), study.columns)
@@ -162,6 +160,8 @@ def run(
         tolerance=study.tolerance,
         effects=effects,
         hold=hold or None,
+        # What happens before a measured input is recorded in it already.
+        measured_input=[name for name, kind in hold.items() if kind == "linear"],
         horizon=study.horizon,
         parameter_tolerance=study.parameter_tolerance,
         minutes=study.minutes,
@@ -189,16 +189,6 @@ def holds(simulator: HostSimulator, hold: str | Mapping[str, Hold]) -> dict[str,
             raise ValueError(f"--hold: no input {unknown}; there are {', '.join(names) or 'none'}")
         return dict(hold)
     return {name: "linear" if hold == "linear" else "zero" for name in names}
-
-
-def not_upstream(effects: Sequence[Effect], hold: Mapping[str, Hold]) -> tuple[Effect, ...]:
-    """Effects without those whose consequence a measured input ("linear") holds already."""
-
-    def recorded(effect: Effect) -> bool:
-        inputs = effect.actuators if isinstance(effect, ActuatorEffect) else ()
-        return effect.upstream_of_sensor and any(hold.get(name) == "linear" for name in inputs)
-
-    return tuple(effect for effect in effects if not recorded(effect))
 
 
 def read(simulator: HostSimulator, logs: Sequence[str], columns: LogFormat) -> LogData:

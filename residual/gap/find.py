@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from numbers import Real
 from typing import Any
@@ -54,7 +54,7 @@ def find_gap(
     tolerance: float | None = None,
     effects: Effect | str | Iterable[Effect | str | Mapping[str, Any]] | None = None,
     hold: Hold | Mapping[str, Hold] | None = None,
-    measured_input: bool = False,
+    measured_input: bool | Collection[str] = False,
     horizon: float | None = None,
     parameter_tolerance: float = KNOWN,
     minutes: float = 2.0,
@@ -76,8 +76,9 @@ def find_gap(
         hold: How inputs run between samples, ``"zero"`` (held, as commands are) or ``"linear"``
             (straight to the next, as most measured inputs are), for all or by input; by default
             as the channels say, unless what is found fits clearly better the other way.
-        measured_input: True if the logged inputs were measured at the actuator's output; what
-            happens before that (dead zone, saturation, lag) is then no candidate.
+        measured_input: True if the logged inputs were measured at the actuator's output, or names
+            of those that were; what happens before that (dead zone, saturation, lag) is then no
+            candidate.
         horizon: Forecast length in seconds; by default a third of the usual period of the motion,
             see ``residual.gap.preparation.horizon``.
         parameter_tolerance: How well the simulator's parameters are known, as a share of each: an
