@@ -104,7 +104,7 @@ def write_gap(
     config: Mapping[str, Any],
     findings: Sequence[Finding] = (),
     seconds: float | None = None,
-) -> Path:
+) -> None:
     """Write ``gap.json``, ``corrected.yaml``, ``report.html`` and ``figures/``: all or nothing.
 
     Args:
@@ -114,9 +114,6 @@ def write_gap(
             ``init_args`` of the nominal simulator (``sims.loading.simulator_settings``).
         findings: What the reader of the logs had to say.
         seconds: Wall time; by default the sum over the stages.
-
-    Returns:
-        The folder.
 
     Raises:
         OSError: The folder cannot be written.
@@ -133,7 +130,6 @@ def write_gap(
             (stage / name).write_bytes(content)
         write_report(result, record, stage)
         write_sealed(stage / JSON, record)
-    return Path(folder)
 
 
 def gap_record(
