@@ -27,6 +27,7 @@ from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 from residual.gap import GapResult, find_gap
 from residual.gap.find import hosting
 from residual.logs import LogData, LogFormat, read_logs
+from residual.logs.checks import Finding
 from residual.step_check import advice
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
@@ -171,7 +172,8 @@ def run(
     tell("writing the report")
     write_gap(result, output, config, findings, time.perf_counter() - begin)
     grave = found_in_data([found for found in findings if found.severity == "warning"])
-    return dataclasses.replace(result, quality=(*grave, *result.quality))
+    first = tuple(Finding("log", "", line) for line in grave)
+    return dataclasses.replace(result, quality=(*first, *result.quality))
 
 
 def holds(simulator: HostSimulator, hold: str | Mapping[str, Hold]) -> dict[str, Hold]:

@@ -36,6 +36,7 @@ from residual.gap.row_late import Read, a_row_earlier
 from residual.gap.search.finals import on_more_windows
 from residual.gap.search.known import KNOWN
 from residual.logs import LogData
+from residual.logs.checks import Finding
 from residual.trajectories import Trajectory, trajectories_of
 from sims.contract import refuse_unsound
 from sims.effects.base import Effect
@@ -170,8 +171,9 @@ def find_gap(
         )
         clock.lap("forecast")
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
-    quality = [*log.findings, *log.left_out, *other, *on_hold, *read.says, *on_rest, *on_more]
-    quality += [*known.says, *_searched(answer.found.search.fitter), *inquiry.untried(answer)]
+    says = [*log.left_out, *other, *on_hold, *read.says, *on_rest, *on_more, *known.says]
+    says += [*_searched(answer.found.search.fitter), *inquiry.untried(answer)]
+    quality = (*log.findings, *(Finding("search", "", one) for one in says))
     result = told(answer, table, judged.table, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)
     conventions = conventions or other_sign(simulator, result.effects)

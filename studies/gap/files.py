@@ -155,8 +155,8 @@ def gap_record(
             name: {"value": sigma, "error": error} for name, (sigma, error) in result.noise.items()
         },
         "quality": [
-            *({"kind": f.kind, "where": f.where, "says": f.says} for f in findings),
-            *({"kind": "engine", "where": "", "says": says} for says in result.quality),
+            {"kind": one.kind, "where": one.where, "says": one.says}
+            for one in (*findings, *result.quality)
         ],
         "seconds": {"total": total, **result.seconds},
         "versions": versions(),

@@ -117,7 +117,7 @@ def score(
         "forecast_after": result.gap.after.value / result.gap.noise_floor.value,
         "seconds": sum(result.seconds.values()),
         "says": [v.says for v in result.verdicts],
-        "quality": list(result.quality),
+        "quality": [one.words for one in result.quality],
     }
     return row
 
