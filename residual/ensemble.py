@@ -12,7 +12,7 @@ from sklearn.multioutput import MultiOutputRegressor
 from sklearn.utils import check_random_state
 from sklearn.utils.metaestimators import available_if
 
-from residual.estimator import Array, Estimator
+from residual.estimator import Array, Estimator, unset_seeds
 from sims.simulator import Simulator
 
 
@@ -107,12 +107,7 @@ class Ensemble(Estimator):
 
 def _seeded(regressor: Any, outputs: int, random: np.random.RandomState) -> Any:
     copy = clone(regressor)
-    unset = {
-        name: int(random.randint(2**31 - 1))
-        for name, value in sorted(copy.get_params().items())
-        if name.split("__")[-1] == "random_state" and value is None
-    }
-    copy.set_params(**unset)
+    copy.set_params(**{name: int(random.randint(2**31 - 1)) for name in unset_seeds(copy)})
     several = copy.__sklearn_tags__().target_tags.multi_output
     return copy if several else MultiOutputRegressor(copy)
 

@@ -84,6 +84,15 @@ def _refuse_predictions(estimator: Any) -> None:
         raise ValueError(f"estimator {name} predicts {found[~np.isfinite(found)][0]} after fit")
 
 
+def unset_seeds(estimator: BaseEstimator) -> list[str]:
+    """Every ``random_state`` that nobody has set, of it and of what is inside, in order."""
+    return [
+        name
+        for name, value in sorted(estimator.get_params().items())
+        if name.split("__")[-1] == "random_state" and value is None
+    ]
+
+
 class Estimator(MultiOutputMixin, RegressorMixin, BaseEstimator, abc.ABC):
     """Base of our own estimators: what any estimator of a difference model must offer, and more.
 

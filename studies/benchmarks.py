@@ -52,31 +52,6 @@ def build_parser() -> Parser:
     return parser
 
 
-def run_suite(target: Path) -> bool:
-    """Run the benchmarks in a process of their own; progress goes to stderr.
-
-    Args:
-        target: JSON file to write.
-
-    Returns:
-        Whether every benchmark passed.
-
-    Raises:
-        FileNotFoundError: This is no checkout of the project: the suite is not there.
-        ChildProcessError: Nothing was measured.
-    """
-    check_suite()
-    command = [sys.executable, "-m", "pytest", str(SUITE), "-o", "addopts=", "--benchmark-only"]
-    command += ["--benchmark-json", str(target), "-q", "-rs", "-p", "no:cacheprovider"]
-    done = subprocess.run(command, cwd=ROOT, env=os.environ | ONE_THREAD, stdout=sys.stderr)
-    if not target.is_file() or not target.stat().st_size:
-        raise ChildProcessError(
-            "nothing was measured, see above; the benchmarks need the extras: "
-            "`pip install -e '.[test,bench]'`"
-        )
-    return done.returncode == 0
-
-
 def check_suite() -> None:
     """Raise ``FileNotFoundError`` if this is no checkout of the project."""
     if not (ROOT / SUITE).is_dir():
@@ -167,14 +142,30 @@ def joined(page: str, section: str) -> str:
 
 
 def measure() -> tuple[dict[str, Any], bool]:
-    """Run the suite: what it measured, and whether every benchmark passed; see ``run_suite``."""
+    """Run the suite in a process of its own; progress goes to stderr.
+
+    Returns:
+        What it measured, and whether every benchmark passed.
+
+    Raises:
+        FileNotFoundError: This is no checkout of the project: the suite is not there.
+        ChildProcessError: Nothing was measured.
+    """
+    check_suite()
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder, "benchmarks.json")
-        complete = run_suite(target)
+        command = [sys.executable, "-m", "pytest", str(SUITE), "-o", "addopts=", "--benchmark-only"]
+        command += ["--benchmark-json", str(target), "-q", "-rs", "-p", "no:cacheprovider"]
+        done = subprocess.run(command, cwd=ROOT, env=os.environ | ONE_THREAD, stdout=sys.stderr)
+        if not target.is_file() or not target.stat().st_size:
+            raise ChildProcessError(
+                "nothing was measured, see above; the benchmarks need the extras: "
+                "`pip install -e '.[test,bench]'`"
+            )
         data = read_json(target)
     # What decides the figures; where they are written to does not.
     data["command"] = "python -m studies.benchmarks"
-    return data, complete
+    return data, done.returncode == 0
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@ simulator does not know.
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -26,11 +25,10 @@ from typing import Any, Literal
 from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
+from residual.gap.find import hosting
 from residual.logs import LogData, LogFormat, read_logs
+from residual.logs.checks import Finding
 from residual.step_check import advice
-from sims.contract import refuse_unsound
-from sims.effects.actuator import ActuatorEffect
-from sims.effects.base import Effect
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Hold, Simulator
@@ -135,16 +133,14 @@ def run(
     begin = time.perf_counter()
     tell = progress or (lambda _: None)
     parser = build_parser()
-    chosen = parser.parse_object(
-        {**copy.deepcopy(dict(settings)), "output": str(output), "jobs": jobs}
-    )
+    chosen = parser.parse_object({**settings, "output": str(output), "jobs": jobs})
     plain = parser.plain(chosen)
     config = {key: plain[key] for key in (*_FIELDS, "logs", "held_out", "effects")}
     made = parser.instantiate(chosen)
     study = GapStudy(**{name: made[name] for name in _FIELDS})
     simulator = hosting(study.simulator)
     hold = holds(simulator, study.hold)
-    effects = not_upstream(chosen_effects(simulator, chosen.effects), hold)
+    effects = chosen_effects(simulator, chosen.effects)
     check_output(output)
     # In whatever order the files come, not one digit of the answer changes.
     data = read(simulator, sorted(chosen.logs), study.columns)
@@ -165,6 +161,8 @@ def run(
         tolerance=study.tolerance,
         effects=effects,
         hold=hold or None,
+        # What happens before a measured input is recorded in it already.
+        measured_input=[name for name, kind in hold.items() if kind == "linear"],
         horizon=study.horizon,
         parameter_tolerance=study.parameter_tolerance,
         minutes=study.minutes,
@@ -174,7 +172,8 @@ def run(
     tell("writing the report")
     write_gap(result, output, config, findings, time.perf_counter() - begin)
     grave = found_in_data([found for found in findings if found.severity == "warning"])
-    return dataclasses.replace(result, quality=(*grave, *result.quality))
+    first = tuple(Finding("log", "", line) for line in grave)
+    return dataclasses.replace(result, quality=(*first, *result.quality))
 
 
 def holds(simulator: HostSimulator, hold: str | Mapping[str, Hold]) -> dict[str, Hold]:
@@ -192,31 +191,6 @@ def holds(simulator: HostSimulator, hold: str | Mapping[str, Hold]) -> dict[str,
             raise ValueError(f"--hold: no input {unknown}; there are {', '.join(names) or 'none'}")
         return dict(hold)
     return {name: "linear" if hold == "linear" else "zero" for name in names}
-
-
-def not_upstream(effects: Sequence[Effect], hold: Mapping[str, Hold]) -> tuple[Effect, ...]:
-    """Effects without those whose consequence a measured input ("linear") holds already."""
-
-    def recorded(effect: Effect) -> bool:
-        inputs = effect.actuators if isinstance(effect, ActuatorEffect) else ()
-        return effect.upstream_of_sensor and any(hold.get(name) == "linear" for name in inputs)
-
-    return tuple(effect for effect in effects if not recorded(effect))
-
-
-def hosting(simulator: Simulator) -> HostSimulator:
-    """The simulator, if effects can be added to it.
-
-    Raises:
-        ValueError: It hosts none, or is unsound (``sims.contract``).
-    """
-    if isinstance(simulator, HostSimulator):
-        refuse_unsound(simulator)
-        return simulator
-    raise ValueError(
-        f"{type(simulator).__name__} cannot host effects: derive it from EquationOfMotion or "
-        "FirstOrderSystem (sims.equations), or from HostSimulator (sims.host)"
-    )
 
 
 def read(simulator: HostSimulator, logs: Sequence[str], columns: LogFormat) -> LogData:

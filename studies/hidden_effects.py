@@ -35,11 +35,10 @@ from simgap_files.atomic import read_sealed, write_sealed
 from sims.effects.library import library
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import make_logs
-from studies.hidden.dirty.report import summary as dirty_summary
 from studies.hidden.dirty.report import write_dirty
 from studies.hidden.dirty.score import run_dirty
 from studies.hidden.grid import OUTSIDE, HiddenStudy, trials_of
-from studies.hidden.report import summary, write_report
+from studies.hidden.report import write_report
 from studies.hidden.rivals import one_step, regression, sparse
 from studies.hidden.scores import replaceable, score, score_names
 from studies.hidden.strengths import draw, truth
@@ -122,11 +121,10 @@ def _report(
     dirty = [result for result in results if "system" in result["config"]]
     clean = [result for result in results if "system" not in result["config"]]
     if clean:
-        write_report(clean, output, settings)
-        print(f"\n{summary(clean)}\n\nreport: {output / 'report.html'}")
+        short = write_report(clean, output, settings)
+        print(f"\n{short}\n\nreport: {output / 'report.html'}")
     if dirty:
-        write_dirty(dirty, output)
-        print(f"\n{dirty_summary(dirty)}\n\nreport: {output / 'dirty.md'}")
+        print(f"\n{write_dirty(dirty, output)}\n\nreport: {output / 'dirty.md'}")
 
 
 @guarded()

@@ -3,7 +3,7 @@
   python -m studies.log_info run.mcap
   python -m studies.log_info run.csv dataset.hdf5 lerobot_folder
 
-Names are those that a column map takes (docs/find-gap.md).
+Names are those that a column map takes (docs/logs.md).
 """
 
 from __future__ import annotations

@@ -21,12 +21,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 from jsonargparse.typing import PositiveInt
 
 from policy.learner import OURS, Algorithm
 from residual.logs.writing import write_log
-from sims.pendulum import IDEALISED_MASS, TRUE_MASS
+from sims.pendulum import ACTION_CHANNELS, IDEALISED_MASS, STATE_CHANNELS, TRUE_MASS
 from studies.hidden.data import Truth, make_logs
 from studies.hidden.walks import write_walks
 from studies.running.command import Parser
@@ -81,10 +80,8 @@ def write_logs(
     """
     paths = []
     for number, run in enumerate(make_logs(truth, seed, excitation, noise, runs, steps), start=1):
-        measured = ["angle", "rate"] if np.isfinite(run.states[:, 1]).any() else ["angle"]
-        seen = run.states[:, : len(measured)]
         paths.append(folder / f"run-{number:02d}.csv")
-        write_log(paths[-1], [*measured, "voltage"], run.times, seen, run.actions)
+        write_log(paths[-1], run, STATE_CHANNELS, ACTION_CHANNELS)
     return paths
 
 

@@ -5,8 +5,8 @@ what the rig's config in studies/configs/find_gap says, and the logs to fit. Its
 then judged on logs that it has not seen, beside the nominal simulator and beside a repair by hand:
 the nominal simulator with the effects of the rig's answer key, fitted by the same forecasts.
 
-  python -m studies.real_rigs --data ../shared/data
-  python -m studies.real_rigs --data ../shared/data --rigs airtrack heater --output results/rigs
+  python -m studies.real_rigs --data rigs
+  python -m studies.real_rigs --data rigs --rigs airtrack heater --output results/rigs
 """
 
 from __future__ import annotations
@@ -34,7 +34,12 @@ RATIO, SECONDS = 1.5, 120.0
 def build_parser() -> Parser:
     """The command line of this study."""
     parser = Parser(prog="python -m studies.real_rigs", description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="Folder with one folder a rig.")
+    parser.add_argument(
+        "--data",
+        type=Path,
+        required=True,
+        help="Folder with one folder for each rig; docs/real-rigs.md lists their files.",
+    )
     parser.add_argument(
         "--rigs", type=str, nargs="+", default=None, help="Only these, by folder; default: all."
     )
@@ -68,25 +73,21 @@ def table(results: Sequence[Judged]) -> pd.DataFrame:
 
 def summary(results: Sequence[Judged]) -> str:
     """What was reached, in counts, and every miss in words."""
-    count = len(results)
-    lines = [
-        f"key's effect or its family named: {sum(r.named.enough for r in results)}/{count}",
-        f"error at most {RATIO} times the key's repair: "
-        f"{sum(r.ratio <= RATIO for r in results)}/{count}",
-        f"a confirmed name that the key does not support: "
-        f"{sum(bool(r.named.wrong) for r in results)}/{count}",
-        f"at most {SECONDS:.0f} s of processor time: "
-        f"{sum(r.seconds <= SECONDS for r in results)}/{count}",
-    ]
+    counts = {
+        "key's effect or its family named": sum(r.named.enough for r in results),
+        f"error at most {RATIO} times the key's repair": sum(r.ratio <= RATIO for r in results),
+        "a confirmed name that the key does not support": sum(bool(r.named.wrong) for r in results),
+        f"at most {SECONDS:.0f} s of processor time": sum(r.seconds <= SECONDS for r in results),
+    }
+    lines = [f"{what}: {count}/{len(results)}" for what, count in counts.items()]
     for r in results:
-        if not r.named.enough:
-            lines.append(f"missed: {r.rig}: names {', '.join(r.named.right)}")
-        if r.ratio > RATIO:
-            lines.append(f"missed: {r.rig}: {r.ratio:.2f} times the error of the key's repair")
-        if r.named.wrong:
-            lines.append(f"missed: {r.rig}: confirmed {', '.join(r.named.wrong)}")
-        if r.seconds > SECONDS:
-            lines.append(f"missed: {r.rig}: {r.seconds:.0f} s of processor time")
+        misses = {
+            f"names {', '.join(r.named.right)}": not r.named.enough,
+            f"{r.ratio:.2f} times the error of the key's repair": r.ratio > RATIO,
+            f"confirmed {', '.join(r.named.wrong)}": bool(r.named.wrong),
+            f"{r.seconds:.0f} s of processor time": r.seconds > SECONDS,
+        }
+        lines += [f"missed: {r.rig}: {what}" for what, missed in misses.items() if missed]
     return "\n".join(lines)
 
 

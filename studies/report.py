@@ -13,7 +13,6 @@ import importlib
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from jinja2 import UndefinedError
 
@@ -45,8 +44,8 @@ def study_of(folder: Path) -> str:
         raise FileNotFoundError(
             f"{folder}: expected the output folder of a study, with {PLAN} or results.json in it"
         )
-    found: Any = read_sealed(path)
-    if not isinstance(found, dict) or "study" not in found:
+    found = read_sealed(path)
+    if "study" not in found:
         raise ValueError(f"{path} is damaged: expected a JSON object with the name of its study")
     name = str(found["study"])
     # A name from a file is imported: it may only be that of a study.

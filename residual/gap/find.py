@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from numbers import Real
 from typing import Any
@@ -13,6 +13,7 @@ from residual.gap.answer.answer import summed_up, told
 from residual.gap.answer.apart import NOT_JUDGED, judged_apart
 from residual.gap.answer.changing import changing
 from residual.gap.answer.confirmed import matters
+from residual.gap.answer.encoders import by_an_encoder
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.records import stands_for, unlike
 from residual.gap.clock import Clock
@@ -35,11 +36,12 @@ from residual.gap.row_late import Read, a_row_earlier
 from residual.gap.search.finals import on_more_windows
 from residual.gap.search.known import KNOWN
 from residual.logs import LogData
+from residual.logs.checks import Finding
 from residual.trajectories import Trajectory, trajectories_of
 from sims.contract import refuse_unsound
 from sims.effects.base import Effect
 from sims.host import HostSimulator
-from sims.simulator import Hold
+from sims.simulator import Hold, Simulator
 
 #: Part of the rows that an answer rests on, below which that is told.
 ENOUGH = 0.5
@@ -53,7 +55,7 @@ def find_gap(
     tolerance: float | None = None,
     effects: Effect | str | Iterable[Effect | str | Mapping[str, Any]] | None = None,
     hold: Hold | Mapping[str, Hold] | None = None,
-    measured_input: bool = False,
+    measured_input: bool | Collection[str] = False,
     horizon: float | None = None,
     parameter_tolerance: float = KNOWN,
     minutes: float = 2.0,
@@ -75,8 +77,9 @@ def find_gap(
         hold: How inputs run between samples, ``"zero"`` (held, as commands are) or ``"linear"``
             (straight to the next, as most measured inputs are), for all or by input; by default
             as the channels say, unless what is found fits clearly better the other way.
-        measured_input: True if the logged inputs were measured at the actuator's output; what
-            happens before that (dead zone, saturation, lag) is then no candidate.
+        measured_input: True if the logged inputs were measured at the actuator's output, or names
+            of those that were; what happens before that (dead zone, saturation, lag) is then no
+            candidate.
         horizon: Forecast length in seconds; by default a third of the usual period of the motion,
             see ``residual.gap.preparation.horizon``.
         parameter_tolerance: How well the simulator's parameters are known, as a share of each: an
@@ -94,11 +97,11 @@ def find_gap(
     Raises:
         ValueError: There are no trajectories, nothing was measured (in those set aside: nothing
             that was measured in the others), samples are too rare, a setting is no number or beyond
-            its range, the simulator is unsound
-            (``sims.contract``) or returns values that are not finite, or a position of a system
-            that strikes the ground was not measured.
+            its range, the simulator hosts no effects, is unsound (``sims.contract``) or returns
+            values that are not finite, or a position of a system that strikes the ground was not
+            measured.
     """
-    refuse_unsound(simulator)
+    simulator = hosting(simulator)
     declared = {channel.name: channel.scale for channel in simulator.physical_channels}
     _refuse_settings(horizon, parameter_tolerance, minutes)
     runs, set_aside = trajectories_of(trajectories), trajectories_of(held_out)
@@ -157,7 +160,7 @@ def find_gap(
             claims=tuple(
                 replace(
                     claim,
-                    counted=conventions is not None,
+                    counted=conventions is not None or by_an_encoder(claim, log.rescaled),
                     cut_off=bool(log.cut_off),
                     unlike=stands_for(answer, claim, differ),
                     refuted=judged.refuted,
@@ -168,8 +171,9 @@ def find_gap(
         )
         clock.lap("forecast")
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
-    quality = [*log.findings, *log.left_out, *other, *on_hold, *read.says, *on_rest, *on_more]
-    quality += [*known.says, *_searched(answer.found.search.fitter), *inquiry.untried(answer)]
+    says = [*log.left_out, *other, *on_hold, *read.says, *on_rest, *on_more, *known.says]
+    says += [*_searched(answer.found.search.fitter), *inquiry.untried(answer)]
+    quality = (*log.findings, *(Finding("search", "", one) for one in says))
     result = told(answer, table, judged.table, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)
     conventions = conventions or other_sign(simulator, result.effects)
@@ -177,6 +181,21 @@ def find_gap(
         result, corrected=result.corrected.with_scales(declared), conventions=conventions,
         cut_off=log.cut_off, unlike=differ, changing=over_time, nearly_late=late,
     )  # fmt: skip
+
+
+def hosting(simulator: Simulator) -> HostSimulator:
+    """The simulator, if effects can be added to it.
+
+    Raises:
+        ValueError: It hosts none, or is unsound (``sims.contract``).
+    """
+    if isinstance(simulator, Simulator) and not isinstance(simulator, HostSimulator):
+        raise ValueError(
+            f"{type(simulator).__name__} cannot host effects: derive it from EquationOfMotion or "
+            "FirstOrderSystem (sims.equations), or from HostSimulator (sims.host)"
+        )
+    refuse_unsound(simulator)
+    return simulator
 
 
 def _refuse_settings(horizon: Any, parameter_tolerance: Any, minutes: Any) -> None:

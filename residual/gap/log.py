@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -31,9 +31,11 @@ class Log:
         horizon: Length of forecasts in s.
         by_user: Whether the user chose the horizon, so that it stays.
         apart: Runs that are set aside, without what is faulty in them or measured there only.
-        findings: What was found about the data, in words.
+        findings: What was found about the data.
         left_out: What of the data is not searched, in words.
         cut_off: Channels that the simulator cuts off within what was recorded of them.
+        rescaled: Part by which a position moves more than the integral of its rate, which was put
+            on its scale, by name.
     """
 
     simulator: HostSimulator
@@ -42,9 +44,10 @@ class Log:
     horizon: float
     by_user: bool
     apart: Sequence[Trajectory]
-    findings: list[str]
+    findings: list[Finding]
     left_out: list[str]
     cut_off: tuple[str, ...] = ()
+    rescaled: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def at(self, horizon: float) -> Log:
         """The same for forecasts of another length, which want other rows."""
@@ -61,13 +64,22 @@ def look(
 ) -> Log:
     """Find faults of the data, and how far forecasts go if the user does not say."""
     examined = examine(simulator, trajectories)
-    findings = _in_words(examined.findings)
+    findings = list(examined.findings)
     apart, more = _set_aside(simulator, held, examined.trajectories)
-    findings += [f"records set aside: {says}" for says in more if says not in findings]
+    known = {one.words for one in findings}
+    findings += [
+        dataclasses.replace(one, where=f"records set aside: {one.where}")
+        for one in more
+        if one.words not in known
+    ]
     simulator = simulator.for_motion([run.states for run in [*examined.trajectories, *apart]])
     findings += [
-        f"{copy.name} is set aside, and holds samples of {first.name}, which is fitted: what is "
-        "said of records set aside is no test"
+        Finding(
+            "copy",
+            copy.name,
+            f"is set aside, and holds samples of {first.name}, which is fitted: what is said of "
+            "records set aside is no test",
+        )
         for copy, first in shared(held, trajectories)[:1]
     ]
     every = examined.trajectories
@@ -76,16 +88,22 @@ def look(
         held_by_records(simulator, every, horizon) if horizon else usual_horizon(simulator, every)
     )
     cut = dict.fromkeys(one.where for one in examined.findings if one.kind == "unanswered")
-    log = Log(simulator, every, every, length, horizon is not None, apart, findings, [], tuple(cut))
+    rescaled = {
+        one.where: one.numbers["scale"] - 1 for one in examined.findings if one.kind == "kinematics"
+    }
+    log = Log(
+        simulator, every, every, length, horizon is not None, apart, findings, [], tuple(cut),
+        rescaled,
+    )  # fmt: skip
     log = log.at(length)
-    for says in [*findings, *log.left_out]:
+    for says in [*(one.words for one in findings), *log.left_out]:
         tell(says)
     return log
 
 
 def _set_aside(
     simulator: HostSimulator, held: Sequence[Trajectory], fitted: Sequence[Trajectory]
-) -> tuple[list[Trajectory], list[str]]:
+) -> tuple[list[Trajectory], Sequence[Finding]]:
     """Runs that are set aside, with the channels that were measured in the others, and what was
     found about them."""
     if not held:
@@ -107,11 +125,7 @@ def _set_aside(
             f"records set aside: none of them measures {' or '.join(names)}, which the others "
             "measure; give records with these channels"
         )
-    return apart, _in_words(examined.findings)
-
-
-def _in_words(findings: Sequence[Finding]) -> list[str]:
-    return [f"{finding.where} {finding.says}".strip() for finding in findings]
+    return apart, examined.findings
 
 
 def settle(simulator: HostSimulator, log: Log, tell: Callable[[str], None]) -> tuple[Log, Prepared]:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from residual.gap.answer.curves import curves_for
 from residual.gap.confirmation.aliases import aliases, beyond_parameters, representatives
 from residual.gap.log import Log
+from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.flexible import FlexiblePart
 from sims.effects.library import curves_in, library, parts_in
 from sims.effects.parameter_curve import ParameterCurve
+from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
 
 
@@ -46,17 +48,28 @@ class Offered:
         cls,
         log: Log,
         effects: Effect | str | Iterable[Effect | str | Mapping[str, Any]] | None,
-        measured_input: bool,
+        measured_input: bool | Collection[str],
     ) -> Offered:
         """Those that a user asks for, or the library, less what a measured input cannot show.
 
+        Args:
+            log: What was recorded.
+            effects: As for ``find_gap``.
+            measured_input: As for ``find_gap``.
+
         Raises:
-            ValueError: One of them is not known, or cannot be looked for here.
+            ValueError: One of them is not known, or cannot be looked for here, or there is no
+                such input.
         """
         wanted = LIBRARY if effects is None else effects
         if isinstance(wanted, Effect | str | Mapping):
             wanted = [wanted]
-        offered = chosen_effects(log.simulator, list(wanted))
+        recorded = _measured(log.simulator, measured_input)
+        offered = tuple(
+            effect
+            for effect in chosen_effects(log.simulator, list(wanted))
+            if not (effect.upstream_of_sensor and recorded.intersection(_inputs(effect)))
+        )
         # Those by name have no range yet: the log gives it.
         without_range = curves_in(log.simulator)
         asked = [
@@ -75,12 +88,29 @@ class Offered:
         # Whoever asks for some effects does not ask for a part on a spring.
         whole = {str(e) for e in library(log.simulator) if not e.upstream_of_sensor} <= there
         parts = [one for one in parts_in(log.simulator) if whole and str(one) not in there]
-        if measured_input:
-            offered = tuple(effect for effect in offered if not effect.upstream_of_sensor)
-            curves = tuple(effect for effect in curves if not effect.upstream_of_sensor)
         curves = tuple(curve for curve in curves if curve not in asked)
         offered = beyond_parameters(log.simulator, offered)
         groups, sets = aliases(log.simulator, offered, log.runs)
         kept, less = representatives(log.simulator, offered, groups)
         by_label = {str(effect): effect for effect in offered}
         return cls(by_label, kept, less, groups, sets, curves, parts, asked)
+
+
+def _inputs(effect: Effect) -> tuple[str, ...]:
+    """The inputs that an effect acts on."""
+    return effect.actuators if isinstance(effect, ActuatorEffect) else ()
+
+
+def _measured(simulator: HostSimulator, given: bool | Collection[str]) -> frozenset[str]:
+    """Names of the inputs that were measured at the actuator's output.
+
+    Raises:
+        ValueError: There is no such input.
+    """
+    names = [channel.name for channel in simulator.action_channels]
+    if isinstance(given, bool):
+        return frozenset(names if given else ())
+    if unknown := sorted(set(given) - set(names)):
+        there = ", ".join(names) or "none"
+        raise ValueError(f"measured_input: no input {', '.join(unknown)}; there are {there}")
+    return frozenset(given)

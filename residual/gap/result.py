@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from residual.gap.beside import Blind, Changing, Conventions, Unlike
 from residual.gap.fitting.where import Where
+from residual.logs.checks import Finding
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 
@@ -254,7 +255,7 @@ class GapResult:
         corrected: The simulator with them.
         channels: Names and units of the measured channels, in the order of all columns.
         noise: Standard deviation of each measured channel, with its standard error.
-        quality: Findings about the data, in words.
+        quality: Findings about the data and, of kind ``search``, what bears on all answers.
         blind: Effects that this log could hide.
         adequate: True if what was found leaves no more than noise, so that chance decided;
             otherwise shares of the error did.
@@ -279,7 +280,7 @@ class GapResult:
     corrected: HostSimulator
     channels: tuple[tuple[str, str], ...]
     noise: dict[str, tuple[float, float]]
-    quality: tuple[str, ...]
+    quality: tuple[Finding, ...]
     blind: tuple[Blind, ...]
     adequate: bool
     seconds: dict[str, float]

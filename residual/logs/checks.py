@@ -45,6 +45,11 @@ class Finding:
     severity: Literal["note", "warning", "refuse"] = "note"
     rows: tuple[tuple[str, float], ...] = ()
 
+    @property
+    def words(self) -> str:
+        """The place and what is said of it, where the one begins the sentence of the other."""
+        return f"{self.where} {self.says}".strip()
+
 
 class Signal(NamedTuple):
     """One channel of all runs, before angles are unwrapped.

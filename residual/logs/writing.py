@@ -4,30 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from residual.trajectories import Trajectory
 from simgap_files.atomic import atomic_write_text
-
-Array = NDArray[np.floating[Any]]
+from sims.simulator import Channel
 
 
 def write_log(
-    path: Path, names: Sequence[str], times: Array, states: Array, actions: Array
+    path: Path, run: Trajectory, states: Sequence[Channel], actions: Sequence[Channel]
 ) -> None:
-    """Write one run as a CSV file; it appears whole or not at all.
+    """Write one run as a CSV file whose columns are named as the channels are.
+
+    The file appears whole or not at all. Channels that were not measured have no column.
 
     Args:
         path: Where to.
-        names: Of the columns after ``time``: states, then actions.
-        times: shape (T + 1,), s.
-        states: shape (T + 1, n_s).
-        actions: shape (T, n_a).
+        run: What was recorded.
+        states: Channels of its states.
+        actions: Channels of its actions.
     """
+    measured = np.asarray(np.isfinite(run.states).any(axis=0))
+    seen = [channel.name for channel, there in zip(states, measured, strict=True) if there]
     # The last command is never applied; a log holds it all the same.
-    columns = np.column_stack([times, states, np.vstack([actions, actions[-1:]])])
-    table = pd.DataFrame(columns, columns=["time", *names])
+    held = np.vstack([run.actions, run.actions[-1:]])
+    columns = np.column_stack([run.times, run.states[:, measured], held])
+    table = pd.DataFrame(columns, columns=["time", *seen, *(c.name for c in actions)])
     atomic_write_text(path, table.to_csv(index=False, float_format="%.9g"))

@@ -17,7 +17,7 @@ from sims.effects.inertia import AddedInertia
 from sims.effects.joint import JointEffect
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
-from sims.effects.sensor import SensorOffset, SensorScale
+from sims.effects.sensor import EncoderScale, ScaledSensor, SensorEffect, SensorOffset
 from sims.simulator import Array, random_values
 
 if TYPE_CHECKING:
@@ -143,14 +143,15 @@ def _alone(simulator: HostSimulator, channel: str) -> bool:
 
 
 def _read_after(
-    simulator: HostSimulator, sensor: SensorOffset | SensorScale, states: Array, inputs: Array
+    simulator: HostSimulator, sensor: SensorEffect, states: Array, inputs: Array
 ) -> Array:
     """Readings a tenth of a control period after readings of ``states``, (n, n_s)."""
-    column = [c.name for c in simulator.state_channels].index(sensor.channel)
+    names = [c.name for c in simulator.state_channels]
+    columns = [names.index(name) for name in sensor.read_by_it(simulator)]
     true = states.copy()
-    true[:, column] = sensor.undo(true[:, column])
+    true[:, columns] = sensor.undo(true[:, columns])
     after = shortly_after(simulator, true, inputs)
-    after[:, column] = sensor.read(after[:, column])
+    after[:, columns] = sensor.read(after[:, columns])
     return after
 
 
@@ -162,7 +163,7 @@ def linear_columns(
     near: dict[str, Array] = {}
     far: dict[str, Array] = {}
     # Of twins the first is named: what moves is more often off than what reads it.
-    for effect in sorted(library(plain), key=lambda e: isinstance(e, SensorOffset | SensorScale)):
+    for effect in sorted(library(plain), key=lambda e: isinstance(e, SensorEffect)):
         if not _is_linear(plain, effect) or (among is not None and str(effect) not in among):
             continue
         response = _response(plain, effect, states, inputs, 1e-4)
@@ -174,8 +175,8 @@ def linear_columns(
 
 def _is_linear(simulator: HostSimulator, effect: Effect) -> bool:
     """Whether a small effect changes the motion, or its readings, in proportion to one strength."""
-    if isinstance(effect, SensorOffset | SensorScale):
-        return _alone(simulator, effect.channel)
+    if isinstance(effect, SensorOffset | ScaledSensor):
+        return isinstance(effect, EncoderScale) or _alone(simulator, effect.channel)
     force = isinstance(effect, JointEffect) and not isinstance(effect, DryFriction)
     proportional = ParameterChange | ActuatorGain | ActuatorBias | AddedInertia
     return (force or isinstance(effect, proportional)) and len(effect.strengths()) == 1
@@ -262,7 +263,7 @@ def _response(
     ends = []
     for value in (change, -change):
         changed = effect.with_values(**{name: value})
-        if isinstance(changed, SensorOffset | SensorScale):
+        if isinstance(changed, SensorEffect):
             ends.append(_read_after(simulator, changed, states, inputs))
         else:
             ends.append(shortly_after(simulator.with_effects([changed]), states, inputs))

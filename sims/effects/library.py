@@ -43,7 +43,7 @@ from sims.effects.joint import (
 from sims.effects.limit import RateLimit, follows_command
 from sims.effects.parameter import ParameterChange
 from sims.effects.pull import pulled_by_position, pulled_by_turn
-from sims.effects.sensor import SensorOffset, SensorScale
+from sims.effects.sensor import EncoderScale, SensorOffset, SensorScale
 from sims.effects.store import SecondStore
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ ACTUATOR_EFFECTS: tuple[type[Effect], ...] = (
 SHARED_EFFECTS = (ActuatorGain, QuadraticActuator, DeadZone, Saturation, Delay, ActuatorLag)
 #: Most inputs that have something in common.
 ROTORS = 4
-SENSOR_EFFECTS = (SensorOffset, SensorScale)
+SENSOR_EFFECTS = (SensorOffset, SensorScale, EncoderScale)
 
 
 def library(simulator: HostSimulator) -> tuple[Effect, ...]:

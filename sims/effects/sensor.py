@@ -36,6 +36,10 @@ class SensorEffect(Effect):
     enters: ClassVar = "sensor"
     stage: ClassVar[int]
 
+    def read_by_it(self, simulator: HostSimulator) -> tuple[str, ...]:
+        """Names of all channels whose readings come from this sensor."""
+        return (self.channel,)
+
     @abc.abstractmethod
     def read(self, x: Value) -> Value:
         """What the sensor reads where ``x`` is true, by row."""
@@ -80,21 +84,36 @@ class SensorOffset(SensorEffect):
 
 
 @dataclasses.dataclass(frozen=True)
-class SensorScale(SensorEffect):
-    """The sensor reads ``zero + (1 + scale) (x - zero)``; an angle is not wrapped."""
+class ScaledSensor(SensorEffect):
+    """The sensor reads ``1 + scale`` times what is there."""
 
     scale: Value = number(share=0.1, low=-0.99, channel=0)
-    zero: Value = number(role="fixed", channel=1)
 
-    name: ClassVar[str] = "sensor_scale"
-    sentence: ClassVar[str] = "The sensor's scale is wrong: it reads a fixed share too much."
-    needs: ClassVar[str] = "a wide range of positions"
     stage: ClassVar[int] = 0
 
     @property
     def surprising(self) -> bool:
         """True: sensors are calibrated, and what is missing elsewhere is likelier."""
         return True
+
+    def read(self, x: Value) -> Value:
+        """Reading."""
+        return x + self.scale * x
+
+    def undo(self, x: Value) -> Value:
+        """Truth."""
+        return x / (1.0 + self.scale)
+
+
+@dataclasses.dataclass(frozen=True)
+class SensorScale(ScaledSensor):
+    """The sensor reads ``zero + (1 + scale) (x - zero)``; an angle is not wrapped."""
+
+    zero: Value = number(role="fixed", channel=1)
+
+    name: ClassVar[str] = "sensor_scale"
+    sentence: ClassVar[str] = "The sensor's scale is wrong: it reads a fixed share too much."
+    needs: ClassVar[str] = "a wide range of positions"
 
     def read(self, x: Value) -> Value:
         """Reading."""
@@ -115,6 +134,31 @@ class SensorScale(SensorEffect):
         return self.with_values(zero=float(0.5 * (low + high)))
 
 
+@dataclasses.dataclass(frozen=True)
+class EncoderScale(ScaledSensor):
+    """The sensor of a position, from which its rate is derived, reads so much too much.
+
+    Encoders with other counts per turn, drums of another radius, cameras at another distance.
+    """
+
+    name: ClassVar[str] = "encoder_scale"
+    sentence: ClassVar[str] = (
+        "An encoder's scale is wrong: the position and its rate read the same fixed share too much."
+    )
+    needs: ClassVar[str] = "a force that is not in proportion to the motion, such as gravity"
+
+    def read_by_it(self, simulator: HostSimulator) -> tuple[str, ...]:
+        """The position and its rate."""
+        channels = simulator.physical_channels
+        return (self.channel, *(c.name for c in channels if c.rate_of == self.channel))
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """As for every sensor effect; the position needs a rate."""
+        if len(self.read_by_it(simulator)) == 1:
+            raise ValueError(f"no channel is the rate of {self.channel!r}: use sensor_scale")
+        return super().measures(simulator)
+
+
 def through_sensors(simulator: HostSimulator, states: Array, forward: bool) -> Array:
     """What the sensors read of true states, (n, n_i), or backward what is true where they do."""
     effects = [e for e in simulator.effects if isinstance(e, SensorEffect) and not e.absent]
@@ -123,7 +167,7 @@ def through_sensors(simulator: HostSimulator, states: Array, forward: bool) -> A
     states = np.array(states, float)
     names = [channel.name for channel in simulator.physical_channels]
     for effect in sorted(effects, key=lambda effect: effect.stage, reverse=not forward):
-        column = names.index(effect.channel)
         change = effect.read if forward else effect.undo
-        states[:, column] = change(states[:, column])
+        for column in map(names.index, effect.read_by_it(simulator)):
+            states[:, column] = change(states[:, column])
     return states

@@ -5,8 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import os
-import secrets
-import shutil
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -105,7 +104,7 @@ def write_gap(
     config: Mapping[str, Any],
     findings: Sequence[Finding] = (),
     seconds: float | None = None,
-) -> Path:
+) -> None:
     """Write ``gap.json``, ``corrected.yaml``, ``report.html`` and ``figures/``: all or nothing.
 
     Args:
@@ -116,9 +115,6 @@ def write_gap(
             ``config["logs"]`` the names of the runs.
         findings: What the reader of the logs had to say.
         seconds: Wall time; by default the sum over the stages.
-
-    Returns:
-        The folder.
 
     Raises:
         OSError: The folder cannot be written.
@@ -135,7 +131,6 @@ def write_gap(
             (stage / name).write_bytes(content)
         write_report(result, record, stage)
         write_sealed(stage / JSON, record)
-    return Path(folder)
 
 
 def gap_record(
@@ -144,7 +139,7 @@ def gap_record(
     findings: Sequence[Finding] = (),
     seconds: float | None = None,
 ) -> dict[str, Any]:
-    """What ``gap.json`` holds (docs/find-gap.md)."""
+    """What ``gap.json`` holds (docs/gap-json.md)."""
     total = sum(result.seconds.values()) if seconds is None else seconds
     return {
         "says": lead(result, config.get("tolerance")),
@@ -161,8 +156,8 @@ def gap_record(
             name: {"value": sigma, "error": error} for name, (sigma, error) in result.noise.items()
         },
         "quality": [
-            *({"kind": f.kind, "where": f.where, "says": f.says} for f in findings),
-            *({"kind": "engine", "where": "", "says": says} for says in result.quality),
+            {"kind": one.kind, "where": one.where, "says": one.says}
+            for one in (*findings, *result.quality)
         ],
         "seconds": {"total": total, **result.seconds},
         "versions": versions(),
@@ -174,14 +169,13 @@ def gap_record(
 def staged(folder: Path) -> Iterator[Path]:
     """A temporary folder beside ``folder``; its files move there when the block ends well."""
     folder.parent.mkdir(parents=True, exist_ok=True)
-    stage = folder.parent / f".partial-{secrets.token_hex(4)}-{folder.name}"
-    stage.mkdir()
-    try:
+    with tempfile.TemporaryDirectory(
+        f"-{folder.name}", ".partial-", folder.parent, ignore_cleanup_errors=True
+    ) as made:
+        stage = Path(made)
         yield stage
         for source in sorted(path for path in stage.rglob("*") if path.is_file()):
             target = folder / source.relative_to(stage)
             target.parent.mkdir(parents=True, exist_ok=True)
             flush_to_disk(source)
             os.replace(source, target)
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)

@@ -95,13 +95,12 @@ def bars(result: GapResult, folder: Path) -> Figure:
 
 def curves(result: GapResult, folder: Path) -> list[Section]:
     """Laws by points, where what was measured follows a curve of its own."""
-    pictures = []
-    for number, verdict in enumerate(result.verdicts, start=1):
-        for effect in result.effects:
-            if isinstance(effect, Curve) and str(effect) == verdict.label:
-                path = folder / f"curve-{number}.png"
-                pictures.append(_curve(curve(result, verdict, effect, path), verdict, effect))
-    return list(pictures)
+    return [
+        _curve(curve(result, verdict, effect, folder / f"curve-{number}.png"), verdict, effect)
+        for number, verdict in enumerate(result.verdicts, start=1)
+        for effect in result.effects
+        if isinstance(effect, Curve) and str(effect) == verdict.label
+    ]
 
 
 def _curve(drawing: Drawing, verdict: Verdict, effect: Curve) -> Figure:

@@ -5,32 +5,21 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable
 from typing import Self
 
 #: Seconds without a line after which the last one is repeated.
 QUIET = 4.0
 
 
-def to_terminal(line: str) -> None:
-    """One line on stderr, at once."""
-    print(line, file=sys.stderr, flush=True)
-
-
 class Heartbeat:
-    """Tells what is being done, with the time since the start and what is left of a budget.
+    """Tells on stderr what is being done, the time since the start and what is left of a budget.
 
     Args:
         budget: Seconds of processor time, as the search counts them.
-        write: Takes a line.
-        quiet: Seconds without a line after which the last one is repeated.
     """
 
-    def __init__(
-        self, budget: float, write: Callable[[str], None] = to_terminal, quiet: float = QUIET
-    ) -> None:
-        self._budget, self._write, self._quiet = budget, write, quiet
-        self._text = ""
+    def __init__(self, budget: float) -> None:
+        self._budget, self._text = budget, ""
         self._lock, self._over = threading.Lock(), threading.Event()
         self._thread = threading.Thread(target=self._beat, daemon=True)
 
@@ -54,10 +43,10 @@ class Heartbeat:
         self._spoke = time.perf_counter()
         spent = self._spoke - self._begin
         left = max(self._budget - (time.process_time() - self._used), 0.0)
-        self._write(f"{spent:6.1f} s, {left:.0f} s left  {text}")
+        print(f"{spent:6.1f} s, {left:.0f} s left  {text}", file=sys.stderr, flush=True)
 
     def _beat(self) -> None:
-        while not self._over.wait(0.25 * self._quiet):
+        while not self._over.wait(0.25 * QUIET):
             with self._lock:
-                if self._text and time.perf_counter() - self._spoke > 0.75 * self._quiet:
+                if self._text and time.perf_counter() - self._spoke > 0.75 * QUIET:
                     self._say(f"still working; last: {self._text.strip()}")

@@ -55,8 +55,8 @@ def summary(result: GapResult, tolerance: float | None = None) -> str:
         lines += ["", *held_out(result.held_out)]
     if result.quality:
         lines.append("")
-    for says in result.quality[:NOTES]:
-        lines += wrapped(says, "      ", "note:")
+    for found in result.quality[:NOTES]:
+        lines += wrapped(found.words, "      ", "note:")
     if len(result.quality) > NOTES:
         lines.append(f"      and {len(result.quality) - NOTES} more in the report")
     return "\n".join(lines)

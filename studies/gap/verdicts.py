@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 from residual.gap import GapResult
 from residual.gap.result import Verdict as Answer
@@ -19,9 +18,8 @@ from studies.gap.answer import (
 )
 from studies.gap.lead import lead, unborne
 from studies.gap.words import capitalized, effect_name, names_of, set_name, unit_text
-from studies.reporting.sections import Cell, Prose, Section, Table, Verdict
+from studies.reporting.sections import Cell, Prose, Section, Table, Tone, Verdict
 
-Tone = Literal["good", "warning", "bad", "neutral"]
 TONES: dict[str, Tone] = {
     "confirmed": "good",
     "ambiguous": "warning",

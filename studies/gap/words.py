@@ -185,17 +185,11 @@ def percent(share: float) -> str:
     return f"{hundredths:.1f}".removesuffix(".0") + " %" if close else f"{hundredths:.0f} %"
 
 
-def seconds_text(seconds: float) -> str:
-    """A forecast length: ``1 s``."""
-    return f"{float(f'{seconds:.3g}'):g} s"
-
-
 def duration_text(seconds: float) -> str:
-    """A length of time in seconds, or in hours or days where there are two of them."""
-    for unit, size in (("d", 86400.0), ("h", 3600.0)):
-        if seconds >= 2 * size:
-            return f"{float(f'{seconds / size:.3g}'):g} {unit}"
-    return seconds_text(seconds)
+    """A length of time in seconds, or in hours or days where there are two of them: ``1 s``."""
+    longer = (pair for pair in ((86400.0, "d"), (3600.0, "h")) if seconds >= 2 * pair[0])
+    size, unit = next(longer, (1.0, "s"))
+    return f"{float(f'{seconds / size:.3g}'):g} {unit}"
 
 
 def ahead(gap: Gap) -> str:

@@ -10,13 +10,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 if TYPE_CHECKING:
-    from studies.hidden.data import Truth
+    from studies.hidden.data import Array, Truth
 
-Array = NDArray[np.float64]
 #: Share of the play that an opening begins with.
 HAIR = 1e-8
 

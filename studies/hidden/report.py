@@ -176,16 +176,16 @@ def confusion(table: pd.DataFrame) -> Drawing:
     return figure
 
 
-def summary(results: Sequence[Mapping[str, Any]]) -> str:
-    """A few lines for the terminal."""
-    return headlines(tidy(results)).to_string(index=False)
-
-
 def write_report(
     results: Sequence[Mapping[str, Any]], output: Path, config: Mapping[str, Any]
-) -> None:
-    """Write sets.csv, cells.csv, rivals.csv, the confusion picture and report.html."""
+) -> str:
+    """Write sets.csv, cells.csv, rivals.csv, the confusion picture and report.html.
+
+    Returns:
+        A few lines for the terminal.
+    """
     data = tidy(results)
+    short = compared = rivals(data)
     output.mkdir(parents=True, exist_ok=True)
     atomic_write_text(output / "sets.csv", data.to_csv(index=False))
     sections: list[Section] = [
@@ -200,7 +200,8 @@ def write_report(
     if (data["method"] == "find_gap").any():
         table = cells(data)
         atomic_write_text(output / "cells.csv", table.to_csv(index=False))
-        sections.append(Table.of(headlines(data), "In short", ""))
+        short = headlines(data)
+        sections.append(Table.of(short, "In short", ""))
         counts = confusion_counts(data)
         if counts.size:
             drawn = confusion(counts)
@@ -213,7 +214,6 @@ def write_report(
             "means nothing hidden. Logs: excitation, noise, number of trajectories."
         )
         sections.append(Table.of(table, "Every cell", caption))
-    compared = rivals(data)
     atomic_write_text(output / "rivals.csv", compared.to_csv(index=False))
     caption = (
         "Near-twins count as right. pysindy differentiates over 50 ms, across the jumps of a held "
@@ -225,3 +225,4 @@ def write_report(
     Report("Hidden effects", "What find_gap names, known what was hidden.", sections, found).write(
         output / "report.html"
     )
+    return short.to_string(index=False)

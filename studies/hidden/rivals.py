@@ -24,8 +24,8 @@ from residual.gap.model.model import Model
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
 from sims.host import HostSimulator
+from sims.simulator import Array
 
-Array = NDArray[np.float64]
 #: Savitzky-Golay window in samples; wider ones smear the jumps of the input.
 WINDOW = 5
 #: Smallest share of the residual worth a name, the same as the engine's.
@@ -128,13 +128,10 @@ def one_step(data: Regression, chance: float = 0.05, most: int = 3) -> list[str]
     chosen: list[int] = []
     n = len(data.target)
     while len(chosen) < most:
-        if chosen:
-            fitted = np.linalg.lstsq(unit[:, chosen], data.target, rcond=None)[0]
-            left = data.target - unit[:, chosen] @ fitted
-            q, _ = np.linalg.qr(unit[:, chosen])
-            rest = unit - q @ (q.T @ unit)
-        else:
-            left, rest = data.target, unit
+        fitted = np.linalg.lstsq(unit[:, chosen], data.target, rcond=None)[0]
+        left = data.target - unit[:, chosen] @ fitted
+        q, _ = np.linalg.qr(unit[:, chosen])
+        rest = unit - q @ (q.T @ unit)
         power = (rest**2).sum(axis=0)
         gain = np.where(power > 1e-4, (rest.T @ left) ** 2 / np.maximum(power, 1e-12), 0.0)
         taken = {data.owner[i] for i in chosen}

@@ -117,7 +117,7 @@ def score(
         "forecast_after": result.gap.after.value / result.gap.noise_floor.value,
         "seconds": sum(result.seconds.values()),
         "says": [v.says for v in result.verdicts],
-        "quality": list(result.quality),
+        "quality": [one.words for one in result.quality],
     }
     return row
 
@@ -129,10 +129,10 @@ def _names(labels: Iterable[str]) -> set[str]:
 
 def coverage(result: GapResult, strengths: Mapping[str, float]) -> list[bool]:
     """Whether the interval of each number holds the true one, for effects named as hidden."""
-    found = []
-    for verdict in result.verdicts:
-        if verdict.effect in strengths:
-            effect = HIDDEN[verdict.effect].effect(strengths[verdict.effect])
-            for name, number in verdict.parameters.items():
-                found.append(bool(number.low <= getattr(effect, name) <= number.high))
-    return found
+    hidden = {name: HIDDEN[name].effect(strength) for name, strength in strengths.items()}
+    return [
+        bool(number.low <= getattr(hidden[verdict.effect], name) <= number.high)
+        for verdict in result.verdicts
+        if verdict.effect in hidden
+        for name, number in verdict.parameters.items()
+    ]

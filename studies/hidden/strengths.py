@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from residual.gap.data.blocks import blocks
 from residual.gap.data.samples import Samples
@@ -37,13 +36,12 @@ from studies.hidden.data import (
     MASS,
     NOISES,
     REACH,
+    Array,
     Excitation,
     Truth,
     measure,
     simulate,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True)

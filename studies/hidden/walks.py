@@ -11,6 +11,7 @@ from policy.evaluate import collect
 from policy.learner import Algorithm, load_policy
 from policy.noise import OrnsteinUhlenbeck
 from residual.logs.writing import write_log
+from residual.trajectories import Trajectory
 from sims.environment import SimulatorEnv
 from sims.leo import Leo, Walking
 
@@ -56,18 +57,15 @@ def write_walks(
     rng = np.random.default_rng(seed)
     walker = learner.load(Path(policy), env).policy if learner else load_policy(policy)
     noise = OrnsteinUhlenbeck(6, exploration, 0.15, rng)
-    names = [channel.name for channel in leo.state_channels]
-    spread = np.repeat([PLACE, ANGLE, RATE], [2, 7, 9])
-    kept = len(names) if rates else 9
-    columns = [*names[:kept], *(channel.name for channel in leo.action_channels)]
+    spread = np.repeat([PLACE, ANGLE, RATE if rates else np.nan], [2, 7, 9])
     paths: list[Path] = []
     for run in collect(walker, env, transitions, 1000 * seed, noise):
         if len(run.actions) < SHORTEST or run.states is None:
             continue
         seen = run.states + spread * rng.standard_normal(run.states.shape)
-        times = leo.dt * np.arange(len(seen))
+        walk = Trajectory("walk", leo.dt * np.arange(len(seen), dtype=float), seen, run.actions)
         paths.append(folder / f"walk-{len(paths) + 1:02d}.csv")
-        write_log(paths[-1], columns, times, seen[:, :kept], run.actions)
+        write_log(paths[-1], walk, leo.state_channels, leo.action_channels)
     if not paths:
         raise ValueError(
             f"every walk of {policy} fell within {SHORTEST} steps: give a policy that walks, or "

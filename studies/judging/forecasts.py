@@ -9,12 +9,12 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
-
-Array = NDArray[np.float64]
+from sims.simulator import Array
 
 #: A forecast that leaves its channel by more than this many times its spread is lost; how far
 #: it then goes means nothing.
@@ -226,9 +226,5 @@ def _filled(simulator: HostSimulator, run: Trajectory) -> Array:
 
 def _noise(values: Array) -> Array:
     """Standard deviation of the noise of each column, from third differences; 0 if unmeasured."""
-    bends = np.abs(np.diff(values, 3, axis=0))
-    found = np.zeros(values.shape[1])
-    for j, column in enumerate(bends.T):
-        known = column[np.isfinite(column)]
-        found[j] = float(np.median(known)) / (0.6745 * np.sqrt(20)) if known.size else 0.0
-    return found
+    bends = pd.DataFrame(np.abs(np.diff(values, 3, axis=0)))
+    return bends.median().fillna(0.0).to_numpy() / (0.6745 * np.sqrt(20))

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from sims.effects.base import Effect
 from sims.host import HostSimulator
+from sims.simulator import Array
 from studies.judging.forecasts import Forecasts
-
-Array = NDArray[np.float64]
 
 
 def fit_effects(

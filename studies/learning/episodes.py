@@ -41,8 +41,7 @@ class Episode:
     def save(self, folder: Path) -> None:
         """Write it."""
         arrays = {name: getattr(self.run, name) for name in (*ALWAYS, *OPTIONAL)}
-        arrays = {name: array for name, array in arrays.items() if array is not None}
-        write_npz(folder / ARRAYS, arrays)
+        write_npz(folder / ARRAYS, {name: a for name, a in arrays.items() if a is not None})
         beside = {"terminated": self.run.terminated, "noise": self.noise, "said": self.said}
         (folder / BESIDE).write_text(json.dumps(beside))
 

@@ -7,17 +7,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from policy.evaluate import Policy, Roll, rollout
 from policy.learner import Algorithm
 from residual.accuracy import LEAST_STEPS, Accuracy, accuracy_along, uniform_rollouts
 from residual.corrected import CorrectedSimulator
-from sims.simulator import Simulator
+from sims.simulator import Array, Simulator
 from sims.system import System
 from studies.learning.training import exploration, visited
-
-Array = NDArray[np.float64]
 
 _log = logging.getLogger("simgap")
 

@@ -48,7 +48,6 @@ def keep_only(folder: Path, names: Container[str]) -> None:
 def _read(path: Path) -> dict[str, Any]:
     """What a file of results holds; nothing if it is not there or damaged."""
     try:
-        found = read_sealed(path)
+        return read_sealed(path)
     except (OSError, ValueError):
         return {}
-    return found if isinstance(found, dict) else {}

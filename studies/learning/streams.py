@@ -7,6 +7,8 @@ from typing import Any
 
 from sklearn.base import BaseEstimator, clone
 
+from residual.estimator import unset_seeds
+
 # Rollouts count on from a seed, so streams begin this far apart.
 _APART = 20
 
@@ -31,10 +33,6 @@ def seeded(estimator: BaseEstimator, seed: int) -> BaseEstimator:
     copy: Any = clone(estimator, safe=False)
     if not hasattr(copy, "get_params"):
         return copy
-    unset = [
-        name
-        for name, value in copy.get_params().items()
-        if name.split("__")[-1] == "random_state" and value is None
-    ]
     # Half of a stream's beginning: scikit-learn takes 32 bits.
-    return copy.set_params(**dict.fromkeys(unset, (stream(seed, "estimator") >> _APART) % 2**31))
+    own = (stream(seed, "estimator") >> _APART) % 2**31
+    return copy.set_params(**dict.fromkeys(unset_seeds(copy), own))

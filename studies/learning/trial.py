@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import importlib.util
 import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import threadpoolctl
 import torch
 from jsonargparse.typing import NonNegativeFloat
@@ -17,9 +15,7 @@ from jsonargparse.typing import NonNegativeFloat
 from policy.learner import other_name
 from residual.logs.writing import write_log
 from residual.persistence import is_ours, save
-from residual.trajectories import Trajectory
 from simgap_files.npz import write_npz
-from sims.simulator import Simulator
 from studies.learning.described import modules_in, settings_of
 from studies.learning.fingerprint import fingerprint
 from studies.learning.kept import OnDisk
@@ -73,16 +69,14 @@ def build_parser(study: Study) -> Parser:
 def instantiate(study: Study, config: Config) -> Trial:
     """The trial that plain settings describe; exits with one line if they are wrong."""
     parser = build_parser(study)
-    # The parser changes nested lists of what it is given.
-    chosen = parser.instantiate(parser.parse_object(copy.deepcopy(dict(config))))
+    chosen = parser.instantiate(parser.parse_object(config))
     return study.trial(**{name: chosen[name] for name in study.settings})
 
 
 def resolve(study: Study, config: Config) -> dict[str, Any]:
     """``config`` with every default filled in, checked by the parser."""
     parser = build_parser(study)
-    chosen = parser.parse_object(copy.deepcopy(dict(config)))
-    settings = parser.plain(chosen)
+    settings = parser.plain(parser.parse_object(config))
     return {name: settings[name] for name in study.settings}
 
 
@@ -134,8 +128,10 @@ def run_trial(
     for name, training in learnt.trainings.items():
         training.learner.save(folder / "policies" / f"{name}.safetensors")
         write_npz(folder / "rollouts" / f"{name}.npz", training.episode)
+    nominal = steps.system.nominal
     for run in learnt.runs:
-        _write_run(folder / "samples" / f"{run.name}.csv", steps.system.nominal, run)
+        path = folder / "samples" / f"{run.name}.csv"
+        write_log(path, run, nominal.state_channels, nominal.action_channels)
     saved = []
     for number, model in enumerate(learnt.models, start=1):
         # Another library's estimator needs skops, which may not be there.
@@ -156,14 +152,6 @@ def run_trial(
         "versions": versions(),
         "made_by": made_by,
     }
-
-
-def _write_run(path: Path, simulator: Simulator, run: Trajectory) -> None:
-    """Write a run of true samples as a log whose columns are named as the channels are."""
-    measured = np.asarray(np.isfinite(run.states).any(axis=0))
-    channels = [c for c, seen in zip(simulator.state_channels, measured, strict=True) if seen]
-    names = [channel.name for channel in (*channels, *simulator.action_channels)]
-    write_log(path, names, run.times, run.states[:, measured], run.actions)
 
 
 def code_of_trial(study: Study, config: Config) -> str:

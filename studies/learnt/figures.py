@@ -12,7 +12,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from studies.learnt.statistics import Mean, mean
+from studies.learnt.statistics import mean
 from studies.learnt.words import POLICY_WORDS, Results, policy_name
 from studies.reporting.figures import (
     AMBER,
@@ -183,15 +183,10 @@ def updates_figure(rows: pd.DataFrame) -> Drawn:
         loops.append(("no difference model", control))
     true = rows[rows["name"] == "true"].drop_duplicates("seed")["return_true"]
     factor = scale_of_returns(axis, rows["return_true"].tolist())
-    numbers = []
-
-    def told(method: str, update: int, found: Mean) -> None:
-        numbers.append(
-            {"method": method, "update": update, "return": found.value,
-             "half_width": found.half_width}
-        )  # fmt: skip
-
-    for colour, (label, part) in zip(_of_loops(loops), loops, strict=False):
+    numbers: list[tuple[str, int, float, float]] = []
+    # Of estimators, and of the control, as in the other figures: blue is before.
+    colours = _by_kind([str(part["name"].iloc[0]) for _, part in loops])
+    for colour, (label, part) in zip(colours, loops, strict=True):
         means = {0: mean(begin)} | {
             int(group["iteration"].iloc[0]): mean(group["return_true"].tolist())
             for _, group in part.groupby("iteration")
@@ -200,8 +195,7 @@ def updates_figure(rows: pd.DataFrame) -> Drawn:
         axis.plot(list(means), [factor * m.value for m in values], "o-", color=colour, label=label)
         bounds = [[factor * m.low for m in values], [factor * m.high for m in values]]
         axis.fill_between(list(means), *bounds, color=colour, alpha=0.15, linewidth=0)
-        for update, found in means.items():
-            told(str(label), update, found)
+        numbers += [(str(label), at, found.value, found.half_width) for at, found in means.items()]
     last = int(rows["iteration"].max())
     for beside, name, mark in ((0.08, "cold", "v"), (0.16, "warm", "^")):
         for samples, part in rows[rows["name"] == name].groupby("true_samples"):
@@ -211,19 +205,13 @@ def updates_figure(rows: pd.DataFrame) -> Drawn:
                 last + beside, factor * found.value, np.nan_to_num(found.half_width), fmt=mark,
                 color=INK, capsize=3, label=label,
             )  # fmt: skip
-            told(label, last, found)
+            numbers.append((label, last, found.value, found.half_width))
     if len(true):
         reference_line(axis, factor * true.mean(), "learnt on the true system")
     axis.set_xlabel("update")
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.legend(loc="outside upper left", ncols=2, handlelength=1.4)
-    return figure, pd.DataFrame(numbers)
-
-
-def _of_loops(loops: Sequence[tuple[Any, pd.DataFrame]]) -> list[str]:
-    """Colours of estimators, and of the control, as in the other figures: blue is before."""
-    kinds = [str(part["name"].iloc[0]) for _, part in loops]
-    return _by_kind(kinds)
+    return figure, pd.DataFrame(numbers, columns=["method", "update", "return", "half_width"])
 
 
 def _by_kind(kinds: Sequence[str]) -> list[str]:

@@ -25,26 +25,23 @@ _PICTURES = 8
 SIDE_BY_SIDE = "side_by_side.png"
 
 
-def write_films(results: Mapping[str, Any], folder: Path, simulator: Simulator) -> list[Path]:
+def write_films(results: Mapping[str, Any], folder: Path, simulator: Simulator) -> None:
     """``films/<policy>.gif`` of the policies that a report shows, and one picture of them all.
 
-    Returns:
-        The films' files; none without a renderer.
+    Nothing without a renderer.
     """
     try:
         renderer_for(simulator)
     except ValueError:  # it does not say how it looks, or this machine cannot draw it
-        return []
-    episodes, paths, seen = read_episodes(results, folder), [], {}
+        return
+    episodes, seen = read_episodes(results, folder), {}
     for name, title in shown(results).items():
         if name in episodes:
             seen[title] = episodes[name]["states"]
-            paths.append(folder / "films" / f"{name}.gif")
-            atomic_write_bytes(paths[-1], film(simulator, seen[title]))
+            atomic_write_bytes(folder / "films" / f"{name}.gif", film(simulator, seen[title]))
     if seen:
         picture = to_png(side_by_side(simulator, seen))
         atomic_write_bytes(folder / "films" / SIDE_BY_SIDE, picture)
-    return paths
 
 
 def film(simulator: Simulator, states: np.ndarray) -> bytes:

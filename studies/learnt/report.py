@@ -44,12 +44,9 @@ Drawing = tuple[str, Drawn, str, str, str]
 
 def read_episodes(results: Results, folder: Path) -> dict[str, dict[str, np.ndarray]]:
     """The episode of every policy that left one in ``folder/rollouts``, by ``record_key``."""
-    found = {}
-    for record in results["policies"]:
-        path = folder / "rollouts" / f"{record_key(record)}.npz"
-        if path.exists():
-            found[record_key(record)] = read_npz(path)
-    return found
+    keys = [record_key(record) for record in results["policies"]]
+    paths = {key: folder / "rollouts" / f"{key}.npz" for key in keys}
+    return {key: read_npz(path) for key, path in paths.items() if path.exists()}
 
 
 def write_report(

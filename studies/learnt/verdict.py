@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any
 
 import pandas as pd
 
 from studies.learnt.errors import by_group, model_errors, no_gap, over_rollouts
 from studies.learnt.statistics import Mean, above, mean, return_text, starts
 from studies.learnt.words import NEAR, POLICY_WORDS, duration
-from studies.reporting.sections import KeyValues, Section, Verdict
+from studies.reporting.sections import KeyValues, Section, Tone, Verdict
 
 About = Mapping[str, Any]
-Tone = Literal["good", "warning", "bad", "neutral"]
 _PLACE = ["true_samples", "estimator", "iteration"]
 # A model that leaves so much of the gap in one step, in its worst group of channels, closes none.
 _OPEN = 0.5

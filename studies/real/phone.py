@@ -8,14 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from residual.trajectories import Trajectory
 from sims.effects import QuadraticDrag
 from sims.host import HostSimulator
-
-Array = NDArray[np.float64]
+from sims.simulator import Array
 
 
 def speed_change_error(simulator: HostSimulator, trials: Sequence[Trajectory]) -> float:

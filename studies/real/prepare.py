@@ -7,11 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from simgap_files.atomic import atomic_write_text
-
-Array = NDArray[np.float64]
+from sims.simulator import Array
 
 
 def sum_accelerations(source: str | Path, target: str | Path) -> None:

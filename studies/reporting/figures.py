@@ -118,16 +118,13 @@ def legend_above(figure: Figure, axis: Axes, columns: int = 2) -> None:
 
 def save_figure(
     figure: Figure, path: str | Path, data: Mapping[str, ArrayLike] | pd.DataFrame
-) -> Path:
+) -> None:
     """Write a figure as PNG and the numbers behind it as CSV of the same name.
 
     Args:
         figure: To be saved; both files appear whole or not at all.
         path: Of the PNG.
         data: Columns by name; a shorter column is filled up with empty cells.
-
-    Returns:
-        The path of the PNG.
 
     Raises:
         ValueError: ``path`` does not end in ``.png``.
@@ -140,7 +137,6 @@ def save_figure(
     with atomic_path(path) as temporary:
         temporary.write_bytes(to_png(figure))
     atomic_write_text(path.with_suffix(".csv"), data.to_csv(index=False, lineterminator="\n"))
-    return path
 
 
 def to_png(figure: Figure) -> bytes:

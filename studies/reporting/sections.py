@@ -19,6 +19,7 @@ from studies.reporting.render import render
 
 Source = MatplotlibFigure | Media | bytes | str | Path
 Cell = str | float | int | bool | None
+Tone = Literal["good", "warning", "bad", "neutral"]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -50,7 +51,7 @@ class Verdict(Section):
     template: ClassVar[str] = "verdict.html"
     headline: str
     text: str = ""
-    tone: Literal["good", "warning", "bad", "neutral"] = "neutral"
+    tone: Tone = "neutral"
     label: str = ""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import difflib
 import json
 import re
@@ -103,7 +104,10 @@ class Parser(jsonargparse.ArgumentParser):
 
     def parse_object(self, cfg_obj: Any, *rest: Any, **options: Any) -> Any:
         """As usual; a robot's model file may stand where a simulator is expected."""
-        given = _with_models(cfg_obj) if isinstance(cfg_obj, Mapping) else cfg_obj
+        given = cfg_obj
+        if isinstance(given, Mapping):
+            # A copy, since the parser changes nested lists of what it is given.
+            given = _with_models(copy.deepcopy(dict(given)))
         self._given = given
         self._without_usual([given])
         return super().parse_object(given, *rest, **options)
@@ -121,9 +125,9 @@ class Parser(jsonargparse.ArgumentParser):
                 found = _with_models(found, Path(str(path)).parent if path else None)
                 found = without_replaced(found, self._words)
                 # One file, `logs: log.csv`, is a list of one, as on the command line.
-                found |= {
-                    key: [found[key]] for key in self._lists & set(found) if _is_single(found[key])
-                }
+                for key in self._lists & set(found):
+                    if isinstance(found[key], str | int | float):
+                        found[key] = [found[key]]
         content = content if found == given else yaml.safe_dump(found)
         return super().parse_string(content, path, *rest, **options)
 
@@ -187,10 +191,6 @@ class Parser(jsonargparse.ArgumentParser):
         names = [action.dest for action in self._actions if action.dest.startswith(group)]
         tops = dict.fromkeys(n.removeprefix(group).partition(".")[0] for n in names)
         return [name for name in tops if name != "help"]
-
-
-def _is_single(value: Any) -> bool:
-    return isinstance(value, str | int | float)
 
 
 def _not_among(given: Any, known: Sequence[str]) -> str:
@@ -258,7 +258,6 @@ def _check_given(name: str, value: str) -> None:
     """
     if not name.startswith("--") or name == "--output":
         return
-    lacking = ""
     if value.endswith((".yaml", ".yml")):
         try:
             _READ[value] = (name.removeprefix("--"), safe_yaml.read(value))
@@ -266,9 +265,8 @@ def _check_given(name: str, value: str) -> None:
             raise ValueError(f"{name} {error}") from None
     elif name in CLASSES:
         path = IMPORT_PATH.fullmatch(value) and not Path(value).exists()
-        lacking = in_file(value) or (not_found(value) if path else "")
-    if lacking:
-        raise ValueError(f"{name}: {lacking}")
+        if lacking := in_file(value) or (not_found(value) if path else ""):
+            raise ValueError(f"{name}: {lacking}")
 
 
 def _check_number(name: str, value: str, kind: Any) -> None:

@@ -122,18 +122,16 @@ def read_trials(root: Path) -> tuple[list[dict[str, Any]], Failures]:
     Raises:
         FileNotFoundError: There is no such file.
     """
-    folders = [root / name for name in read_sealed(root / PLAN)["trials"]]
-    results = [read_sealed(folder / RESULTS) for folder in folders if _finished(folder)]
-    failures = {
-        folder: f"{folder / RESULTS} is damaged: give the command of the study again\n"
-        for folder in folders
-        if (folder / RESULTS).exists() and not _finished(folder)
-    }
-    failures |= {
-        folder: (folder / "error.txt").read_text(encoding="utf-8")
-        for folder in folders
-        if not (folder / RESULTS).exists() and (folder / "error.txt").exists()
-    }
+    results: list[dict[str, Any]] = []
+    failures: Failures = {}
+    for folder in [root / name for name in read_sealed(root / PLAN)["trials"]]:
+        path, error = folder / RESULTS, folder / "error.txt"
+        if _finished(folder):
+            results.append(read_sealed(path))
+        elif path.exists():
+            failures[folder] = f"{path} is damaged: give the command of the study again\n"
+        elif error.exists():
+            failures[folder] = error.read_text(encoding="utf-8")
     return results, failures
 
 
@@ -183,7 +181,7 @@ def _finished(folder: Path, code: str | None = None) -> bool:
     """Whether results are there, whole and, if a hash is given, of this code."""
     try:
         made_by = read_sealed(folder / RESULTS).get("made_by")
-    except (OSError, ValueError, TypeError, AttributeError):
+    except (OSError, ValueError):
         return False
     return not code or made_by == code
 

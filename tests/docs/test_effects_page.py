@@ -1,6 +1,7 @@
 """docs/effects.md lists the whole library, with what the classes say."""
 
 import inspect
+import re
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,16 @@ def test_the_page_says_which_lie_upstream_of_a_sensor():
     upstream = [e.name for e in HOSTED if e.upstream_of_sensor and e.where != "pump"]
     (line,) = [line for line in text.splitlines() if line.startswith("Upstream of a sensor")]
     assert [word for word in line.split("`")[1::2]] == upstream
+
+
+def test_an_effect_of_one_s_own_acts_as_the_page_writes_it():
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (code,) = (block for block in blocks if block.startswith("# my_file.py"))
+    exec(code, names := {"__name__": "my_file"})
+    fan = names["FanTorque"]("pivot", 1e-4)
+    assert fan.quantities(PendulumEquation())["level"].unit == "N m s^3/rad^3"
+    braked = PendulumEquation(effects=[fan]).step([[0.0, 20.0]], [[0.0]])
+    assert 0 < braked[0, 1] < PendulumEquation().step([[0.0, 20.0]], [[0.0]])[0, 1]
 
 
 def test_what_one_derives_from_is_there():

@@ -37,8 +37,10 @@ def worked(tmp_path_factory):
     (command,) = blocks("bash")
     words = command.split()
     assert words[0] == "python"
-    at = words.index("logs/*.csv")
-    words[at : at + 1] = sorted(f"logs/{path.name}" for path in (folder / "logs").glob("*.csv"))
+    at = words.index("records/*.csv")
+    words[at : at + 1] = sorted(
+        f"records/{path.name}" for path in (folder / "records").glob("*.csv")
+    )
     told = run([sys.executable, *words[1:]], folder)
     used = script("use.py", folder)
     return json.loads((folder / "gap" / "gap.json").read_text()), told, used

@@ -47,7 +47,7 @@ def test_library_names_every_effect_and_bounds_what_dissipates():
         *("viscous_friction", "coulomb_friction", "stribeck_friction", "quadratic_drag"),
         *("linear_spring", "cubic_spring", "constant_load", "cogging", "mass", "inertia"),
         *("length", "actuator_gain", "actuator_bias", "dead_zone", "saturation", "delay"),
-        *("actuator_lag", "backlash", "sensor_offset", "sensor_scale"),
+        *("actuator_lag", "backlash", "sensor_offset", "sensor_scale", "encoder_scale"),
     }
     for effect in effects:
         assert effect.absent and effect.sentence and effect.needs

@@ -92,6 +92,7 @@ def test_gap_json_holds_what_it_promises(record):
     change = verdict["parameters"]["change"]
     assert change["unit"] == "kg" and change["low"] <= 0.035 <= change["high"]
     assert not change["at_bound"]
+    assert ("sampling", "run-01.csv") in {(one["kind"], one["where"]) for one in record["quality"]}
     gap = record["gap"]
     assert set(gap) >= {"horizon_s", "share", "blocks", "folds", "steps", "by_channel"}
     for key in ("before", "after", "noise_floor", "share"):

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from residual.gap.result import Number
-from studies.gap.progress import Heartbeat
+from studies.gap import progress
 from studies.gap.words import (
     by_place,
     duration_text,
@@ -51,13 +51,15 @@ def test_a_share_is_rounded_where_that_hides_nothing(share, text):
     assert percent(share) == text
 
 
-def test_a_sign_of_life_comes_while_nothing_is_said():
+def test_a_sign_of_life_comes_while_nothing_is_said(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "QUIET", 0.04)
     lines = []
-    with Heartbeat(60, lines.append, quiet=0.04) as tell:
+    with progress.Heartbeat(60) as tell:
         tell("mass: 3 % of the error")
         end = time.monotonic() + 10
         while len(lines) < 3 and time.monotonic() < end:
             time.sleep(0.01)
+            lines += capsys.readouterr().err.splitlines()
     assert len(lines) >= 3
     assert all(re.match(r" *\d+\.\d s, \d+ s left  ", line) for line in lines)
     assert lines[-1].endswith("still working; last: mass: 3 % of the error")

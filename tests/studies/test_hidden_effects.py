@@ -142,3 +142,12 @@ def test_fast_subset(tmp_path, capsys):
     (tmp_path / "cells.csv").unlink()
     report.main([str(tmp_path / "sets")])
     assert (tmp_path / "cells.csv").stat().st_size > 0
+
+
+def test_rivals_alone_have_a_report(tmp_path, capsys):
+    config = tmp_path / "alone.yaml"
+    block = "{name: no gap, hidden: [[]], excitation: [weak], runs: [3]}"
+    config.write_text(f"steps: 60\nmethods: [one_step]\nblocks: [{block}]\n")
+    main(["--config", str(config), "--output", str(tmp_path / "out")])
+    assert "one-step regression: a false name" in capsys.readouterr().out
+    assert "Beside other methods" in (tmp_path / "out" / "report.html").read_text()

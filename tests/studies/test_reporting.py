@@ -241,7 +241,8 @@ def test_saved_figure_has_its_numbers_beside_it(tmp_path):
         f"{name} {c}": v for name, xy in series.items() for c, v in zip("xy", xy, strict=False)
     }
     figure = drawn(series)
-    path = figures.save_figure(figure, tmp_path / "a" / "curve.png", columns)
+    path = tmp_path / "a" / "curve.png"
+    figures.save_figure(figure, path, columns)
     with Image.open(path) as image:
         assert image.size[0] > 1000
     table = pd.read_csv(path.with_suffix(".csv"))

@@ -26,6 +26,7 @@ from residual.gap.search.comparisons import helps, material
 from residual.gap.search.explain import FOOTNOTE
 from residual.gap.search.redundant import doubles
 from residual.gap.search.sets import Key, Search
+from residual.logs.checks import Finding
 
 #: Forecast error over that by noise alone up to which there may be no gap.
 NEAR_NOISE = 1.5
@@ -45,7 +46,7 @@ def summed_up(answer: Answer) -> Gap:
 
 def told(
     answer: Answer, table: Gap, apart: Gap | None, sets: Sequence[tuple[str, ...]],
-    tolerance: float | None, quality: Sequence[str], seconds: dict[str, float],
+    tolerance: float | None, quality: Sequence[Finding], seconds: dict[str, float],
 ) -> GapResult:  # fmt: skip
     """Everything as plain data."""
     found, search, key = answer.found, answer.found.search, answer.key
@@ -53,11 +54,11 @@ def told(
     corrected = answer.corrected
     finer = corrected.substeps > simulator.substeps
     if finer:
-        quality = [
-            *quality,
+        says = (
             f"what was found is faster than the nominal simulator: the corrected one takes "
-            f"{corrected.substeps} sub-steps in a control period, not {simulator.substeps}",
-        ]
+            f"{corrected.substeps} sub-steps in a control period, not {simulator.substeps}"
+        )
+        quality = [*quality, Finding("search", "", says)]
     measured = [simulator.physical_channels[c] for c in fitter.samples.measured]
     blind: tuple[Blind, ...] = ()
     if found.adequate and len(fitter.blocks) >= TOO_FEW:

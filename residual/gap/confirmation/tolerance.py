@@ -33,7 +33,7 @@ from residual.gap.search.significance import size
 from sims.effects.actuator import ActuatorGain
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange
-from sims.effects.sensor import SensorScale
+from sims.effects.sensor import ScaledSensor
 
 Array = NDArray[np.float64]
 
@@ -176,7 +176,7 @@ def within(search: Search, claim: Claim, tolerance: float, adequate: bool) -> bo
     effect = search.candidates[claim.number].effect
     if isinstance(effect, ParameterChange):
         size = tolerance * known.size(search, effect.parameter)
-    elif isinstance(effect, ActuatorGain | SensorScale) and not adequate:
+    elif isinstance(effect, ActuatorGain | ScaledSensor) and not adequate:
         size = tolerance
     else:
         return False

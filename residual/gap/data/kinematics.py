@@ -55,7 +55,8 @@ def kinematics(
         if agree and clear and not seen.by_zero(scale, error):
             says = (
                 f"changes {scale:.4f} times as much as the integral of {channel.name}: "
-                f"{channel.name} was multiplied by {scale:.4f}"
+                f"{channel.name} was multiplied by {scale:.4f}; if it is {channel.rate_of} that "
+                "reads wrongly, both do now"
             )
             numbers = {"scale": scale}
             findings.append(Finding("kinematics", channel.rate_of, says, numbers, "warning"))

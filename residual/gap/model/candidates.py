@@ -141,7 +141,7 @@ def candidates(
     found = []
     for effect in effects:
         if isinstance(effect, SensorEffect):
-            if effect.where not in measured:
+            if not measured.issuperset(effect.read_by_it(simulator)):
                 continue
             effect = effect.suited_to(*measured_range(samples, columns[effect.where]))
         reach = 0.0

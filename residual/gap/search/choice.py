@@ -3,7 +3,7 @@
 A set must take a fifth off the error that the best smaller one leaves. A share of the nominal
 error instead fails at both ends: where that is small, trifles take off a good part of it, and
 where it is large, a true second effect takes off little. The fifth was measured (20 to 25 % serve)
-on logs that the rule had not been made with; see docs/find-gap.md.
+on logs that the rule had not been made with; see docs/find-gap-rules.md.
 
 Where motion hangs on a hair, as what sticks and breaks away does, the forecast of a block or two
 may go astray whatever is known. Fits to all data say more there: what lowers their loss no more

@@ -9,13 +9,11 @@ from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from residual.trajectories import Trajectory
-from studies.hidden.dirty.truth import COORDINATES, INPUTS, Truth, simulate
+from studies.hidden.dirty.truth import COORDINATES, INPUTS, Array, Truth, simulate
 
-Array = NDArray[np.float64]
 Layout = Literal["ramp", "single", "many"]
 
 #: Largest input of each actuator, by system.

@@ -130,19 +130,20 @@ def misses(data: pd.DataFrame) -> list[str]:
     return lines
 
 
-def summary(results: Sequence[Mapping[str, Any]]) -> str:
-    """A few lines for the terminal."""
-    return headlines(judged(results)).to_string(index=False)
+def write_dirty(results: Sequence[Mapping[str, Any]], output: Path) -> str:
+    """Write dirty.md with all tables, and dirty.csv with one row for each set.
 
-
-def write_dirty(results: Sequence[Mapping[str, Any]], output: Path) -> None:
-    """Write dirty.md with all tables, and dirty.csv with one row for each set."""
+    Returns:
+        A few lines for the terminal.
+    """
     data = judged(results)
+    short = headlines(data)
     plain = data.drop(columns=["says", "findings"])
     atomic_write_text(output / "dirty.csv", plain.to_csv(index=False))
     parts = [
-        f"# Dirty world: {len(data)} sets\n", frame_markdown(headlines(data)), "\n## Every cell\n",
+        f"# Dirty world: {len(data)} sets\n", frame_markdown(short), "\n## Every cell\n",
         frame_markdown(cells(data)), "\n## By effect\n", frame_markdown(by_effect(data)),
         "\n## Misses\n", "".join(f"- {line}\n" for line in misses(data)) or "none\n",
     ]  # fmt: skip
     atomic_write_text(output / "dirty.md", "\n".join(parts))
+    return short.to_string(index=False)

@@ -50,7 +50,7 @@ def run_dirty(config: Mapping[str, Any]) -> dict[str, Any]:
         "period_s": made.simulator.dt,
         "strength": made.truth.strength,
         "seconds": time.process_time() - begin,
-        "findings": list(result.quality),
+        "findings": [one.words for one in result.quality],
         "says": [verdict.says for verdict in result.verdicts],
         **names(result, made, twins),
         **errors(result, made),

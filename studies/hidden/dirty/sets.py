@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +14,6 @@ from studies.hidden.dirty.measure import Layout, Sensors, records
 from studies.hidden.dirty.systems import nominal
 from studies.hidden.dirty.truth import INPUTS, PARAMETERS, Truth
 from studies.judging.forecasts import plan, relative_error
-
-Block = Literal["hidden", "dirt only", "removed"]
 
 #: What can be hidden, with a middling strength: ``effect@where``, or a parameter.
 HIDDEN: Mapping[str, Mapping[str, float]] = {

@@ -6,10 +6,13 @@ import pytest
 from swing import noisy
 
 from residual.gap import find_gap
+from residual.gap.log import look
+from residual.gap.offered import Offered
 from residual.logs import LogData, read_logs
 from residual.trajectories import Trajectory, trajectories_of
 from sims.loading import chosen_effects
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Simulator
 
 
 def test_one_run_several_and_what_was_read_are_the_same():
@@ -49,6 +52,25 @@ def test_a_run_of_one_dimension_is_refused_with_the_fix():
 def test_a_class_in_place_of_a_simulator_is_told():
     with pytest.raises(ValueError, match=r"PendulumEquation is a class, .* PendulumEquation\(\)"):
         find_gap(PendulumEquation, [noisy()])
+
+
+def test_a_simulator_that_hosts_nothing_is_told_what_to_derive_from():
+    class Arm(Simulator):
+        def step(self, states, actions):
+            return states
+
+    with pytest.raises(ValueError, match="Arm cannot host effects: derive it from Equation"):
+        find_gap(Arm(), [noisy()])
+
+
+def test_what_a_measured_input_has_recorded_already_is_not_offered():
+    log = look(PendulumEquation(), [noisy()], [], None, lambda _: None)
+    every, recorded = (set(Offered.of(log, None, given).by_label) for given in ((), ["voltage"]))
+    assert {"dead_zone@voltage", "actuator_lag@voltage"} <= every - recorded
+    assert recorded == set(Offered.of(log, None, True).by_label)
+    assert "viscous_friction@pivot" in recorded
+    with pytest.raises(ValueError, match="measured_input: no input torque; there are voltage"):
+        Offered.of(log, None, ["torque"])
 
 
 def test_runs_in_place_of_a_simulator_are_told():

@@ -94,5 +94,5 @@ def test_a_gap_that_a_single_stretch_shows_is_told():
     noisy = speeds + 0.6 * np.random.default_rng(5).standard_normal(len(times))
     result = find_gap(Wheel(), wheel(noisy, duties))
     assert [v.kind for v in result.verdicts if v.kind != "needs_data"] == ["no_gap"]
-    (told,) = [text for text in result.quality if "as much there as by noise" in text]
+    (told,) = [one.says for one in result.quality if "as much there as by noise" in one.says]
     assert told.startswith("run 0 from 0 s to ")

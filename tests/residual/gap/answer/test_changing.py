@@ -8,9 +8,12 @@ from residual.gap import find_gap
 from studies.gap.files import gap_record
 from studies.gap.summary import summary
 
+#: What may be missing.
+ASKED = ("mass", "stiffness", "damping", "coulomb_friction", "cubic_spring", "actuator_gain")
+
 
 def ask(*records):
-    return find_gap(Trolley(), list(records), minutes=1)
+    return find_gap(Trolley(), list(records), effects=ASKED, minutes=1)
 
 
 def test_a_spring_that_weakens_about_its_nominal_is_told_with_both_ends():

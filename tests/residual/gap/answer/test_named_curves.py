@@ -96,7 +96,7 @@ def test_a_curve_with_more_numbers_than_the_log_can_tell_is_told():
     short = Trajectory("short", short.times[:40], short.states[:40], short.actions[:39])
     found = find_gap(Rotor(), [short], effects=("input_curve",), horizon=0.3)
     assert not found.effects
-    assert any("input_curve@torque was not tried" in says for says in found.quality)
+    assert any("input_curve@torque was not tried" in one.says for one in found.quality)
 
 
 def test_it_explains_records_set_aside(braked):

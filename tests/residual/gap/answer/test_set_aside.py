@@ -57,7 +57,9 @@ def test_what_is_found_about_them_is_told_as_such(runs):
         run.states[:, RATE] = 0.5
     found = ask(runs[:4], still)
     assert any(
-        says.startswith("records set aside: rate is 0.5 rad/s in all") for says in found.quality
+        (one.kind, one.where) == ("still", "records set aside: rate")
+        and one.words.startswith("records set aside: rate is 0.5 rad/s in all")
+        for one in found.quality
     )
     assert set(found.held_out.by_channel) == {"angle"}
 

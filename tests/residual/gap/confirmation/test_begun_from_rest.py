@@ -18,7 +18,7 @@ def lag_of(found):
 
 def told(found):
     """Whether it is said that records are taken to begin from rest."""
-    return [text for text in found.quality if "taken to be rest" in text]
+    return [one.says for one in found.quality if "taken to be rest" in one.says]
 
 
 OFFERED = ("actuator_lag", "delay", "actuator_gain", "constant_load", "slow")

@@ -1,6 +1,7 @@
 """What grows steadily along a record, as a room that warms, passes for an effect no longer."""
 
 import dataclasses
+import functools
 from typing import ClassVar
 
 import numpy as np
@@ -27,9 +28,14 @@ def named(run):
     return [v for v in find_gap(Oven(), [run]).verdicts if v.parameters]
 
 
+@functools.cache
+def in_a_room_that_warms(by):
+    return named(warmed(steps(0, DUTIES, 0.0, lag=0.0), by))
+
+
 @pytest.mark.parametrize("by", [1.0, 3.0])
 def test_a_room_that_warms_has_no_name_that_is_certain(by):
-    found = named(warmed(steps(0, DUTIES, 0.0, lag=0.0), by))
+    found = in_a_room_that_warms(by)
     assert not [verdict.label for verdict in found if verdict.kind == "confirmed"]
 
 
@@ -50,7 +56,7 @@ def test_a_gain_in_a_room_that_stays_as_it_is_is_certain():
 
 def test_no_number_of_what_is_certain_lies_at_its_bound():
     """A store so slow that it is a ramp."""
-    found = named(warmed(steps(0, DUTIES, 0.0, lag=0.0), 1.0))
+    found = in_a_room_that_warms(1.0)
     bound = [v for v in found if any(n.at_bound for n in v.parameters.values())]
     assert all("at_bound" in verdict.doubts for verdict in bound)
 
@@ -122,7 +128,8 @@ def driven(seed, wind, n=1800, drag=3.5e-4):
 
 
 def test_the_size_of_drag_holds_beside_a_wind_that_rises():
-    found = find_gap(Car(), [driven(seed, wind=8.0) for seed in (0, 1)])
+    asked = ("quadratic_drag", "viscous_friction", "constant_load", "actuator_gain", "mass", "roll")
+    found = find_gap(Car(), [driven(seed, wind=8.0) for seed in (0, 1)], effects=asked)
     drags = [v for v in found.verdicts if v.effect == "quadratic_drag"]
     assert drags
     for verdict in drags:
@@ -130,7 +137,9 @@ def test_the_size_of_drag_holds_beside_a_wind_that_rises():
         assert size.low < 3.5e-4 < size.high
     (calm,) = [
         v
-        for v in find_gap(Car(), [driven(seed, wind=0.0) for seed in (0, 1)]).verdicts
+        for v in find_gap(
+            Car(), [driven(seed, wind=0.0) for seed in (0, 1)], effects=asked
+        ).verdicts
         if v.effect == "quadratic_drag"
     ]
     (size,) = calm.parameters.values()

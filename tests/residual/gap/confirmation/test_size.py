@@ -49,7 +49,8 @@ def pushed(friction, gain, rows=360, noise=5e-4, wave=0.03):
 
 def test_friction_without_which_nothing_fits_is_certain_though_the_mass_may_be_meant():
     # Eight times the force with friction 20, or an eighth of the mass with friction 2.5: the same.
-    found = find_gap(Cart(), [pushed(20.0, 8.0)], hold="zero")
+    asked = ("viscous_friction", "coulomb_friction", "actuator_gain", "mass", "sensor_scale")
+    found = find_gap(Cart(), [pushed(20.0, 8.0)], effects=asked, hold="zero")
     by_name = {verdict.effect: verdict for verdict in found.verdicts}
     friction, gain = by_name["viscous_friction"], by_name["actuator_gain"]
     assert friction.kind == "confirmed"

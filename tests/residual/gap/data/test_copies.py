@@ -20,7 +20,7 @@ def test_a_record_set_aside_that_is_fitted_too_is_told(part):
     actions = logs[0].actions[part][: len(times) - 1]
     copy = Trajectory("test.csv", times - times[0], states, actions)
     found = find_gap(PendulumEquation(), logs, held_out=[copy], effects=["mass"], minutes=0.2)
-    assert any("test.csv" in says and "is no test" in says for says in found.quality)
+    assert any("test.csv" in one.where and "is no test" in one.says for one in found.quality)
 
 
 def test_measured_again_under_the_same_commands_is_a_test():

@@ -87,7 +87,7 @@ def test_sets_that_few_windows_leave_open_meet_on_more(tmp_path, monkeypatch):
     monkeypatch.setattr(prepare, "NAMED_ON", 20)
     monkeypatch.setattr(windows, "WORTH", 1.2)
     found = find_gap(simulator, runs, effects=effects, parameter_tolerance=0)
-    assert any("those leave open on 35" in says for says in found.quality)
+    assert any("those leave open on 35" in one.says for one in found.quality)
     assert [e.effects for e in found.evidence if e.chosen] == [("gravity z",)]
     assert (found.verdicts[0].kind, found.verdicts[0].effect) == ("confirmed", "gravity z")
     number = found.verdicts[0].parameters["change"]

@@ -42,7 +42,7 @@ def test_another_length_than_was_asked_for_is_told(step, asked, why):
     found = find_gap(
         PendulumEquation(), [swing(2.0, 10.0, step, noise=1e-3)], horizon=asked, effects=["mass"]
     )
-    told = [says for says in found.quality if "a horizon of" in says]
+    told = [one.says for one in found.quality if "a horizon of" in one.says]
     assert len(told) == (why is not None)
     assert why is None or (why in told[0] and f"{found.gap.horizon_s:.3g} s" in told[0])
 

@@ -139,7 +139,7 @@ def test_how_inputs_run_between_samples_is_told_by_the_data(hold):
     logs = swung(PendulumEquation(mass=0.09), hold)
     found = find_gap(PendulumEquation(), logs, effects=FEW, horizon=0.4, minutes=20.0)
     assert found.corrected.action_channels[0].hold == hold
-    assert any("straight" in line for line in found.quality) == (hold == "linear")
+    assert any("straight" in one.says for one in found.quality) == (hold == "linear")
     # With the wrong hold half a sample would be taken for a delay.
     assert [e.name for e in found.effects] == ["mass"]
 
