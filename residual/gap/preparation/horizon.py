@@ -19,6 +19,10 @@ TURNING = np.pi / np.sqrt(3)
 PART = 1 / 3
 #: Part of a length asked for by which another is none.
 NEARLY = 0.2
+#: Times that the mean square of differences is over twice the time where motion makes them (four
+#: where it is steady, two where it jumps, one of noise), and part of the variance up to which it
+#: may be that of noise.
+LITTLE, FARTHER = 0.5, 1.5
 #: Windows that the records should at least be good for, and where so many show nothing.
 WINDOWS, FEWER = 8, 5
 #: Least samples of a window, and of a forecast of a system that strikes the ground.
@@ -123,15 +127,30 @@ def _period(trajectories: Sequence[Trajectory], column: int, angle: bool) -> flo
 def _speed(values: Array, times: Array, spread: float) -> float:
     """Root mean square rate of a channel: from differences over which it moves a quarter of its
     spread, less what noise adds to differences of any length. Samples may come in bursts."""
-    lag = 1
-    while 4 * lag < len(values) and _change(values, lag) < (0.25 * spread) ** 2:
-        lag *= 2
+    lag = _lag(values, spread)
     longer = min(2 * lag, len(values) - 1)
     once, twice = _change(values, lag), _change(values, longer)
     short, long = _change(times, lag), _change(times, longer)
     # With noise s: (v t)^2 + 2 s^2 for both times t.
     square = (twice - once) / (long - short) if twice > once else once / short
     return float(np.sqrt(square))
+
+
+def _lag(values: Array, spread: float) -> int:
+    """Samples over which a channel moves a quarter of its spread; where noise does, which is less
+    than the motion, those from which on it moves clearly farther the longer it has time."""
+    lag = 1
+    while 4 * lag < len(values) and _change(values, lag) < (0.25 * spread) ** 2:
+        lag *= 2
+    if _change(values, lag) > LITTLE * spread**2:
+        return lag
+    longer = lag
+    while 8 * longer < len(values):
+        once, twice, again = (_change(values, times * longer) for times in (1, 2, 4))
+        if twice >= FARTHER * once and again >= FARTHER * twice:
+            return longer
+        longer *= 2
+    return lag
 
 
 def _change(values: Array, lag: int) -> float:

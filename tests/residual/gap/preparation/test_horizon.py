@@ -20,7 +20,7 @@ from residual.gap.preparation.horizon import (
 from residual.gap.preparation.prepare import prepare
 from residual.gap.preparation.suited import beyond_noise
 from residual.trajectories import Trajectory
-from sims.equations import EquationOfMotion
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.leo import Leo
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel, Parameter
@@ -45,6 +45,29 @@ def test_another_length_than_was_asked_for_is_told(step, asked, why):
     told = [one.says for one in found.quality if "a horizon of" in one.says]
     assert len(told) == (why is not None)
     assert why is None or (why in told[0] and f"{found.gap.horizon_s:.3g} s" in told[0])
+
+
+class Flywheel(FirstOrderSystem):
+    """It spins up by itself."""
+
+    dt = 0.01
+    state_channels = (Channel("speed", "rpm", "rate", scale=50.0),)
+    action_channels = ()
+    parameters: ClassVar = {"slow": Parameter(3.0, "s", "time constant", low=0.05)}
+
+    def derivative(self, x, u, p):
+        return (100.0 - x) / p.slow
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("noise", [0.5, 9.0])
+def test_noise_makes_no_motion_faster(noise, seed):
+    """Noise of a third of the spread, readings alike in pairs: of 1 s it left 0.01 to 0.1 s."""
+    times, rng = 0.01 * np.arange(1600), np.random.default_rng(seed)
+    errors = np.repeat(rng.standard_normal(800), 2)
+    speed = 100.0 * (1 - np.exp(-times / 3.0)) + noise * errors
+    run = Trajectory("run", times, speed[:, None], np.zeros((1599, 0)))
+    assert usual_horizon(Flywheel(), [run]) > 0.6
 
 
 def test_a_length_beyond_the_record_is_what_it_holds_and_one_block_is_never_no_gap():
