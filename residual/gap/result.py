@@ -29,7 +29,7 @@ Kind = Literal[
 #: another kind does as well.
 Doubt = Literal[
     "not_needed", "unsteady", "creeps", "drift", "one_way", "numerics", "at_bound", "calibration",
-    "slight", "no_time", "clock", "sensor", "conventions", "cut_off", "extreme", "orders",
+    "slight", "no_time", "clock", "sensor", "conventions", "cut_off", "extreme", "orders", "levels",
     "records", "law", "set_aside", "no_help", "may_be_zero", "share_may_be_zero", "few_blocks",
     "rivals",
 ]  # fmt: skip

@@ -25,6 +25,8 @@ DOUBTS: dict[Doubt, str] = {
     "see first whether the simulator has it right",
     "orders": "torques that repeat along a turn fit whatever follows the position, where there are "
     "several or something has no name",
+    "levels": "its input rests at as few levels as there are numbers for it, so that other laws "
+    "pass through them, too: log with more",
     "records": "an effect with its own size in each record does better, or may be what this one "
     "stands for",
     "set_aside": "the corrected simulator is worse on the records that were set aside",
@@ -70,6 +72,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "cut_off": claim.cut_off,
         "extreme": claim.extreme,
         "orders": claim.orders,
+        "levels": claim.few_levels,
         "records": claim.unlike,
         "set_aside": claim.refuted,
         "no_help": claim.helpless,

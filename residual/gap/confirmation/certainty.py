@@ -13,6 +13,7 @@ from residual.gap.confirmation.claim import Claim, other_than
 from residual.gap.confirmation.constancy import creeps, on_the_way, whole_size
 from residual.gap.confirmation.drift import Drift
 from residual.gap.confirmation.following import by_another_law
+from residual.gap.confirmation.levels import by_few_levels
 from residual.gap.confirmation.numerics import STEADY, at_half_step, in_the_limit, survives
 from residual.gap.confirmation.one_way import may_hold_a_load
 from residual.gap.confirmation.timing import untimed
@@ -98,6 +99,7 @@ def claims(
                 other_law=number in other_law,
                 extreme=key in search.extreme,
                 orders=of_many_orders(search, key, number, adequate),
+                few_levels=by_few_levels(search, key, number),
             )
         )
     return sorted(found, key=lambda claim: -claim.share[0])

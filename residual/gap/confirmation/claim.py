@@ -49,6 +49,7 @@ class Claim:
         extreme: Whether a number of its set is out of all proportion to the simulator's.
         orders: Whether it repeats along a turn, and is one of several that do, or beside a
             remainder: together they fit whatever follows the position.
+        few_levels: Whether its input rests at as few levels as the laws of it have numbers.
         unlike: Whether it may stand for one effect in a size of its own in each record.
         refuted: Whether the corrected simulator forecasts records that were set aside worse.
         helpless: Whether it, or all that was found, forecasts them no better, though they show more
@@ -81,6 +82,7 @@ class Claim:
     cut_off: bool = False
     extreme: bool = False
     orders: bool = False
+    few_levels: bool = False
     unlike: bool = False
     refuted: bool = False
     helpless: bool = False
@@ -115,6 +117,7 @@ class Claim:
             self.cut_off,
             self.extreme,
             self.orders,
+            self.few_levels,
             self.unlike,
             self.refuted,
             self.helpless,
