@@ -26,9 +26,11 @@ from residual.gap.confirmation.constancy import (
 from residual.gap.confirmation.drift import Drift, Fall, beside
 from residual.gap.data.levels import Level, levels
 from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.plausible import FACTOR
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import Candidate, candidates
+from residual.gap.search.known import ANY_ZERO, size
 from residual.gap.search.sets import Key, Search
 from sims.effects.actuator import ActuatorGain
 from sims.effects.library import library
@@ -50,7 +52,7 @@ def changing(answer: Answer, in_vain: Collection[ParameterCurve] = ()) -> Changi
     Of what is beyond noise it has to take off half of what it leaves as a constant, more than
     chance, more than a push that drifts, and clearly more than a change along the records of what
     is named: of that both ends are told anyway. With a measured channel that has to be clearly more
-    than along the records.
+    than along the records. What would go ten times beyond its value, or to the other sign, is none.
 
     Args:
         answer: What was named.
@@ -59,7 +61,8 @@ def changing(answer: Answer, in_vain: Collection[ParameterCurve] = ()) -> Changi
     search = answer.found.search
     asked = {str(curve) for curve in in_vain}
     courses = [one for one in courses_of(answer) if str(one.curve) not in asked]
-    return next((one.told(search, search.tried[answer.key]) for one in courses), None)
+    told = ((one, one.told(search, search.tried[answer.key])) for one in courses)
+    return next((ends for one, ends in told if _believable(search, one, ends)), None)
 
 
 def courses_of(answer: Answer) -> list[Course]:
@@ -133,6 +136,18 @@ class Course:
         )  # fmt: skip
 
 
+def _believable(search: Search, course: Course, ends: Changing) -> bool:
+    """Whether both ends are values that a parameter, or the factor of a gain, may well have."""
+    effect, usual, nominal = course.one.effect, 1.0, ends.nominal
+    if isinstance(effect, ParameterChange):
+        usual = size(search, effect.parameter)
+    signed = isinstance(effect, ParameterChange) and ends.unit not in ANY_ZERO
+    return not usual or all(
+        abs(end - nominal) <= FACTOR * usual and not (signed and end * nominal < 0)
+        for end in (ends.begin, ends.end)
+    )
+
+
 def _clear(
     search: Search, key: Key, courses: Sequence[Level | None], by_noise: float, named: bool
 ) -> list[Course]:
@@ -180,8 +195,8 @@ def _columns(
     fitter: SmoothFitter, fit: Fit, one: Candidate, shares: Sequence[Array]
 ) -> list[Array]:
     """What a candidate does to every window by unit of its number over each course, (W, R, 1)."""
-    size = float(one.trials[0].values[0, 0])
-    moved = beside_starts(fit, fitter.columns(fit, [one], np.stack(shares))) / size
+    one_unit = float(one.trials[0].values[0, 0])
+    moved = beside_starts(fit, fitter.columns(fit, [one], np.stack(shares))) / one_unit
     return [moved[..., [k]] for k in range(len(shares))]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from residual.gap.confirmation.claim import Claim, other_than
-from residual.gap.confirmation.constancy import creeps, on_the_way, whole_size
+from residual.gap.confirmation.constancy import creeps, far_apart, on_the_way, whole_size
 from residual.gap.confirmation.drift import Drift
 from residual.gap.confirmation.following import by_another_law
 from residual.gap.confirmation.levels import by_few_levels
@@ -69,7 +69,8 @@ def claims(
         compound = search.candidates[number].effect.compound
         least = whole_size(search, key, number)
         numbers = {fit.model.knobs[j].field: bounded(fit, j, half[j], numerics) for j in own}
-        for j, ends in on_the_way(search, key, number).items():
+        along = on_the_way(search, key, number)
+        for j, ends in along.items():
             field = fit.model.knobs[j].field
             numbers[field] = dataclasses.replace(numbers[field], along=ends)
         taken = share(search, key, number)
@@ -82,7 +83,8 @@ def claims(
                 other_than(twins, rivals),
                 twins,
                 needed(search, key, number, adequate) and not (adequate and taken[1] < 0),
-                all(steady(search, key, j, least) for j in strengths),
+                all(steady(search, key, j, least) for j in strengths)
+                and (compound or not any(map(far_apart, along.values()))),
                 all(
                     survives(fit.theta[j], half[j], [n[j] for n in limits], least)
                     for j in strengths

@@ -25,6 +25,8 @@ SAME = 0.33
 CHANCE = 0.01
 #: Blocks below which nothing is said, and the same of a record.
 FEW, FEW_OF_ONE = 6, 2
+#: Times that a size may be larger at one end of the records than at the other.
+APART = 3.0
 
 
 def creeps(search: Search, key: Key, number: int) -> bool:
@@ -70,6 +72,13 @@ def on_the_way(search: Search, key: Key, number: int) -> dict[int, tuple[float, 
             begin, end = np.clip([size - change / 2, size + change / 2], knob.low, knob.high)
             found[j] = (float(begin), float(end))
     return found
+
+
+def far_apart(ends: tuple[float, float]) -> bool:
+    """Whether a size changes so much on the way that it is hardly that of one effect: oil that
+    warms halves a friction, but no lag is five times as long where steps are large."""
+    smaller, larger = sorted(ends, key=abs)
+    return smaller * larger < 0 or abs(larger) > APART * abs(smaller)
 
 
 def whole_size(search: Search, key: Key, number: int) -> float:

@@ -1,10 +1,15 @@
 """A parameter that changes along the records about its nominal value is told, and only then."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from trolley import Trolley, record
 
 from residual.gap import find_gap
+from residual.gap.answer.changing import _believable
+from residual.gap.beside import Changing
+from sims.effects import ActuatorGain, ParameterChange
 from studies.gap.files import gap_record
 from studies.gap.summary import summary
 
@@ -39,3 +44,19 @@ def test_what_is_different_in_the_middle_of_a_record_is_no_change_along_it():
     records = [record(seed, lambda part: 20 + 4 * np.sin(4 * np.pi * part)) for seed in (4, 5)]
     found = ask(*records).changing
     assert found is None or found.taken < 0.5
+
+
+@pytest.mark.parametrize(("begin", "end", "told"), [
+    (23.0, 17.0, True), (20.0, 0.0, True), (20.0, -4.0, False), (20.0, 300.0, False),
+])  # fmt: skip
+def test_a_value_that_no_spring_has_is_not_told(begin, end, told):
+    search = SimpleNamespace(simulator=Trolley())
+    course = SimpleNamespace(one=SimpleNamespace(effect=ParameterChange("stiffness")))
+    ends = Changing("stiffness", begin, end, 20.0, "N/m", 0.8)
+    assert _believable(search, course, ends) == told
+
+
+def test_a_gain_may_turn_round_but_not_be_a_hundred_times_larger():
+    course = SimpleNamespace(one=SimpleNamespace(effect=ActuatorGain("push")))
+    assert _believable(None, course, Changing("actuator_gain@push", -0.5, 0.5, 0.0, "1", 0.8))
+    assert not _believable(None, course, Changing("actuator_gain@push", 0.0, 99.0, 0.0, "1", 0.8))

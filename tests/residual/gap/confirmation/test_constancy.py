@@ -8,6 +8,7 @@ import pytest
 from oven import Oven, steps
 
 from residual.gap import find_gap
+from residual.gap.confirmation.constancy import far_apart
 from residual.trajectories import Trajectory
 from sims.equations import FirstOrderSystem
 from sims.simulator import Channel, Parameter
@@ -84,3 +85,46 @@ def test_friction_that_falls_as_it_warms_is_told_with_where_it_begins_and_ends(b
         assert level.along == pytest.approx((begin, end), abs=6.0)
         assert level.low < end + 6.0 and level.high > begin - 6.0
         assert any("no constant: about" in line for line in notes(friction, found))
+
+
+class Servo(FirstOrderSystem):
+    """It follows its command; that its speed has a limit nobody knows."""
+
+    dt = 0.02
+    state_channels = (Channel("angle", "deg", "other", scale=90.0),)
+    action_channels = (Channel("command", "deg", "input", scale=90.0, low=-180.0, high=180.0),)
+    parameters: ClassVar = {"slow": Parameter(0.08, "s", "time constant", low=0.005)}
+
+    def derivative(self, x, u, p):
+        return ((u[:, 0] - x[:, 0]) / p.slow)[:, None]
+
+
+def limited(seed, largest, smallest, n=900):
+    """Steps that become smaller, or stay as large, of a servo that turns 250 deg/s at most."""
+    rng = np.random.default_rng(seed)
+    sizes = np.linspace(largest, smallest, n // 45)
+    goals = np.repeat(np.cumsum(sizes * np.resize([1, -1], len(sizes))) / 2, 45)
+    angle, seen = 0.0, []
+    for goal in goals:
+        seen.append(angle)
+        for _ in range(20):
+            angle += 0.001 * np.clip((goal - angle) / 0.08, -250.0, 250.0)
+    states = np.array(seen)[:, None] + 0.1 * rng.standard_normal((len(seen), 1))
+    return Trajectory(f"record {seed}", 0.02 * np.arange(len(seen)), states, goals[:-1, None])
+
+
+def test_a_lag_that_is_many_times_as_long_where_steps_are_large_is_not_certain():
+    runs = [limited(seed, 150.0, 10.0) for seed in (0, 1)]
+    found = find_gap(Servo(), runs, effects=["actuator_lag", "constant_load"], hold="zero")
+    (lag,) = [v for v in found.verdicts if v.effect == "actuator_lag"]
+    (time,) = lag.parameters.values()
+    assert lag.kind == "ambiguous" and "unsteady" in lag.doubts
+    assert time.along[0] > 3 * abs(time.along[1])
+
+
+@pytest.mark.parametrize(("ends", "apart"), [
+    ((40.0, 14.0), False), ((-0.2, -0.5), False), ((0.59, 0.13), True), ((0.0, 2.4), True),
+    ((0.3, -0.2), True), ((-4.0, -1.0), True),
+])  # fmt: skip
+def test_sizes_of_one_effect_are_within_three_times(ends, apart):
+    assert far_apart(ends) == far_apart(ends[::-1]) == apart

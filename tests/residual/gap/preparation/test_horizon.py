@@ -56,7 +56,7 @@ class Flywheel(FirstOrderSystem):
     parameters: ClassVar = {"slow": Parameter(3.0, "s", "time constant", low=0.05)}
 
     def derivative(self, x, u, p):
-        return (100.0 - x) / p.slow
+        return ((100.0 - x[:, 0]) / p.slow)[:, None]
 
 
 @pytest.mark.parametrize("seed", range(8))
