@@ -12,8 +12,6 @@ from swings import ACTIONS, STATES, error, kinds, read, swing, write
 
 from residual.logs import Column, LogFormat, read_logs
 from residual.logs.units import USUAL, find_unit, units_of
-from residual.logs.writing import write_log
-from residual.trajectories import Trajectory
 from sims.simulator import Channel
 
 
@@ -26,20 +24,6 @@ def test_every_format_is_read_exactly(tmp_path, suffix):
     np.testing.assert_array_equal(run.states, np.column_stack([columns["angle"], columns["rate"]]))
     np.testing.assert_array_equal(run.actions[:, 0], columns["voltage"][:-1])
     assert kinds(data) == ["sampling"]
-
-
-@pytest.mark.parametrize("unmeasured", [[], [1]])
-def test_a_run_that_was_written_is_read_again(tmp_path, unmeasured):
-    columns = swing()
-    states = np.column_stack([columns["angle"], columns["rate"]])
-    states[:, unmeasured] = np.nan
-    path = tmp_path / "run.csv"
-    run = Trajectory("run", columns["time"], states, columns["voltage"][:-1, None])
-    write_log(path, run, STATES, ACTIONS)
-    (found,) = read_logs([str(path)], STATES, ACTIONS).trajectories
-    assert ("rate" in path.read_text()) == (not unmeasured)
-    for name in ("times", "states", "actions"):
-        np.testing.assert_allclose(getattr(found, name), getattr(run, name), rtol=1e-8, atol=1e-9)
 
 
 @settings(max_examples=30)
