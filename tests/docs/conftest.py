@@ -15,3 +15,11 @@ def own_modules(tmp_path_factory):
         file = getattr(module, "__file__", None)
         if file and folder in Path(file).parents:
             del sys.modules[name]
+
+
+@pytest.fixture
+def here(folder, monkeypatch):
+    """In the folder of a page's files, as for whoever starts Python there."""
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.chdir(folder)
+    return folder

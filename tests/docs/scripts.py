@@ -1,10 +1,22 @@
-"""Scripts of a page, run without a process that imports everything anew."""
+"""Examples of a page: read, written to files, and run without importing everything anew."""
 
 import contextlib
 import io
+import re
 import runpy
 
 import pytest
+
+
+def blocks(page, language):
+    """The page's examples in a language."""
+    return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def write_examples(page, folder):
+    """Put the page's Python into files, of the name that stands in the first line of each."""
+    for code in blocks(page, "python"):
+        (folder / code.splitlines()[0].removeprefix("# ")).write_text(code)
 
 
 @contextlib.contextmanager

@@ -8,13 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from scripts import script
+from scripts import blocks, script, write_examples
 
 TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial-equation-of-motion.md"
-
-
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", TUTORIAL.read_text(), re.DOTALL)
 
 
 def run(command, folder):
@@ -30,11 +26,9 @@ def run(command, folder):
 def worked(tmp_path_factory):
     """A folder in which the tutorial's files were written and its steps 2 to 4 run."""
     folder = tmp_path_factory.mktemp("tutorial")
-    for code in blocks("python"):
-        name = code.splitlines()[0].removeprefix("# ")
-        (folder / name).write_text(code)
+    write_examples(TUTORIAL, folder)
     script("measure.py", folder)
-    (command,) = blocks("bash")
+    (command,) = blocks(TUTORIAL, "bash")
     words = command.split()
     assert words[0] == "python"
     at = words.index("records/*.csv")
@@ -66,7 +60,7 @@ def test_nothing_else_is_claimed_and_the_gap_closes(worked):
 
 
 def test_the_heater_has_a_longer_time_constant_and_a_delay(tmp_path):
-    for code in blocks("python"):
+    for code in blocks(TUTORIAL, "python"):
         name = code.splitlines()[0].removeprefix("# ")
         if "heater" in name:
             (tmp_path / name).write_text(code)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scripts import blocks
 
 import simgap
 from policy import load_policy
@@ -26,10 +27,6 @@ LESS = [
 SMALL_DDPG = ["--ddpg.hidden", "[32, 32]", "--ddpg.warm_up", "200"]
 
 
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", TUTORIAL.read_text(), re.DOTALL)
-
-
 def run(command, folder):
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
@@ -42,17 +39,9 @@ def run(command, folder):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tutorial")
-    for code in blocks("python"):
+    for code in blocks(TUTORIAL, "python"):
         code = code.replace("horizon = 200", "horizon = 60")
         (folder / code.splitlines()[0].removeprefix("# ")).write_text(code)
-    return folder
-
-
-@pytest.fixture
-def here(folder, monkeypatch):
-    """In the folder, as for whoever starts Python there."""
-    monkeypatch.syspath_prepend(folder)
-    monkeypatch.chdir(folder)
     return folder
 
 
@@ -71,7 +60,7 @@ def learnt(folder, command, more, own_process=False):
 
 def test_the_file_is_short_and_the_command_learns(folder):
     assert len((folder / "cart_pole.py").read_text().splitlines()) <= 60
-    command, more = blocks("bash")[0], [*SMALL_DDPG, "--budget.true_samples", "200"]
+    command, more = blocks(TUTORIAL, "bash")[0], [*SMALL_DDPG, "--budget.true_samples", "200"]
     output, found = learnt(folder, command, more, own_process=True)
     assert [policy["name"] for policy in found["policies"]] == ["idealised", "difference"]
     errors = found["accuracy"][0]["visited"]["one_step"]
@@ -116,7 +105,7 @@ def test_the_python_call_runs(here, capsys):
 
 
 def test_the_grid_is_as_many_trials_as_the_page_says(here):
-    (code,) = blocks("yaml")
+    (code,) = blocks(TUTORIAL, "yaml")
     (here / "grid.yaml").write_text(code)
     parser = build_parser(learn.STUDY)
     settings = parser.plain(parser.parse_args(["--config", "grid.yaml"]))
@@ -141,7 +130,7 @@ def test_the_table_of_a_grid_is_read(here):
 def test_a_mujoco_environment_is_the_true_system(here, learner):
     pytest.importorskip("mujoco")
     pytest.importorskip("imageio")
-    command = blocks("bash")[1 if learner == "ddpg" else 3]
+    command = blocks(TUTORIAL, "bash")[1 if learner == "ddpg" else 3]
     small = "{policy_kwargs: {net_arch: [16, 16]}, learning_starts: 100}"
     more = SMALL_DDPG if learner == "ddpg" else ["--learner_options", small]
     output, found = learnt(here, command, more)
@@ -151,7 +140,7 @@ def test_a_mujoco_environment_is_the_true_system(here, learner):
     assert "uniform" not in found["accuracy"][0]
     assert max(found["accuracy"][0]["visited"]["one_step"].values()) < 0.5
     if learner == "ddpg":
-        asked = blocks("bash")[2].split()
+        asked = blocks(TUTORIAL, "bash")[2].split()
         assert asked[:3] == ["python", "-m", "studies.find_gap"]
         logs = sorted(map(str, (here / output / "samples").glob("*.csv")))
         given = [word for word in asked[3:] if "samples" not in word]

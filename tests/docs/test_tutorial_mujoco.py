@@ -9,16 +9,12 @@ from pathlib import Path
 
 import mujoco
 import pytest
-from scripts import inside, script
+from scripts import blocks, inside, script
 
 from studies import learn
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial-mujoco.md"
-
-
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", TUTORIAL.read_text(), re.DOTALL)
 
 
 def run(words, folder):
@@ -35,12 +31,12 @@ def run(words, folder):
 def worked(tmp_path_factory):
     """A folder in which steps 1 to 3 of the tutorial were done."""
     folder = tmp_path_factory.mktemp("lever")
-    (model,) = blocks("xml")
+    (model,) = blocks(TUTORIAL, "xml")
     (folder / "lever.xml").write_text(model)
-    for code in (*blocks("python"), *blocks("yaml")):
+    for code in (*blocks(TUTORIAL, "python"), *blocks(TUTORIAL, "yaml")):
         (folder / code.splitlines()[0].removeprefix("# ")).write_text(code)
     script("measure.py", folder)
-    command, _ = blocks("bash")
+    command, _ = blocks(TUTORIAL, "bash")
     told = run(command.split()[1:], folder)
     return folder, json.loads((folder / "gap" / "gap.json").read_text()), told
 
@@ -73,7 +69,7 @@ def test_the_policy_holds_the_robot(worked):
 
 def test_the_loop_runs_on_it(worked):
     folder, _, _ = worked
-    _, command = blocks("bash")
+    _, command = blocks(TUTORIAL, "bash")
     less = ["--budget.idealised_steps", "400", "--budget.difference_steps", "300"]
     small = ["--ddpg.hidden", "[32, 32]", "--ddpg.warm_up", "200"]
     words = command.split()

@@ -1,11 +1,10 @@
 """The simulators of docs/wrap-your-simulator.md keep the contract, learn, and are asked."""
 
 import json
-import re
 from pathlib import Path
 
 import pytest
-from scripts import script
+from scripts import blocks, script, write_examples
 
 from residual import NamedEffects
 from sims import check_simulator
@@ -21,22 +20,10 @@ LESS = [
 ]  # fmt: skip
 
 
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", PAGE.read_text(), re.DOTALL)
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wrapped")
-    for code in blocks("python"):
-        (folder / code.splitlines()[0].removeprefix("# ")).write_text(code)
-    return folder
-
-
-@pytest.fixture
-def here(folder, monkeypatch):
-    monkeypatch.syspath_prepend(folder)
-    monkeypatch.chdir(folder)
+    write_examples(PAGE, folder)
     return folder
 
 
@@ -44,7 +31,7 @@ def test_a_wrapped_environment_keeps_the_contract_and_learns(here, capsys):
     from gym_pendulum import GymPendulum
 
     assert all(finding.ok for finding in check_simulator(GymPendulum()))
-    command = blocks("bash")[0].split()
+    command = blocks(PAGE, "bash")[0].split()
     assert command[:3] == ["python", "-m", "studies.learn"]
     given = [*command[3:], *LESS, "--output", "learnt"]
     learn.main(given)
@@ -57,7 +44,7 @@ def test_a_wrapped_environment_keeps_the_contract_and_learns(here, capsys):
 
 
 def test_named_effects_refuse_a_simulator_that_hosts_none(here, capsys):
-    command = [*blocks("bash")[0].split()[3:], *LESS, "--estimator", "residual.NamedEffects"]
+    command = [*blocks(PAGE, "bash")[0].split()[3:], *LESS, "--estimator", "residual.NamedEffects"]
     with pytest.raises(SystemExit, match="2"):
         learn.main([*command, "--output", "refused"])
     assert NamedEffects.__name__ in capsys.readouterr().err
@@ -68,7 +55,7 @@ def test_a_wrapped_engine_hosts_effects_and_is_asked(here, capsys):
 
     assert all(finding.ok for finding in check_simulator(Lever()))
     script("measure.py", here)
-    _, asked = blocks("bash")[1].splitlines()
+    _, asked = blocks(PAGE, "bash")[1].splitlines()
     words = asked.split()
     assert words[:3] == ["python", "-m", "studies.find_gap"]
     at = words.index("lever_logs/*.csv")
