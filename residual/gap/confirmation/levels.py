@@ -9,6 +9,7 @@ from residual.gap.data.at_rest import STILL
 from residual.gap.search.sets import Key, Search
 from sims.effects.actuator import StaticActuatorEffect
 from sims.effects.base import Effect
+from sims.effects.curve import Curve
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ def by_few_levels(search: Search, key: Key, number: int) -> bool:
 
     A gain and a dead zone are then as good as a gain and a square: only what happens between
     levels, where clocks and lags count, parts them. A law of one number needs no such rule, as
-    others are tried in its place.
+    others are tried in its place, nor does a curve by points, which stands for any of them.
 
     Args:
         search: With the fitted set.
@@ -32,6 +33,8 @@ def by_few_levels(search: Search, key: Key, number: int) -> bool:
         number: Its member.
     """
     fit = search.tried[key]
+    if isinstance(search.candidates[number].effect, Curve):
+        return False
     for name in _inputs(search, number):
         together = [n for n in key if name in _inputs(search, n)]
         numbers = sum(knob.strength for n in together for knob in search.candidates[n].knobs)
