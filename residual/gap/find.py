@@ -119,7 +119,7 @@ def find_gap(
         clock.begin()
         converted = frozenset[str]().union(*(run.converted for run in log.runs))
         conventions = otherwise(simulator, prepared.fitter, converted)
-        conventions = conventions or beyond_scale(simulator, prepared.fitter.samples)
+        conventions = conventions or beyond_scale(simulator, prepared.fitter.samples, converted)
         if conventions is not None:
             tell(f"does the log count otherwise, by {' or '.join(conventions.changes)}?")
 

@@ -222,11 +222,11 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
     if result.adequate:
         times = gap.after.value / max(gap.noise_floor.value, 1e-300)
         by = f"forecasts err {times:.3g} times as by noise"
-        found = [by if few else f"nothing of the library explains it: {by}"]
+        found = [by if few else f"no effect of the library is established: {by}"]
     if few:
         more = duration_text((TOO_FEW - gap.blocks) * gap.horizon_s)
         found.append(
-            f"nothing is named from {gap.blocks} {_blocks(gap)} of data, {TOO_FEW} are needed: "
+            f"nothing is named from {blocks_of(gap)}, {TOO_FEW} are needed: "
             f"log some {more} more, or set a shorter --horizon"
         )
     if result.changing:
@@ -252,13 +252,13 @@ def provisional(result: GapResult) -> str:
     gap = result.gap
     more = duration_text((FEW - gap.blocks) * gap.horizon_s)
     return (
-        f"provisional: there are {gap.blocks} {_blocks(gap)} of data to confirm it, {FEW} would "
-        f"do (some {more} more)"
+        f"provisional: there are {blocks_of(gap)} to confirm it, {FEW} would do (some {more} more)"
     )
 
 
-def _blocks(gap: Gap) -> str:
-    return "block" if gap.blocks == 1 else "blocks"
+def blocks_of(gap: Gap) -> str:
+    """``"2 blocks of data"``."""
+    return f"{gap.blocks} {'block' if gap.blocks == 1 else 'blocks'} of data"
 
 
 def is_footnote(verdict: Verdict) -> bool:

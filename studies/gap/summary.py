@@ -11,7 +11,7 @@ from residual.gap.answer.table import BESIDE
 from residual.gap.result import ChannelGap, Gap
 from residual.logs import Finding
 from studies.gap import records
-from studies.gap.answer import headline, is_footnote, kind_text, notes
+from studies.gap.answer import blocks_of, headline, is_footnote, kind_text, notes
 from studies.gap.lead import lead, own_errors
 from studies.gap.words import CROSS_VALIDATED, ahead, found_once, gap_rows, span_text, unit_text
 
@@ -46,7 +46,9 @@ def summary(result: GapResult, tolerance: float | None = None) -> str:
     lines += [f"{ahead(gap)}{unit}, {CROSS_VALIDATED} (95 % interval)", *bars(gap)]
     others = beside(result)
     lines += [f"  {name}: {told}" for name, told in others.items()]
-    blocks = f"{gap.blocks} blocks of data, {gap.folds} groups of them left out in turn"
+    blocks = blocks_of(gap)
+    if gap.folds > 1:
+        blocks += f", {gap.folds} groups of them left out in turn"
     if result.effects and gap.no_better:
         of = f" {gap.channel}" if others else ""
         blocks += f"; in {gap.no_better} of them the corrected simulator forecasts{of} no better"

@@ -127,7 +127,7 @@ def parted_verdict(gap: Gap, leads: Sequence[str] = ()) -> Verdict:
     share = Span(1 - gap.share.value, 1 - gap.share.high, 1 - gap.share.low)
     says = (
         f"{100 * share.value:.3g} % of the gap has no name: forecasts err {times:.3g} times as by "
-        "noise, and nothing of the library explains it"
+        "noise, and no effect of the library is established"
     )
     if leads:
         says += f"; {', '.join(leads)} might take some of it, but these data do not show that"

@@ -76,12 +76,12 @@ def conventions(
         for name, unit in other_units(action.unit):
             says = f"`unit: {name}` for {action.name} ({_beside_a_unit(unit)})"
             found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
-        for says, unit in _misread(action, converted):
+        for says, unit in misread(action, converted):
             found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
     joints = _measured_joints(simulator, samples)
     for seen in joints:
         found += _turned(simulator, seen) + _in_other_units(simulator, seen)
-        for says, unit in _misread(simulator.physical_channels[seen[0]], converted):
+        for says, unit in misread(simulator.physical_channels[seen[0]], converted):
             found.append(_of_states(simulator, says, seen[:1], unit.factor, unit.offset))
     return found + _all_in_other_units(simulator, joints) + _exchanged(simulator, joints)
 
@@ -186,7 +186,7 @@ def _upside_down(simulator: HostSimulator, place: int) -> Convention:
     return _of_input(simulator, says, place, -1.0, ends)
 
 
-def _misread(channel: Channel, converted: Collection[str]) -> list[tuple[str, Unit]]:
+def misread(channel: Channel, converted: Collection[str]) -> list[tuple[str, Unit]]:
     """What undoes the conversion of a column from a unit that it is not in, in words and numbers;
     but for what another unit does, too. Where nothing was converted, there is nothing to undo."""
     others = other_units(channel.unit) if channel.name in converted else []

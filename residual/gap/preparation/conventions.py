@@ -28,6 +28,7 @@ from residual.gap.preparation.alternatives import (
     as_said,
     beyond,
     conventions,
+    misread,
     plainest,
     reversed_sign,
 )
@@ -147,9 +148,15 @@ def other_sign(simulator: HostSimulator, found: Sequence[Effect]) -> Conventions
     return Conventions(changes, 1.0, "sign") if changes else None
 
 
-def beyond_scale(simulator: HostSimulator, samples: Samples) -> Conventions | None:
+def beyond_scale(
+    simulator: HostSimulator, samples: Samples, converted: Collection[str] = ()
+) -> Conventions | None:
     """Units of a channel that is far beyond the scale that it declares, and would be near it in
-    another unit; None if there is none. Of states how far they range counts: a zero is no unit."""
+    another unit, or without the conversion of its column; None if there is none.
+
+    Of states how far they range counts: a zero is no unit. What comes nearest to the scale is
+    named, and what comes nearly as near.
+    """
     states = simulator.physical_channels
     names = {states[i].name for i in samples.measured}
     ranged = [
@@ -162,11 +169,13 @@ def beyond_scale(simulator: HostSimulator, samples: Samples) -> Conventions | No
         times = float(size) / channel.scale
         if channel.scale == UNDECLARED or times < BEYOND:
             continue
-        units = [(name, times * unit.factor) for name, unit in other_units(channel.unit)]
-        near = [name for name, then in units if 1 / NEAR <= then <= NEAR]
-        if near:
-            changes = tuple(f"`unit: {name}` for {channel.name}" for name in near)
-            return Conventions(changes, times, "scale")
+        units = [(f"`unit: {name}` for {channel.name}", u) for name, u in other_units(channel.unit)]
+        units += misread(channel, converted)
+        off = {says: abs(math.log(times * unit.factor)) for says, unit in units}
+        least = min(off.values(), default=math.inf)
+        if least <= math.log(NEAR):
+            near = [says for says in off if off[says] <= least + 1 and off[says] <= math.log(NEAR)]
+            return Conventions(tuple(sorted(near, key=off.__getitem__)), times, "scale")
     return None
 
 

@@ -259,6 +259,25 @@ def test_a_state_far_beyond_its_scale_is_asked_about(factor, asked):
     assert (found is not None and "`unit: cm` for x" in found.changes) == asked
 
 
+class Servo(FirstOrderSystem):
+    dt = 0.05
+    state_channels = (Channel("angle", "deg", "other", scale=90.0),)
+    action_channels = ()
+
+    def derivative(self, x, u, p):
+        return -x
+
+
+@pytest.mark.parametrize("converted", [(), ("angle",)])
+def test_degrees_that_were_taken_for_radians_are_asked_about_first(converted):
+    """Where nothing was converted, another unit is all that is left to ask about."""
+    angle = np.degrees(90.0 + 80.0 * np.sin(0.1 * np.arange(101)))
+    run = Trajectory("run", 0.05 * np.arange(101), angle[:, None], np.zeros((100, 0)))
+    found = beyond_scale(Servo(), Samples.join([run], 1), converted)
+    first = "`unit: deg` for angle (not rad)" if converted else "`unit: mrad` for angle"
+    assert found.changes[0] == first
+
+
 class Cart(EquationOfMotion):
     dt = 0.05
     state_channels = (
