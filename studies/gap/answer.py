@@ -38,6 +38,8 @@ from studies.gap.words import (
 NAMELESS = ("unexplained", "calibrated", "needs_data", "no_gap")
 #: Letters of a parameter's name up to which it is a symbol: l and L are two.
 SYMBOL = 2
+#: Error over that by noise from which on there is a gap, however few blocks of data show it.
+PLAINLY = 10.0
 #: Part of an interval below which one with an exact simulator is worth a line.
 MUCH = 0.7
 
@@ -244,7 +246,8 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
 def cannot_tell(result: GapResult) -> bool:
     """Whether too few data err by no more than noise, so that there may be a gap or none."""
     gap = result.gap
-    return gap.blocks < TOO_FEW and not gap.exceeds_noise(OFF) and not result.effects
+    plain = gap.exceeds_noise(OFF) or gap.before.value > PLAINLY * gap.noise_floor.value
+    return gap.blocks < TOO_FEW and not plain and not result.effects
 
 
 def provisional(result: GapResult) -> str:

@@ -215,6 +215,9 @@ def test_too_few_data_that_err_as_by_noise_may_hold_a_gap_or_none():
     table = dataclasses.replace(found.gap, noise_floor=Span(0.9, 0.8, 1.2))
     few = dataclasses.replace(found, gap=table)
     assert lead(few).startswith("Too few data to tell whether there is a gap: ")
+    rest_and_jump = dataclasses.replace(found.gap, before=Span(1.0, 0.01, 2.0))
+    plain = dataclasses.replace(found, gap=rest_and_jump)
+    assert lead(plain).startswith("The gap has no name: ")
     assert headline(few.verdicts[0], few) == "These data cannot tell whether there is a gap."
     assert "4 are needed" in summary(few)
     assert lead(found).startswith("The gap has no name: ")
