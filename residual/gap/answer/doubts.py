@@ -25,8 +25,8 @@ DOUBTS: dict[Doubt, str] = {
     "see first whether the simulator has it right",
     "orders": "torques that repeat along a turn fit whatever follows the position, where there are "
     "several or something has no name",
-    "levels": "its input rests at as few levels as there are numbers for it, so that other laws "
-    "pass through them, too: log with more",
+    "levels": "its input rests at no more levels than its laws have numbers, so that other laws "
+    "fit as well: log more levels",
     "records": "an effect with its own size in each record does better, or may be what this one "
     "stands for",
     "set_aside": "the corrected simulator is worse on the records that were set aside",
