@@ -12,8 +12,8 @@ from scipy.stats import t
 from residual.gap.confirmation.claim import Claim, other_than
 from residual.gap.confirmation.constancy import creeps, far_apart, on_the_way, whole_size
 from residual.gap.confirmation.drift import Drift
+from residual.gap.confirmation.few_levels import by_few_levels
 from residual.gap.confirmation.following import by_another_law
-from residual.gap.confirmation.levels import by_few_levels
 from residual.gap.confirmation.numerics import STEADY, at_half_step, in_the_limit, survives
 from residual.gap.confirmation.one_way import may_hold_a_load
 from residual.gap.confirmation.timing import untimed

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from residual.gap import find_gap
-from residual.gap.confirmation.levels import levels
+from residual.gap.confirmation.few_levels import resting_levels
 from residual.trajectories import Trajectory
 from sims.equations import FirstOrderSystem
 from sims.simulator import Channel
@@ -64,10 +64,10 @@ def test_levels_are_counted_in_any_order_and_unit(places, seed, size):
     rng = np.random.default_rng(seed)
     values = np.repeat([1.0 + place for place in places], 50)
     values = rng.permutation(values + 0.002 * rng.standard_normal(len(values)))
-    assert levels(size * values) == len(places)
+    assert resting_levels(size * values) == len(places)
 
 
 def test_what_takes_every_value_rests_at_none():
-    assert levels(np.linspace(0.1, 1.0, 300)) is None
-    assert levels(np.r_[np.full(200, 0.3), np.linspace(0.1, 1.0, 100)]) is None
-    assert levels(np.zeros(0)) is None
+    assert resting_levels(np.linspace(0.1, 1.0, 300)) is None
+    assert resting_levels(np.r_[np.full(200, 0.3), np.linspace(0.1, 1.0, 100)]) is None
+    assert resting_levels(np.zeros(0)) is None

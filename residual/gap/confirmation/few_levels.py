@@ -46,13 +46,13 @@ def by_few_levels(search: Search, key: Key, number: int) -> bool:
         if all(_odd(added[key.index(n)], given) for n in together):
             given = np.abs(given)
             given = given[given > STILL * given.max(initial=0.0)]
-        count = levels(given)
+        count = resting_levels(given)
         if count is not None and count <= numbers:
             return True
     return False
 
 
-def levels(given: Array) -> int | None:
+def resting_levels(given: Array) -> int | None:
     """How many values an input rests at, None if it takes others, too."""
     if not given.size:
         return None
