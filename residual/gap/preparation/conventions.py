@@ -55,8 +55,8 @@ ABSURD = 1.25
 #: what swings by itself hides a reversed input.
 HIDDEN, CLEARLY = 0.1, 4.0
 #: Times the declared scale of a channel from which on another unit is asked after, and how near to
-#: that scale it has to be then.
-BEYOND, NEAR = 100.0, 10.0
+#: that scale it has to be then; times farther from it than the nearest that another may be.
+BEYOND, NEAR, NEARLY_AS_NEAR = 100.0, 10.0, math.e
 #: Offset of an angle, in turns, from which on another quarter turn is nearer than its zero.
 NEXT = 0.125
 #: Part of what was found makes forecasts better by, from which on another zero does so, too, and
@@ -171,11 +171,12 @@ def beyond_scale(
             continue
         units = [(f"`unit: {name}` for {channel.name}", u) for name, u in other_units(channel.unit)]
         units += misread(channel, converted)
-        off = {says: abs(math.log(times * unit.factor)) for says, unit in units}
-        least = min(off.values(), default=math.inf)
-        if least <= math.log(NEAR):
-            near = [says for says in off if off[says] <= least + 1 and off[says] <= math.log(NEAR)]
-            return Conventions(tuple(sorted(near, key=off.__getitem__)), times, "scale")
+        then = {says: times * unit.factor for says, unit in units}
+        off = {says: max(share, 1 / share) for says, share in then.items()}
+        most = min(NEAR, NEARLY_AS_NEAR * min(off.values(), default=math.inf))
+        near = sorted((says for says in off if off[says] <= most), key=off.__getitem__)
+        if near:
+            return Conventions(tuple(near), times, "scale")
     return None
 
 

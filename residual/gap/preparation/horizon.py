@@ -22,7 +22,7 @@ NEARLY = 0.2
 #: Times that the mean square of differences is over twice the time where motion makes them (four
 #: where it is steady, two where it jumps, one of noise), and part of the variance up to which it
 #: may be that of noise.
-LITTLE, FARTHER = 0.5, 1.5
+FARTHER, LITTLE = 1.5, 0.5
 #: Windows that the records should at least be good for, and where so many show nothing.
 WINDOWS, FEWER = 8, 5
 #: Least samples of a window, and of a forecast of a system that strikes the ground.
