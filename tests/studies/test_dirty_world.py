@@ -1,21 +1,24 @@
 """The dirty world: its truth against the simulators, its oracle, and the fast subset end to end."""
 
+import dataclasses
 import json
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from residual.gap.result import Number, Span, Verdict
 from sims.checks import check_simulator
 from sims.effects.library import library
+from sims.effects.store import SecondStore
 from sims.loading import chosen_effects
 from studies.hidden.dirty import sets
 from studies.hidden.dirty.measure import Sensors, records
 from studies.hidden.dirty.report import headlines, judged, misses
-from studies.hidden.dirty.score import oracle, same_as
+from studies.hidden.dirty.score import is_the_store, oracle, same_as
 from studies.hidden.dirty.sets import HIDDEN, LEAD, make_set
 from studies.hidden.dirty.systems import SYSTEMS, nominal
-from studies.hidden.dirty.truth import Truth, simulate
+from studies.hidden.dirty.truth import STORE_TIME, Truth, simulate
 from studies.hidden.grid import DirtyBlock, HiddenStudy, trials_of
 from studies.hidden_effects import main
 from studies.judging.forecasts import plan, relative_error, root_mean_squares
@@ -124,6 +127,32 @@ def test_what_means_the_same_is_the_same():
     arm = nominal("arm", 0.02, False, False)
     assert same_as("constant_load@shoulder", arm) >= {"actuator_bias@torque"}
     assert same_as("", arm) == frozenset()
+
+
+@pytest.mark.parametrize(
+    ("flexible", "rate", "right"), [(0.024, 0.006, True), (0.024, 0.02, False), (0.0, 0.006, False)]
+)
+def test_a_store_is_right_where_the_oven_has_one_of_that_size(flexible, rate, right):
+    config = {"system": "oven", "hidden": "", "size": 3.0, "layout": "ramp", "seed": 4}
+    made = make_set(config)
+    made = dataclasses.replace(made, truth=dataclasses.replace(made.truth, flexible=flexible))
+    numbers = {
+        "rate": Number(rate, rate / 1.5, rate * 1.5, "1/s"),
+        "time": Number(3.5, 2.0, 6.0, "s"),
+    }
+    said = Verdict("confirmed", "second_store", "temperature", numbers, (), "", "", Span(1, 1, 1))
+    assert is_the_store(said, made) is right
+
+
+def test_the_oven_with_a_second_mass_is_the_simulator_with_a_store():
+    """What the dirt holds there is the library's effect: two derivations, two integrators."""
+    truth = Truth("oven", {}, flexible=0.03)
+    runs = records(truth, SHARP, "many", 0.5, 600.0, (5,))
+    store = SecondStore("temperature", rate=0.03 / STORE_TIME, time=STORE_TIME)
+    simulator = nominal("oven", 0.5, False, False)
+    groups = plan(simulator, runs, 50.0)  # whole records: the store begins in balance
+    with_store = simulator.with_effects([store])
+    assert relative_error(with_store, groups) < 0.02 * relative_error(simulator, groups)
 
 
 def test_the_grid_takes_every_effect_in_turn():

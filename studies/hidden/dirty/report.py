@@ -37,7 +37,6 @@ def judged(results: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
         any_sure=data["sure"].map(bool),
         wrong=data["wrong_sure"].map(bool),
         wrong_else=[bool(set(names) - o) for names, o in zip(data["wrong_sure"], off, strict=True)],
-        sure_else=[bool(set(names) - o) for names, o in zip(data["sure"], off, strict=True)],
     )
     data = data.assign(close=data["ratio"] <= RATIO, worse=data["worsening"] > SAME)
     data[_OF_HIDDEN] = data[_OF_HIDDEN].astype(object).where(data["block"] == "hidden", None)
@@ -67,8 +66,8 @@ def headlines(data: pd.DataFrame) -> pd.DataFrame:
         ("removed from the library: a confirmed wrong name", "at most 2 %", removed["wrong"]),
         (but_off, "", removed["wrong_else"]),
         ("removed: any name", "", removed["any_name"]),
-        ("dirt alone: a confirmed name", "at most 2 %", dirt["any_sure"]),
-        (but_off, "", dirt["sure_else"]),
+        ("dirt alone: a confirmed wrong name", "at most 2 %", dirt["wrong"]),
+        (but_off, "", dirt["wrong_else"]),
         ("dirt alone: any name", "", dirt["any_name"]),
         ("records said to differ, which are alike", "at most 2 %", data["differ"]),
         ("corrected worse than the nominal, held out", "0 %", data["worse"]),

@@ -13,9 +13,11 @@ from residual.trajectories import Trajectory
 from sims.effects.aliases import exact_aliases, exact_twins
 from sims.effects.base import Effect
 from sims.effects.library import library
+from sims.effects.store import SecondStore
 from sims.host import HostSimulator
 from sims.loading import chosen_effects
 from studies.hidden.dirty.sets import LEAD, Dirty, make_set
+from studies.hidden.dirty.truth import STORE_TIME
 from studies.judging.forecasts import Forecasts, plan, relative_error, root_mean_squares
 from studies.judging.oracle import fit_effects
 
@@ -107,12 +109,14 @@ def names(result: GapResult, made: Dirty, twins: frozenset[str]) -> dict[str, An
         "unlike": [one.label for one in result.unlike],
         "truly_off": [verdict.label for verdict in chosen if truly_off(verdict, made)],
     }
+    there = {verdict.label for verdict in chosen if is_the_store(verdict, made)}
     if not made.label:
-        return row | {"first": None, "family": None, "among": None, "wrong_sure": sure}
+        wrong = [name for name in sure if name not in there]
+        return row | {"first": None, "family": None, "among": None, "wrong_sure": wrong}
     right = twins | _family(made.label, made.simulator, offered)
     first = "".join(named[:1])
     alternatives = chosen[0].alternatives if chosen else ()
-    meant = right | together(made.label, made.simulator, named)
+    meant = right | there | together(made.label, made.simulator, named)
     return row | {
         "first": first in twins,
         "family": first in right,
@@ -127,6 +131,17 @@ def truly_off(verdict: Verdict, made: Dirty) -> bool:
     off = made.truth.off
     parameters = [name for name in same_as(verdict.label, made.simulator) if name in off]
     return verdict.label != made.label and any(off[name] * strength > 0 for name in parameters)
+
+
+def is_the_store(verdict: Verdict, made: Dirty) -> bool:
+    """Whether a verdict names the oven's second thermal mass, and its intervals hold its numbers.
+
+    Of all that the dirt is made of the library holds this alone (``SecondStore``).
+    """
+    thermal = verdict.effect == SecondStore.name and made.truth.flexible > 0
+    true = {"rate": made.truth.flexible / STORE_TIME, "time": STORE_TIME}
+    numbers = verdict.parameters
+    return thermal and all(numbers[k].low <= v <= numbers[k].high for k, v in true.items())
 
 
 def together(label: str, simulator: HostSimulator, named: Sequence[str]) -> frozenset[str]:

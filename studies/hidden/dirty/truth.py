@@ -35,6 +35,8 @@ COORDINATES = {name: [joint.name for joint in made.joints] for name, made in NOM
 INPUTS = {name: [c.name for c in made.action_channels] for name, made in NOMINAL.items()}
 #: Inertia that a flexible part hangs on, roughly.
 INERTIA = {"arm": 0.3, "two-link arm": 0.25, "cart": 1.2, "oven": 1.0}
+#: Seconds in which the second thermal mass of the oven follows.
+STORE_TIME = 4.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +51,7 @@ class Truth:
         strength: In its unit; for a parameter the absolute change.
         soft: Speed over which dry friction builds up.
         presliding: Distance that dry friction gives way elastically; 0 for the soft law.
-        flexible: Share of the inertia that hangs on a spring.
+        flexible: Share of the inertia that hangs on a spring, of the oven in a second thermal mass.
         resonance: Of that part, in Hz.
         filtered: Time constant of the sensors in s, 0 for none.
     """
@@ -190,9 +192,9 @@ def simulate(
             hanging = -pull / mass
         elif mass:
             # A second thermal mass that follows slowly.
-            flow = truth.flexible * (second - q[0]) / 4.0
+            flow = truth.flexible * (second - q[0]) / STORE_TIME
             force[0] += flow
-            second_rate = (q[0] - second) / 4.0
+            second_rate = (q[0] - second) / STORE_TIME
         rates = accelerations(system, p, q, v, u, force)
         moved = rates if thermal else v
         pushed = [0.0] * c if thermal else rates
