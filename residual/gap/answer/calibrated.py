@@ -7,8 +7,8 @@ import numpy as np
 from residual.gap.result import Number, Span, Verdict
 from residual.gap.search.sets import Key, Search
 
-#: Part of what a parameter may change by that is a change.
-MOVED = 5e-3
+#: Part of what a parameter may change by that is a change: with 3 % either way, 0.1 % of its value.
+MOVED = 0.02
 
 
 def moved(search: Search, key: Key) -> dict[str, Number]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.data.blocks import ENOUGH
+from residual.gap.data.blocks import ENOUGH, Blocks
 from residual.gap.fitting.contract import Fitter
 from residual.gap.fitting.forecasts import main_channel, noise_floor
 from residual.gap.fitting.smooth import SmoothFitter
@@ -47,7 +47,7 @@ class Stretch:
         run: Name of the run.
         begin, end: Its first and last row, in s since the start of the log.
         share: Its part of the nominal simulator's squared error, or of what is left of it.
-        motion: Its part of the squared way that is gone.
+        motion: Its part of the squared motion.
         beside: Whether it is what is left beside something that was named.
     """
 
@@ -195,14 +195,26 @@ def _stretch(answer: Answer, block: int, errors: Array, beside: bool = False) ->
 
 
 def _motion(fitter: Fitter) -> Array:
-    """Every block's part of the squared way from the starts of windows, (B,), all channels
-    averaged."""
+    """Every block's part of the squared motion, (B,), all channels averaged.
+
+    Motion is the way from the start of a window, or the distance from the straight line between its
+    two ends, whichever the block has more of: a wheel at an even speed goes far, and shows nothing
+    of what set it in motion.
+    """
     samples, windows = fitter.samples, fitter.blocks.windows
     seen = samples.seen[windows.index][..., samples.measured]
     way = np.where(windows.inside[..., None], seen - seen[:, :1], np.nan)
-    there = np.isfinite(way)
-    mean = np.where(there, way, 0.0) ** 2
-    squares = by_block(mean.sum(axis=1) / np.maximum(there.sum(axis=1), 1), fitter.blocks)
+    last = windows.inside.sum(axis=1) - 1
+    along = np.arange(way.shape[1])[None, :, None] / np.maximum(last, 1)[:, None, None]
+    bend = way - along * way[np.arange(len(way)), last][:, None]
+    return np.maximum(_shares(way, fitter.blocks), _shares(bend, fitter.blocks))
+
+
+def _shares(distance: Array, blocks: Blocks) -> Array:
+    """Every block's part of squared distances (W, L, m) that may be unknown, (B,)."""
+    there = np.isfinite(distance)
+    mean = (np.where(there, distance, 0.0) ** 2).sum(axis=1) / np.maximum(there.sum(axis=1), 1)
+    squares = by_block(mean, blocks)
     return np.nanmean(squares / np.maximum(np.nansum(squares, axis=0), 1e-300), axis=1)
 
 

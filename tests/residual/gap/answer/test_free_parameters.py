@@ -24,12 +24,12 @@ def test_parameters_within_their_tolerance_may_be_all_there_is():
     (verdict,) = found.verdicts
     assert verdict.kind == "calibrated"
     parameters = PendulumEquation().parameters
-    # What hardly moves is not told: the motor's damping is so small that 3 % of it hardly matter.
-    assert set(parameters) - {"damping"} <= set(verdict.parameters) <= set(parameters)
+    # What hardly moves is not told, be it small or right.
+    assert {*OFF, "gravity"} <= set(verdict.parameters) <= set(parameters)
     for name, change in verdict.parameters.items():
         size = 0.03 * parameters[name].value
         assert -size <= change.low <= change.value <= change.high <= size
-        assert abs(change.value) > 0.01 * size
+        assert abs(change.value) > 0.04 * size
     # They are in the corrected simulator, and the table is its.
     assert found.gap.after.value < 0.7 * found.gap.before.value
     assert {e.name for e in found.effects} <= set(parameters)
