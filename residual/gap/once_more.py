@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import time
 from collections.abc import Sequence
@@ -24,6 +25,7 @@ from residual.gap.answer.lone import (
     off_stretch,
 )
 from residual.gap.answer.varying import no_surer, worth_varying
+from residual.gap.data.windows import TooShort
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.log import Log
 from residual.gap.longer import longer_horizon
@@ -74,13 +76,15 @@ class OnceMore:
     def of(self, known: Confirmed) -> Confirmed:
         """The same, or what is found without a stretch that nothing explains, with parameters
         free, with more than the library on offer, or over longer forecasts."""
-        known = self.without_lone_stretch(known)
+        with contextlib.suppress(TooShort):  # here and below, what was found holds without it
+            known = self.without_lone_stretch(known)
         lone = bool(known.says)
-        known = self.with_parameters_free(known)
-        known = self.with_varying(known)
-        known = self.with_curves(known)
-        known = self.with_parts(known)
-        known = self.over_longer_forecasts(known)
+        for step in (
+            self.with_parameters_free, self.with_varying, self.with_curves, self.with_parts,
+            self.over_longer_forecasts,
+        ):  # fmt: skip
+            with contextlib.suppress(TooShort):
+                known = step(known)
         if lone:
             return known
         rest = left_stretch(known.answer)

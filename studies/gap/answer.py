@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from residual.gap import GapResult
 from residual.gap.answer.doubts import DOUBTS
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
+from residual.gap.preparation.horizon import SAMPLES
 from residual.gap.result import OFF, Gap, Meant, Number, Verdict
 from sims.effects import Curve
 from sims.effects.actuator import ActuatorEffect
@@ -139,12 +140,11 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.kind == "unexplained":
         return _remainder_notes(verdict, result)
     if verdict.kind == "calibrated":
-        if verdict.share.value <= 0:
-            return ["alone they take nothing off, they serve the rest; which is off is not known"]
-        return [
-            f"alone they take {percent(verdict.share.value)} of the gap off; which of them is off "
-            "is not known, and what else is missing may hide behind them"
-        ]
+        taken, more = "nothing off: what is named fits better beside them", ""
+        if verdict.share.value > 0:
+            taken = f"{percent(verdict.share.value)} of the gap off"
+            more = ", and what else is missing may hide behind them"
+        return [f"alone they take {taken}; which of them is off is not known{more}"]
     if verdict.kind not in ("confirmed", "ambiguous"):
         return []
     found = [f"without it, {percent(verdict.share.value)} of the gap would be back"]
@@ -227,9 +227,10 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
         found = [by if few else f"no effect of the library is established: {by}"]
     if few:
         more = duration_text((TOO_FEW - gap.blocks) * gap.horizon_s)
+        shorter = any(len(one.times) > SAMPLES for one in result.rollouts)
         found.append(
             f"nothing is named from {blocks_of(gap)}, {TOO_FEW} are needed: "
-            f"log some {more} more, or set a shorter --horizon"
+            f"log some {more} more{', or set a shorter --horizon' * shorter}"
         )
     if result.changing:
         found.append(on_the_way(result.changing))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from residual.gap.data.bursts import without_bursts
 from residual.gap.data.copies import once
 from residual.gap.data.inspection import (
     bounds,
@@ -73,10 +74,11 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
     physical = slice(len(simulator.physical_channels))
     trajectories = [replace(run, states=run.states[:, physical]) for run in trajectories]
     trajectories, copied = once(trajectories)
+    trajectories, bursts = without_bursts(trajectories)
     trajectories, wild = without_wild_inputs(simulator, trajectories)
     trajectories, resets = cut_at_resets(simulator, trajectories)
     trajectories, repeats = without_repeats(simulator, trajectories)
-    found = [*copied, *wild, *resets, *repeats, *findings(simulator, trajectories)]
+    found = [*copied, *bursts, *wild, *resets, *repeats, *findings(simulator, trajectories)]
     for finding in found:
         if finding.severity == "refuse":
             raise ValueError(f"{finding.where}: {finding.says}" if finding.where else finding.says)

@@ -52,13 +52,28 @@ class Windows:
         ]
 
 
+class TooShort(ValueError):
+    """No record holds a window."""
+
+    def __init__(self, shortest: int) -> None:
+        super().__init__(
+            f"every record is shorter than {shortest} samples, the least for a window: log longer"
+        )
+
+
 def fixed(samples: Samples, length: int, shortest: int = 4) -> Windows:
-    """Windows of ``length`` samples; what is left at a run's end is a window if long enough."""
+    """Windows of ``length`` samples; what is left at a run's end is a window if long enough.
+
+    Raises:
+        TooShort: No run is.
+    """
     pieces = []
     for run, (start, stop) in enumerate(samples.runs):
         for a in range(start, stop, length):
             if min(a + length, stop) - a >= shortest:
                 pieces.append((run, a, min(a + length, stop)))
+    if not pieces:
+        raise TooShort(shortest)
     return Windows.cut(pieces)
 
 
@@ -85,7 +100,7 @@ def cut(
         growth: Largest allowed norm of the product of the scaled Jacobians.
 
     Raises:
-        ValueError: No run has samples enough for a window.
+        TooShort: No run has samples enough for a window.
     """
     scaled = jacobians * scale[None, None, :] / scale[None, :, None]
     before = np.append(0, np.cumsum(np.isfinite(samples.seen).any(axis=1)))
@@ -116,9 +131,7 @@ def cut(
                 pieces.append((run, a, a + size))
                 a += size
     if not pieces:
-        raise ValueError(
-            f"every record is shorter than {shortest} samples, the least for a window: log longer"
-        )
+        raise TooShort(shortest)
     return Windows.cut(pieces)
 
 

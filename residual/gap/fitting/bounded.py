@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 Array = NDArray[np.float64]
-
-#: Passes over all unknowns where a bound holds some of them.
-PASSES = 200
 
 
 def bounded_step(
@@ -16,9 +14,12 @@ def bounded_step(
 ) -> Array:
     """Least squares step, (p,), the best within the bounds.
 
+    Source: Stark and Parker, "Bounded-variable least-squares", Computational Statistics 10 (1995),
+    as in SciPy, for where a bound holds some of the unknowns.
+
     Args:
         matrix, right: Normal equations, (p, p) and (p,).
-        low, high: Bounds of the step.
+        low, high: Bounds of the step, (p,); an unknown with equal ones stays there.
         damping: Added to the diagonal of the scaled matrix.
 
     Returns:
@@ -32,13 +33,11 @@ def bounded_step(
     right, least, most = right / size, low * size, high * size
     step = np.linalg.lstsq(matrix, right, rcond=None)[0]
     if ((step < least) | (step > most)).any():
-        step = np.clip(step, least, most)
-        # One unknown after the other: the problem is convex, so this ends at its least value.
-        for _ in range(PASSES):
-            before = step.copy()
-            for i in range(p):
-                rest = right[i] - matrix[i] @ step + matrix[i, i] * step[i]
-                step[i] = min(max(rest / matrix[i, i], least[i]), most[i])
-            if np.abs(step - before).max() <= 1e-9 * np.abs(step).max():
-                break
+        free = least < most
+        step = np.where(free, 0.0, least)
+        right = (right - matrix @ step)[free]
+        if free.any():
+            factor = np.linalg.cholesky(matrix[np.ix_(free, free)])
+            aim, bounds = np.linalg.solve(factor, right), (least[free], most[free])
+            step[free] = lsq_linear(factor.T, aim, bounds, method="bvls").x
     return np.clip(step / size, low, high)

@@ -27,8 +27,13 @@ FINE = 0.01
 
 
 def stride_for(trajectories: Sequence[Trajectory], horizon: float) -> int:
-    """Recorded samples in an interval, so that a horizon has about ``ROWS`` rows."""
-    step = float(np.median(np.concatenate([t.durations for t in trajectories])))
+    """Recorded samples in an interval, so that a horizon has about ``ROWS`` rows.
+
+    Where most samples come close together, with long pauses between them, the middle step is not
+    what a row takes.
+    """
+    durations = np.concatenate([t.durations for t in trajectories])
+    step = max(float(np.median(durations)), 0.5 * float(durations.mean()))
     wanted = max(1, int(horizon / ROWS / step + 1e-9))
     # Powers of two, so that an interval has whole sub-steps of recorded ones.
     return 2 ** int(np.log2(wanted))

@@ -114,16 +114,19 @@ def explain(
         every_pair: Whether every two effects are tried where there are few.
     """
 
-    def begun(fitter: Fitter, floor: Noise) -> Search:
+    def begun(fitter: Fitter, floor: Noise, before: Search | None) -> Search:
         search = Search(simulator, pool, fitter, effort, tell, until, beside, twins, floor.sigma)
         if len(search.currency.groups) > 1 and not simulator.has_contacts:
             alone = noise_floor(fitter, search.nominal, floor.sigma)
             search.currency = search.currency.only_where_wrong(alone)
+        if before is not None:
+            search.globally.after(before.globally)
         return search
 
     seeds: Proposals = {}
+    before = earlier
     for _ in range(ROUNDS):
-        search = begun(fitter, floor)
+        search = begun(fitter, floor, before)
         if not seeds:
             if earlier is not None:
                 search.add(carried(earlier, search))
@@ -141,10 +144,10 @@ def explain(
         seeds = {key: search.own(key) for key in best if key}
         if search.late:
             # No time for another search, but for what was found in the weights that it earns.
-            search = begun(fresh, floor)
+            search = begun(fresh, floor, search)
             search.add(dict(itertools.islice(seeds.items(), LAST)))
             break
-        fitter = fresh
+        fitter, before = fresh, search
     return settle(search, floor)
 
 

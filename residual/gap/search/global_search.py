@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 
 #: Part of the time for searching, at most.
 GLOBALLY = 0.3
+#: Part of its squared error that a fit keeps at most if seeking was of use, and how many sets it is
+#: of no use to, one after the other, before it ends; how many of those another search has.
+GAINED, IN_VAIN, ONCE_MORE = 0.9, 10, 3
 #: Residual over noise from which on a fit may have ended in a wrong minimum.
 FAR = 3.0
 #: Vectors of numbers in a generation, and generations, for every number.
@@ -53,7 +56,7 @@ LESS, MORE, EITHER = 0.7, 2.5, 10.0
 
 
 class GlobalSearch:
-    """Fits from numbers that were sought globally, for a part of the time.
+    """Fits from numbers that were sought globally, for a part of the time, and while it is of use.
 
     Args:
         noise: Of every measured channel, (m,): what leaves much more may be sought globally; None
@@ -64,6 +67,11 @@ class GlobalSearch:
     def __init__(self, noise: Array | None, until: float) -> None:
         self.noise, self.until = noise, until
         self._left = GLOBALLY * (until - time.process_time())
+        self._in_vain = 0
+
+    def after(self, earlier: GlobalSearch) -> None:
+        """Know of what use it was in an earlier search of the same effects."""
+        self._in_vain = min(earlier._in_vain, IN_VAIN - ONCE_MORE)
 
     def better(self, fitter: Fitter, found: Fit, free: int, begun_from: Array) -> Fit:
         """A fit, or the same set's from elsewhere where that is better.
@@ -76,17 +84,23 @@ class GlobalSearch:
         """
         if self.noise is None or not isinstance(fitter, SmoothFitter):
             return found
+        by_slopes, sought = found.merit, False
         for turn in range(len(PARTS)):
             begun = time.process_time()
-            if begun > self.until or self._left < 0:
+            if begun > self.until or self._left < 0 or self._in_vain >= IN_VAIN:
                 break
             starts = begins_elsewhere(fitter, found, self.noise, free, PARTS[turn], turn)
-            if len(starts) and not turn:
+            if not len(starts):
+                break
+            sought = True
+            if not turn:
                 starts = np.vstack([begun_from, starts])
             ways = (fitter.from_forecasts, fitter.fit)
             fits = [way(found.model, start, found) for start in starts for way in ways]
             self._left -= time.process_time() - begun
             found = min([found, *fits], key=lambda fit: fit.merit)
+        if sought:
+            self._in_vain = 0 if found.merit < GAINED * by_slopes else self._in_vain + 1
         return found
 
 

@@ -87,7 +87,7 @@ class Search:
         self.nearly: set[Key] = set()
         self.extreme: set[Key] = set()
         self.halved: dict[Key, Fit] = {}
-        self._noise, self._globally = noise, GlobalSearch(noise, until)
+        self._noise, self.globally = noise, GlobalSearch(noise, until)
         self._from_longer_leads: dict[Key, Array] = {}
         self._signatures: dict[Key, Signatures] = {}
         channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
@@ -220,7 +220,7 @@ class Search:
                 start = from_nested(self.model(key), key, theta, inner.model, near, inner.theta)
                 again = self.fitter.fit(self.model(key), start, self.tried[near])
                 found = again if again.merit < found.merit else found
-            found = self._globally.better(self.fitter, found, self.numbers(key), theta)
+            found = self.globally.better(self.fitter, found, self.numbers(key), theta)
         if key in self.tried and found.merit >= self.tried[key].merit:
             return
         self._forget(key)
