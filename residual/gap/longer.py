@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from residual.gap.answer.answer import summed_up, within_noise
 from residual.gap.answer.confirmed import Answer
+from residual.gap.fitting.forecasts import main_channel, noise_floor
+from residual.gap.fitting.validation import validate
 from residual.gap.log import Log
+from residual.gap.model.model import Model
 from residual.gap.preparation.horizon import FEWER, PART, longest_horizon, usual_horizon
+from residual.gap.preparation.prepare import prepare
 from sims.host import HostSimulator
 
 #: By how much longer forecasts have to be to show something else.
 LONGER = 1.25
+#: Windows of the longest forecasts, the most first; error over that by noise, over that of the usual
+#: forecasts and over the spread of the channel, from which on a slow error shows though they are
+#: as few.
+FEWEST, PLAIN, GROWN, MATTERS = (2, 1), 5.0, 3.0, 0.1
 
 
 def longer_horizon(simulator: HostSimulator, log: Log, answer: Answer) -> float | None:
@@ -27,3 +37,38 @@ def longer_horizon(simulator: HostSimulator, log: Log, answer: Answer) -> float 
     if not answer.found.nominal_left.adequate and not within_noise(summed_up(answer)):
         longer = max(longer, min(log.horizon / PART, longest_horizon(log.recorded, FEWER)))
     return longer if longer >= LONGER * log.horizon else None
+
+
+def slow_error(log: Log, answer: Answer) -> tuple[float, str] | None:
+    """Length in s of forecasts over which the simulator is plainly off though it is not over the
+    usual ones, and how that is said; None if there is none.
+
+    What a sensor jumps by hides a slow error from short forecasts.
+
+    Args:
+        log: What was asked about, and how far its forecasts went.
+        answer: In which nothing is named.
+    """
+    search = answer.found.search
+    if not (answer.found.nominal_left.adequate or within_noise(summed_up(answer))):
+        return None
+    usual = np.nanmean(search.before.squares, axis=0)
+    for windows in FEWEST:
+        horizon = longest_horizon(log.recorded, windows)
+        if horizon < LONGER * log.horizon:
+            continue
+        ready = prepare(search.simulator, log.at(horizon).runs, horizon)
+        fitter = ready.fitter
+        fit = fitter.fit(Model(search.simulator), np.zeros(0))
+        squares, floor = validate(fitter, fit).squares, noise_floor(fitter, fit, ready.floor.sigma)
+        main = main_channel(search.simulator, fitter.samples.measured, squares, floor)
+        spread = np.nanvar(fitter.samples.seen[:, fitter.samples.measured[main]])
+        noise = np.nanmean(floor[:, main])
+        least = max(PLAIN**2 * noise, GROWN**2 * usual[main], MATTERS**2 * spread)
+        if np.nanmean(squares[:, main]) > least:
+            says = (
+                f"forecasts go over {fitter.seconds:.3g} s, of which the records hold "
+                f"{len(fitter.blocks)}: over {search.fitter.seconds:.3g} s noise hides a slow error"
+            )
+            return horizon, says
+    return None

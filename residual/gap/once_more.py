@@ -28,7 +28,7 @@ from residual.gap.answer.varying import no_surer, worth_varying
 from residual.gap.data.windows import TooShort
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.log import Log
-from residual.gap.longer import longer_horizon
+from residual.gap.longer import longer_horizon, slow_error
 from residual.gap.preparation.prepare import Prepared, finely
 from residual.gap.search.redundant import by_points
 from sims.effects.base import Effect
@@ -81,7 +81,7 @@ class OnceMore:
         lone = bool(known.says)
         for step in (
             self.with_parameters_free, self.with_varying, self.with_curves, self.with_parts,
-            self.over_longer_forecasts,
+            self.over_longer_forecasts, self.over_the_longest_forecasts,
         ):  # fmt: skip
             with contextlib.suppress(TooShort):
                 known = step(known)
@@ -200,6 +200,23 @@ class OnceMore:
             "of which these records hold more, nothing can be named"
         )
         return Confirmed(ready, answer, (says,))
+
+    def over_the_longest_forecasts(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found over forecasts as long as the records where these alone show
+        that something is missing, even if nothing can be named from so few."""
+        search = known.answer.found.search
+        if self.log.by_user or known.answer.key or search.beside or self._late:
+            return known
+        slow = None if search.simulator.has_contacts else slow_error(self.log, known.answer)
+        if slow is None:
+            return known
+        horizon, says = slow
+        longer = self.log.at(horizon)
+        self.inquiry.tell("once more over the longest forecasts, where a slow error shows")
+        ready, answer = self.inquiry.asked_of(
+            search.simulator, longer.runs, longer.horizon, self.tolerance
+        )
+        return Confirmed(ready, answer, (*known.says, says))
 
     def _with_more(
         self, known: Confirmed, more: Sequence[Effect], what: str, lacking: str
