@@ -16,7 +16,7 @@ from sims.host import HostSimulator
 
 #: By how much longer forecasts have to be to show something else.
 LONGER = 1.25
-#: Windows of the longest forecasts, the most first; error over that by noise, over that of the usual
+#: Windows of the longest forecasts, the most first; error over that by noise, over that of usual
 #: forecasts and over the spread of the channel, from which on a slow error shows though they are
 #: as few.
 FEWEST, PLAIN, GROWN, MATTERS = (2, 1), 5.0, 3.0, 0.1

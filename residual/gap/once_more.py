@@ -101,7 +101,7 @@ class OnceMore:
         stretch = lone_stretch(known.answer)
         if stretch is None:
             return known
-        if self._late:
+        if self._late or stretch.indispensable:
             return known.and_says(stretch.says(left_out=False))
         self.inquiry.tell("once more without a stretch that nothing explains")
         simulator = known.answer.found.search.simulator

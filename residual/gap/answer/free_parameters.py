@@ -18,7 +18,8 @@ def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
 
     They do where nothing could be named, though forecasts err by more than noise, or where they
     take a material part of the error off, free beside what was named. Parameters that were named
-    are none of them.
+    are none of them, nor those that were chosen, though too few data tell of them: they may be off
+    by more.
 
     Args:
         answer: What was found with all parameters at their values.
@@ -30,7 +31,7 @@ def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
         return []
     if not key and within_noise(summed_up(answer)):
         return []
-    named = search.labels(key)
+    named = {*search.labels(key), *search.labels(answer.found.key)}
     free = [one for one in allowed(search, tolerance) if one.label not in named]
     if not free or not key:
         return free

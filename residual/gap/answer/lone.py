@@ -35,8 +35,9 @@ NEARLY_ALL, FEW, LISTED = 0.8, 1 / 3, 4
 #: Error over that by noise of a block in which a simulator is clearly off, and up to which most are
 #: as good as right.
 OFF, NEAR = 2.0, 1.3
-#: Part of the motion over that of the error, from which on it may be the motion that is not known.
-MOVES = 0.5
+#: Part of the motion over that of the error, from which on it may be the motion that is not known;
+#: part of the motion without which the log tells of rest alone.
+MOVES, ALL = 0.5, 0.9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +58,11 @@ class Stretch:
     share: float
     motion: float
     beside: bool = False
+
+    @property
+    def indispensable(self) -> bool:
+        """Whether nearly all of the motion lies in it."""
+        return self.motion > ALL
 
     def says(self, left_out: bool) -> str:
         """A sentence for the user."""

@@ -29,7 +29,7 @@ from residual.gap.search.comparisons import (
     material,
     no_match,
 )
-from residual.gap.search.known import departures, parameters
+from residual.gap.search.known import departures, extent, parameters
 from residual.gap.search.reasons import reasons
 from residual.gap.search.sets import Key, Search
 from residual.gap.search.significance import score
@@ -89,6 +89,7 @@ def choose(search: Search, enough: Callable[[Key], bool] = lambda _: False) -> C
     if key:
         key = _fits_far_better(search, _plainer(search, key, open_), open_)
         key = _less_departed(search, key, open_)
+        key = better_fit(search, [key, *(k for k in open_ if _fits_alike(search, k, key))])
     if key and not helps(search, (), key):
         key = ()
     kept = tuple(number for number in dict.fromkeys(minor) if number not in key)
@@ -159,9 +160,11 @@ def _ahead_by_one_block(search: Search, key: Key, other: Key) -> bool:
 def better_fit(search: Search, keys: list[Key]) -> Key:
     """The set that forecasts best, or one that is as good within chance, of sizes that surprise
     less, and fits better; of sets that no data tell apart the one with the least to be otherwise
-    than was known, and of those that move exactly alike the one in the simulator's own terms."""
+    than was known, and of those that move exactly alike the one in the simulator's own terms, or
+    with the smallest numbers."""
     best = min(keys, key=search.error)
-    near = [k for k in keys if _does_as_well(search, k, best)] or [best]
+    near = [k for k in keys if _does_as_well(search, k, best) or _fits_alike(search, k, best)]
+    near = near or [best]
     fewest = min(search.surprises(k) for k in near)
     near = sorted(
         (k for k in near if search.surprises(k) == fewest), key=lambda k: search.tried[k].merit
@@ -175,7 +178,17 @@ def better_fit(search: Search, keys: list[Key]) -> Key:
         if search.tried[k].merit <= (1 + ROUNDING) * search.tried[least].merit
         and departures(search, k) <= departures(search, least)
     ]
-    return max(same, key=lambda k: parameters(search, k))
+    return max(same, key=lambda k: (parameters(search, k), -extent(search, k)))
+
+
+def _fits_alike(search: Search, key: Key, best: Key) -> bool:
+    """Whether a set of as many numbers reaches the very loss of another: then it makes the same
+    motion, and what it forecasts otherwise, of the one block that tells its numbers and was left
+    out, is due to how they are written alone."""
+    losses = [search.tried[k].merit for k in (key, best)]
+    alike = abs(losses[0] - losses[1]) <= ROUNDING * losses[1]
+    helped = losses[1] < (1 - ROUNDING) * search.tried[()].merit
+    return alike and helped and search.numbers(key) == search.numbers(best)
 
 
 def _does_as_well(search: Search, key: Key, best: Key) -> bool:

@@ -43,6 +43,12 @@ def parameters(search: Search, key: Key) -> int:
     return sum(any(isinstance(c.effect, ParameterChange) for c in one) for one in own)
 
 
+def extent(search: Search, key: Key) -> float:
+    """How far all numbers of a fitted set are from nothing, each beside its usual size."""
+    own = search.own(key)
+    return float(np.abs(own / search.tried[key].model.step[: len(own)]).sum())
+
+
 def _departure(search: Search, effect: Effect) -> float:
     if not isinstance(effect, ParameterChange):
         return 1.0
