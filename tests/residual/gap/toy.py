@@ -43,12 +43,14 @@ class Toy:
         surprising: Numbers of effects that are larger than usual.
         undoing: Sets of which two members undo each other.
         mass: Change of the mass, in kg.
+        sizes: Numbers of a set's members, of which a tenth is a step; none if not given.
     """
 
     def __init__(
         self, errors, merits=None, joints=1, blocks=20, scatter=0.0, half=None, surprising=(),
-        mass=0.02, undoing=(),
+        mass=0.02, undoing=(), sizes=None,
     ):  # fmt: skip
+        self.sizes = sizes or {}
         self.surprising, self.undoing = set(surprising), set(undoing)
         fitted = (ParameterChange("mass", mass), *EFFECTS[1:])
         rng = np.random.default_rng(0)
@@ -73,6 +75,7 @@ class Toy:
                 merit=(merits or {}).get(key, 1e4 * float(np.mean(error)) ** 2),
                 theta=np.zeros(len(key)),
                 model=SimpleNamespace(
+                    step=np.full(len(key), 0.1),
                     simulator=PendulumEquation(),
                     added=lambda _, key=key: tuple(fitted[n] for n in key),
                 ),
@@ -123,6 +126,9 @@ class Toy:
 
     def error(self, key):
         return self.currency.error(self.validated[key].squares)
+
+    def own(self, key):
+        return np.array(self.sizes.get(key, np.zeros(len(key))))
 
     def numbers(self, key):
         return len(key)

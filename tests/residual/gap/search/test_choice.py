@@ -76,6 +76,16 @@ def test_of_what_moves_exactly_alike_the_simulators_own_parameter_is_named():
         assert choose(Toy(sets, merits, mass=0.33 * known)).key == (0, 3)
 
 
+@pytest.mark.parametrize("far", [0.2, 0.6])
+def test_of_what_moves_exactly_alike_the_smallest_numbers_are_named_however_they_forecast(far):
+    """A gain of 5.1 beside friction moves as a time constant does that is off by 0.8."""
+    sets, merits = {(1, 4): 0.2, (3, 5): far}, {(1, 4): 20.0, (3, 5): 20.0001}
+    sizes = {(1, 4): (5.1, 2.5), (3, 5): (0.8, 0.01)}
+    assert choose(Toy(sets, merits, sizes=sizes)).key == (3, 5)
+    # What fits worse is another motion, and forecasts tell.
+    assert choose(Toy(sets, {**merits, (3, 5): 21.0}, sizes=sizes)).key != (3, 5) or far == 0.2
+
+
 def test_what_would_be_surprisingly_large_comes_after_what_does_as_well():
     merits = {(0,): 50.0, (3,): 20.0}
     assert choose(Toy({(0,): 0.200, (3,): 0.201}, merits, surprising={3})).key == (0,)
