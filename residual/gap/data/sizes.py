@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 #: Times the size that a channel declares, or part of it, from which on another unit is asked after,
 #: and how near to that size values have to be in it.
 FAR, NEAR = 50.0, 4.0
+#: Temperature in K that no column of a simulator with a warmer parameter stays below.
+COLD = 200.0
 #: How nearly a jump has to be a turn, and the share of it that no other step reaches.
 ALMOST, SMALL = 0.03, 0.3
 
@@ -42,6 +44,36 @@ def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[
                 f"are declared: if it counts otherwise than read, set {' or '.join(near[:3])}"
             )
             found.append(Finding("size", channel.name, says, {"times": times}, "warning"))
+    return found
+
+
+def too_cold(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Temperatures in K that are those of another zero, beside what the simulator knows of."""
+    warm = [
+        (float(np.max(parameter.value)), name)
+        for name, parameter in simulator.parameters.items()
+        if parameter.unit == "K" and float(np.max(parameter.value)) > COLD
+    ]
+    columns = [
+        *measured(simulator, trajectories),
+        *(
+            (channel, [run.actions[:, column] for run in trajectories])
+            for column, channel in enumerate(simulator.action_channels)
+        ),
+    ]
+    found = []
+    for channel, runs in columns:
+        if not warm or channel.unit != "K":
+            continue
+        most = float(_known(runs).max(initial=-np.inf))
+        if most >= COLD:
+            continue
+        value, name = max(warm)
+        says = (
+            f"is never warmer than {most:.3g} K, where {name} is {value:.3g} K: if the column "
+            "counts from 0 degC, set `unit: degC`"
+        )
+        found.append(Finding("size", channel.name, says, {"most": most}, "warning"))
     return found
 
 

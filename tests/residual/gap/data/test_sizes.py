@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from residual.gap.data.examine import examine, findings
 from residual.trajectories import Trajectory, moment
 from sims.equations import FirstOrderSystem
-from sims.simulator import Channel
+from sims.simulator import Channel, Parameter
 
 
 class Head(FirstOrderSystem):
@@ -83,3 +83,33 @@ def test_times_of_a_calendar_are_told_with_their_date():
     assert moment(1585250253.569) == "1585250253.57 s (2020-03-26 19:17:33.5 UTC)"
     assert moment(1e18) == "1e+18 s"
     assert moment(float("nan")) == "nan s"
+
+
+class Plate(FirstOrderSystem):
+    """A hot plate in a room."""
+
+    dt = 1.0
+    state_channels = (Channel("plate", "K", "other", scale=20.0),)
+    action_channels = (Channel("power", "W", "input", scale=10.0),)
+
+    def __init__(self, ambient=293.0):
+        self.parameters = {"ambient": Parameter(ambient, "K", "room")}
+        super().__init__()
+
+    def derivative(self, x, u, p):
+        return ((p.ambient + 2.0 * u[:, 0] - x[:, 0]) / 60.0)[:, None]
+
+
+@pytest.mark.parametrize(
+    ("zero", "ambient", "told"),
+    [(0.0, 293.0, False), (273.15, 293.0, True), (273.15, 20.0, False), (0.0, 20.0, False)],
+)
+def test_a_temperature_of_another_zero_is_told(zero, ambient, told):
+    """In degC as if in K: the room is then 253 K warmer than anything that was measured."""
+    simulator = Plate(ambient)
+    power = np.repeat(np.random.default_rng(0).uniform(0, 20, 10), 30)[:, None]
+    path = Plate().rollout([300.0], power) - zero
+    run = Trajectory("run", np.arange(301.0), path, power)
+    says = [one.says for one in findings(simulator, [run]) if "warmer" in one.says]
+    assert bool(says) is told
+    assert not told or "set `unit: degC`" in says[0]
