@@ -23,7 +23,9 @@ from residual.gap.fitting.screening import beside_starts, constrained, flatten, 
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.fitting.validation import by_block, validate
 from residual.gap.search.sets import Key, Search
+from sims.effects.actuator import StaticActuatorEffect
 from sims.effects.curve import Curve
+from sims.effects.joint import ConstantLoad
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -76,15 +78,19 @@ def stands_for(answer: Answer, claim: Claim, differ: Sequence[Unlike]) -> bool:
     """Whether what was named may stand for an effect that differs between records.
 
     Where one does better alone, all that was named may. A curve may anyway: records that reach
-    differently far have points of it to themselves.
+    differently far have points of it to themselves. So may the law of an input where a push
+    differs: records driven otherwise tell a law by what parts them.
 
     Args:
         answer: What was found with one size for all.
         claim: On one of its effects.
         differ: See ``unlike``.
     """
-    curve = isinstance(answer.found.search.candidates[claim.number].effect, Curve)
-    return any(one.instead or curve for one in differ)
+    search = answer.found.search
+    effect = search.candidates[claim.number].effect
+    curve, law = isinstance(effect, Curve), isinstance(effect, StaticActuatorEffect)
+    pushes = {c.label for c in search.candidates if c.effect.family == ConstantLoad.family}
+    return any(one.instead or curve or (law and one.label in pushes) for one in differ)
 
 
 def _records(fitter: SmoothFitter) -> tuple[tuple[str, ...], Integers]:

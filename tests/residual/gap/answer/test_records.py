@@ -11,7 +11,7 @@ from lift import OFFERED as OFFERED_LIFT
 from residual.gap import find_gap
 from residual.gap.answer.records import stands_for
 from residual.gap.beside import Unlike
-from sims.effects import CoulombFriction, FrictionCurve
+from sims.effects import ConstantLoad, CoulombFriction, FrictionCurve, QuadraticActuator
 from sims.pendulum_equation import PendulumEquation
 from studies.gap.lead import lead
 from studies.gap.summary import summary
@@ -96,8 +96,28 @@ def test_nothing_is_said_of_a_single_record():
 ])  # fmt: skip
 def test_a_curve_may_stand_for_what_differs_between_records(effect, instead, wanted):
     """Records that reach differently far have points of a curve to themselves."""
-    search = SimpleNamespace(candidates=[SimpleNamespace(effect=effect)])
-    answer = SimpleNamespace(found=SimpleNamespace(search=search))
+    push = SimpleNamespace(effect=ConstantLoad("pivot"), label="constant_load@pivot")
+    own = SimpleNamespace(effect=effect, label=str(effect))
+    answer = SimpleNamespace(found=SimpleNamespace(search=SimpleNamespace(candidates=[own, push])))
     one = Unlike("constant_load", "pivot", "load", "N m", {}, 0.5, instead=instead)
     assert stands_for(answer, SimpleNamespace(number=0), [one]) is wanted
     assert not stands_for(answer, SimpleNamespace(number=0), [])
+
+
+def test_a_law_of_an_input_may_stand_for_a_push_that_differs():
+    """Records are driven at other levels: these tell the law by what parts the records."""
+    effects = [
+        QuadraticActuator("voltage", full=5.0),
+        ConstantLoad("pivot"),
+        CoulombFriction("pivot"),
+    ]
+    candidates = [SimpleNamespace(effect=e, label=str(e)) for e in effects]
+    answer = SimpleNamespace(found=SimpleNamespace(search=SimpleNamespace(candidates=candidates)))
+
+    def asked(effect, where, number):
+        differs = Unlike(effect, where, "load", "N m", {}, 0.5)
+        return stands_for(answer, SimpleNamespace(number=number), [differs])
+
+    assert asked("constant_load", "pivot", number=0)
+    assert not asked("mass", "mass", number=0)
+    assert not asked("constant_load", "pivot", number=2)
