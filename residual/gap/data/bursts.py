@@ -6,10 +6,12 @@ them the simulator has hardly any time to move, and the log's usual step says no
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from residual.logs.checks import Finding
 from residual.trajectories import Trajectory
@@ -17,8 +19,9 @@ from residual.trajectories import Trajectory
 #: Times the usual step that one between bursts is longer; how many there are at least, and their
 #: part of the time.
 LONG, ENOUGH, MOST = 10.0, 10, 0.8
-#: Part of the time between bursts that one lasts, at most: a longer one is a record of its own.
-BRIEF = 0.1
+#: Part of the time between bursts that one lasts, and of its range that a channel moves in it, at
+#: most: else it is a record of its own.
+BRIEF, STILL = 0.1, 0.1
 
 
 def without_bursts(
@@ -39,9 +42,11 @@ def without_bursts(
         return runs, []
     if (total - apart.sum()) / len(apart) > BRIEF * np.median(apart):
         return runs, []
+    ends = [np.append(run.durations > LONG * np.median(durations), True) for run in runs]
+    if _moves(runs, ends):
+        return runs, []
     kept, rows = [], 0
-    for run in runs:
-        last = np.append(run.durations > LONG * np.median(durations), True)
+    for run, last in zip(runs, ends, strict=True):
         rows += len(last) - int(last.sum())
         kept.append(
             replace(
@@ -55,3 +60,19 @@ def without_bursts(
         "sensor's own time"
     )
     return kept, [Finding("bursts", "", says, {"every_s": every, "rows": rows}, "warning")]
+
+
+def _moves(runs: Sequence[Trajectory], ends: Sequence[NDArray[np.bool_]]) -> bool:
+    """Whether some channel moves within bursts, that end where told."""
+    bursts = [
+        part
+        for run, last in zip(runs, ends, strict=True)
+        for part in np.split(run.states, np.flatnonzero(last)[:-1] + 1)
+    ]
+    whole = np.concatenate(bursts)
+    with np.errstate(invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of channels that were not measured
+        reach = np.nanmax(whole, axis=0) - np.nanmin(whole, axis=0)
+        moved = [np.nanmax(part, axis=0) - np.nanmin(part, axis=0) for part in bursts]
+        usual = np.nanmedian(moved, axis=0)
+    return bool((usual > STILL * reach).any())

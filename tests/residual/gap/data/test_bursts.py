@@ -43,6 +43,16 @@ def test_even_rows_and_records_with_pauses_stay(inside):
     assert not said and kept == [run]
 
 
+def test_brief_records_between_long_rests_stay():
+    """The fast part of every step alone: within it the state moves as far as ever."""
+    rise = 1 - np.exp(-np.arange(40) / 8.0)
+    times = np.concatenate([10.0 * n + 1e-3 * np.arange(40) for n in range(12)])
+    states = np.tile(rise, 12)[:, None]
+    run = Trajectory("run", times, states, np.zeros((len(times) - 1, 0)))
+    kept, said = without_bursts([run])
+    assert not said and kept == [run]
+
+
 def test_the_answer_is_of_the_motion_and_not_of_the_port():
     found = find_gap(PendulumEquation(), [swinging()], effects=["mass", "viscous_friction"])
     assert [verdict.kind for verdict in found.verdicts if verdict.kind == "confirmed"] == []
