@@ -227,7 +227,8 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
         found = [by if few else f"no effect of the library is established: {by}"]
     if few:
         more = duration_text((TOO_FEW - gap.blocks) * gap.horizon_s)
-        shorter = any(len(one.times) > SAMPLES for one in result.rollouts)
+        # Of one or two, shorter ones may have shown nothing.
+        shorter = gap.blocks > 2 and any(len(one.times) > SAMPLES for one in result.rollouts)
         found.append(
             f"nothing is named from {blocks_of(gap)}, {TOO_FEW} are needed: "
             f"log some {more} more{', or set a shorter --horizon' * shorter}"

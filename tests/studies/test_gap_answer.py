@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 from told import DELAY, FRICTION, MASS, MINOR, rest, result
 
@@ -10,6 +11,7 @@ from residual.gap.result import (
     ChannelGap,
     Meant,
     Number,
+    Rollout,
     Span,
     Step,
     Verdict,
@@ -123,6 +125,17 @@ def test_a_twin_is_told_with_its_size_and_what_it_does_to_the_others():
     )  # fmt: skip
     both = result(heavier, rubbing)
     assert "0.0835 N m s/rad if length is meant, not mass" in notes(rubbing, both)
+
+
+@pytest.mark.parametrize(("blocks", "rows", "told"), [(3, 24, True), (3, 6, False), (2, 24, False)])
+def test_a_shorter_horizon_is_advised_where_there_is_one(blocks, rows, told):
+    """Six rows are the fewest; one or two blocks may be asked because shorter ones show nothing."""
+    found = result(rest(0.6), effects=[], blocks=blocks)
+    path = np.zeros((rows, 1))
+    forecast = Rollout("run", np.arange(float(rows)), path, path, path)
+    said = notes(rest(0.6), dataclasses.replace(found, rollouts=(forecast,)))
+    assert any("set a shorter --horizon" in note for note in said) is told
+    assert any("are needed: log some" in note for note in said)
 
 
 @pytest.mark.parametrize("effects", [[], [ParameterChange("mass", 0.001)]])
