@@ -6,10 +6,8 @@ import numpy as np
 
 from residual.gap.answer.answer import summed_up, within_noise
 from residual.gap.answer.confirmed import Answer
-from residual.gap.fitting.forecasts import main_channel, noise_floor
-from residual.gap.fitting.validation import validate
+from residual.gap.fitting.forecasts import most_beside_noise
 from residual.gap.log import Log
-from residual.gap.model.model import Model
 from residual.gap.preparation.horizon import (
     FEWER,
     PART,
@@ -70,14 +68,9 @@ def slow_error(log: Log, answer: Answer) -> tuple[float, str] | None:
             continue
         ready = prepare(search.simulator, log.at(horizon).runs, horizon)
         fitter = ready.fitter
-        fit = fitter.fit(Model(search.simulator), np.zeros(0))
-        squares = validate(fitter, fit).squares
-        floor = noise_floor(fitter, fit, ready.floor.sigma, DRAWS)
-        main = main_channel(search.simulator, fitter.samples.measured, squares, floor)
+        main, error, noise = most_beside_noise(search.simulator, fitter, ready.floor.sigma, DRAWS)
         spread = np.nanvar(fitter.samples.seen[:, fitter.samples.measured[main]])
-        noise = np.nanmean(floor[:, main])
-        least = max(PLAIN**2 * noise, GROWN**2 * usual[main], MATTERS**2 * spread)
-        if np.nanmean(squares[:, main]) > least:
+        if error > max(PLAIN**2 * noise, GROWN**2 * usual[main], MATTERS**2 * spread):
             says = (
                 f"forecasts go over {fitter.seconds:.3g} s, of which the records hold "
                 f"{len(fitter.blocks)}: over {search.fitter.seconds:.3g} s noise hides a slow error"

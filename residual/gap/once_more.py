@@ -162,12 +162,8 @@ class OnceMore:
             return known
         if not isinstance(fitter, SmoothFitter) or fitter.samples.stride == 1:
             return known
-        shorter = self.log.at(self.log.horizon / fitter.samples.stride)
-        self.inquiry.tell(f"once more over short forecasts, with {part}")
-        simulator, offered = known.answer.found.search.simulator, [*_curves(known), *parts]
-        ready, answer = self.inquiry.asked_of(
-            simulator, shorter.runs, shorter.horizon, self.tolerance, offered
-        )
+        horizon, what = self.log.horizon / fitter.samples.stride, f"short forecasts, with {part}"
+        ready, answer = self._over(known, horizon, what, [*_curves(known), *parts])
         if not (takes_most_by_itself(answer, parts) and still_names(answer, known.answer)):
             return known
         says = (
@@ -184,15 +180,11 @@ class OnceMore:
         search = known.answer.found.search
         if self.log.by_user or known.answer.key or search.beside:
             return known
-        simulator = search.simulator
-        horizon = longer_horizon(simulator, self.log, known.answer)
+        horizon = longer_horizon(search.simulator, self.log, known.answer)
         if horizon is None or self._late:
             return known
-        longer = self.log.at(horizon)
-        self.inquiry.tell("once more over longer forecasts, of which the records hold fewer")
-        ready, answer = self.inquiry.asked_of(
-            simulator, longer.runs, longer.horizon, self.tolerance
-        )
+        what = "longer forecasts, of which the records hold fewer"
+        ready, answer = self._over(known, horizon, what)
         if not explains_the_rest(answer):
             return known
         says = (
@@ -211,12 +203,17 @@ class OnceMore:
         if slow is None:
             return known
         horizon, says = slow
-        longer = self.log.at(horizon)
-        self.inquiry.tell("once more over the longest forecasts, where a slow error shows")
-        ready, answer = self.inquiry.asked_of(
-            search.simulator, longer.runs, longer.horizon, self.tolerance
-        )
+        what = "the longest forecasts, where a slow error shows"
+        ready, answer = self._over(known, horizon, what)
         return Confirmed(ready, answer, (*known.says, says))
+
+    def _over(
+        self, known: Confirmed, horizon: float, what: str, more: Sequence[Effect] = ()
+    ) -> tuple[Prepared, Answer]:
+        """What is found over forecasts of another length, and these windows."""
+        log, simulator = self.log.at(horizon), known.answer.found.search.simulator
+        self.inquiry.tell(f"once more over {what}")
+        return self.inquiry.asked_of(simulator, log.runs, log.horizon, self.tolerance, more)
 
     def _with_more(
         self, known: Confirmed, more: Sequence[Effect], what: str, lacking: str

@@ -36,13 +36,13 @@ def without_bursts(
     durations = np.concatenate([run.durations for run in runs] or [np.zeros(0)])
     if len(durations) < ENOUGH:
         return runs, []
-    long = durations > LONG * np.median(durations)
-    apart, total = durations[long], durations.sum()
+    least = LONG * np.median(durations)
+    apart, total = durations[durations > least], durations.sum()
     if len(apart) < ENOUGH or apart.sum() < MOST * total:
         return runs, []
     if (total - apart.sum()) / len(apart) > BRIEF * np.median(apart):
         return runs, []
-    ends = [np.append(run.durations > LONG * np.median(durations), True) for run in runs]
+    ends = [np.append(run.durations > least, True) for run in runs]
     if _moves(runs, ends):
         return runs, []
     kept, rows = [], 0

@@ -54,6 +54,9 @@ def too_cold(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
         for name, parameter in simulator.parameters.items()
         if parameter.unit == "K" and float(np.max(parameter.value)) > COLD
     ]
+    if not warm:
+        return []
+    value, name = max(warm)
     columns = [
         *measured(simulator, trajectories),
         *(
@@ -63,12 +66,11 @@ def too_cold(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
     ]
     found = []
     for channel, runs in columns:
-        if not warm or channel.unit != "K":
+        if channel.unit != "K":
             continue
         most = float(_known(runs).max(initial=-np.inf))
         if most >= COLD:
             continue
-        value, name = max(warm)
         says = (
             f"is never warmer than {most:.3g} K, where {name} is {value:.3g} K: if the column "
             "counts from 0 degC, set `unit: degC`"

@@ -71,10 +71,18 @@ def own_channels(channels: Sequence[Channel]) -> list[int]:
     return [i for i, channel in enumerate(channels) if channel.rate_of not in names]
 
 
+def most_beside_noise(
+    simulator: HostSimulator, fitter: Fitter, sigma: Array, draws: int = 4
+) -> tuple[int, float, float]:
+    """Place of the channel that shows an error of a simulator most, its mean squared forecast
+    error, and that by noise alone."""
+    fit = fitter.fit(Model(simulator), np.zeros(0))
+    squares, floor = validate(fitter, fit).squares, noise_floor(fitter, fit, sigma, draws)
+    main = main_channel(simulator, fitter.samples.measured, squares, floor)
+    return main, float(np.nanmean(squares[:, main])), float(np.nanmean(floor[:, main]))
+
+
 def beside_noise(simulator: HostSimulator, fitter: Fitter, sigma: Array) -> float:
     """Forecast error of a simulator over that by noise alone, of the channel that shows it most."""
-    fit = fitter.fit(Model(simulator), np.zeros(0))
-    squares, floor = validate(fitter, fit).squares, noise_floor(fitter, fit, sigma)
-    main = main_channel(simulator, fitter.samples.measured, squares, floor)
-    by_noise = max(float(np.nanmean(floor[:, main])), 1e-300)
-    return float(np.sqrt(np.nanmean(squares[:, main]) / by_noise))
+    _, error, noise = most_beside_noise(simulator, fitter, sigma)
+    return float(np.sqrt(error / max(noise, 1e-300)))
