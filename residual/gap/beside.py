@@ -29,7 +29,7 @@ class Conventions:
 
     Attributes:
         changes: Lines of the column map, any of which makes the nominal simulator forecast far
-            better: a sign, a zero or a unit; of ``"row"`` the inputs.
+            better: a sign, a zero, a unit or a clock; of ``"row"`` the inputs.
         times: How much smaller the error is then, or how many times its scale a channel is.
         reason: ``"forecasts"`` are far better so, or with the ``"zero"`` of an angle elsewhere; an
             input would be turned round by what was found (``"sign"``); a channel is far beyond the

@@ -1,4 +1,4 @@
-"""What a column map may have to say: signs, zeros, units, and columns in each other's place."""
+"""What a column map may have to say: signs, zeros, units, a clock, columns that were exchanged."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ Places = NDArray[np.intp]
 
 #: Zeros from which angles are counted, in turns.
 QUARTERS = (0.0, 0.25, 0.5, -0.25)
+#: Control periods in a sample, or samples in one, that a slip of the clock makes, and how nearly.
+SLIPS, SLIPPED = (10.0, 60.0, 100.0, 1000.0), 0.15
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,6 +34,7 @@ class Convention:
         states_from: Which column every state is read from, (n_s,).
         inputs_from: The same of every input, (n_a,).
         turned: Whether nothing but the zero of an angle is another one, and perhaps its direction.
+        clock: Times as long as said that every step lasts.
     """
 
     says: str
@@ -40,6 +43,7 @@ class Convention:
     states_from: Places
     inputs_from: Places
     turned: bool = False
+    clock: float = 1.0
 
     @property
     def sign(self) -> bool:
@@ -83,7 +87,31 @@ def conventions(
         found += _turned(simulator, seen) + _in_other_units(simulator, seen)
         for says, unit in misread(simulator.physical_channels[seen[0]], converted):
             found.append(_of_states(simulator, says, seen[:1], unit.factor, unit.offset))
-    return found + _all_in_other_units(simulator, joints) + _exchanged(simulator, joints)
+    found += _all_in_other_units(simulator, joints) + _exchanged(simulator, joints)
+    return found + _of_the_clock(simulator, samples, joints)
+
+
+def _of_the_clock(
+    simulator: HostSimulator, samples: Samples, joints: Sequence[Sequence[int]]
+) -> list[Convention]:
+    """A sample in every control period, where one comes ten, 60, 100 or 1000 times as often or as
+    seldom.
+
+    A measured rate counts as it is, or it was put on the scale of a position whose clock was wrong.
+    """
+    period = float(np.median(np.concatenate([run.durations for run in samples.recorded])))
+    rare = period / simulator.dt
+    slips = [n for n in SLIPS for ratio in (rare, 1 / rare) if abs(ratio / n - 1) < SLIPPED]
+    if not slips:
+        return []
+    says = (
+        f"`scale: {1 / rare:.6g}` for the time (`period: {simulator.dt:g}` of a log without times)"
+    )
+    plain = dataclasses.replace(as_said(simulator), says=says, clock=1 / rare)
+    pace = dataclasses.replace(as_said(simulator), says=says, clock=1 / rare)
+    for joint in joints:
+        pace.states[0, joint[1:]] = rare
+    return [plain, pace] if any(len(joint) > 1 for joint in joints) else [plain]
 
 
 def _measured_joints(simulator: HostSimulator, samples: Samples) -> list[list[int]]:

@@ -1,9 +1,9 @@
-"""Signs, zeros, units and columns that a log has otherwise than said: no effect of physics.
+"""Signs, zeros, units, columns, a clock that a log has otherwise than said: no effect of physics.
 
-A reversed input, an angle counted from elsewhere, a speed in km/h or two columns in each other's
-place make every forecast wrong, and no effect of the library undoes it, or one that is not there.
-So it is asked beforehand whether the nominal simulator forecasts far better with one of them
-changed.
+A reversed input, an angle counted from elsewhere, a speed in km/h, a period with a digit too many
+or two columns in each other's place make every forecast wrong, and no effect of the library undoes
+it, or one that is not there. So it is asked beforehand whether the nominal simulator forecasts far
+better with one of them changed.
 """
 
 from __future__ import annotations
@@ -188,12 +188,14 @@ def _error(simulator: HostSimulator, fitter: SmoothFitter, convention: Conventio
     def acting(actions: Array) -> Array:
         return gain * actions[..., convention.inputs_from] + bias
 
+    clock = convention.clock
     samples = dataclasses.replace(
         samples, seen=factor * samples.seen[:, convention.states_from] + offset,
-        actions=acting(samples.actions),
+        actions=acting(samples.actions), durations=clock * samples.durations,
+        times=clock * samples.times,
         recorded=tuple(
             dataclasses.replace(
-                run, actions=acting(run.actions),
+                run, actions=acting(run.actions), durations=clock * run.durations,
                 before=None if run.before is None else acting(run.before),
             )
             for run in samples.recorded

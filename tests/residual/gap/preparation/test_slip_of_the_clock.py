@@ -1,0 +1,74 @@
+"""Logs whose times are ten or sixty times too long, or too short."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from residual.gap import find_gap
+from residual.gap.preparation.conventions import otherwise
+from residual.gap.preparation.prepare import prepare
+from residual.trajectories import Trajectory
+from sims.effects import ConstantLoad, ParameterChange
+from sims.equations import FirstOrderSystem
+from sims.simulator import Channel, Parameter
+
+
+class Plate(FirstOrderSystem):
+    """A plate on a heater, above the room."""
+
+    dt = 1.0
+    state_channels = (Channel("warmth", "K", "other", scale=50.0),)
+    action_channels = (Channel("power", "1", "input", scale=1.0, low=0.0, high=1.0),)
+    parameters = {"time_constant": Parameter(30.0, "s", "of the plate", low=0.1)}
+
+    def derivative(self, x, u, p):
+        return ((60.0 * u[:, 0] - x[:, 0]) / p.time_constant)[:, None]
+
+
+#: What a plate may lack that is none of its clock.
+LARGE = [
+    (), (ParameterChange("time_constant", 60.0),), (ParameterChange("time_constant", -15.0),),
+    (ConstantLoad("warmth", 0.5),),
+]  # fmt: skip
+
+
+def heated(effects=(), dt=1.0):
+    rng = np.random.default_rng(1)
+    power = np.repeat(rng.uniform(0.0, 1.0, 16), 25)
+    plate = Plate(dt=dt).with_effects(list(effects))
+    states = plate.rollout(np.zeros((1, 1)), power[None, :, None])[0]
+    states += 0.05 * rng.standard_normal(states.shape)
+    return Trajectory("run", dt * np.arange(len(states)), states, power[:, None])
+
+
+def asked(run, dt=1.0):
+    plate = Plate(dt=dt)
+    return otherwise(plate, prepare(plate, [run], 25.0 * float(run.durations[0])).fitter)
+
+
+@pytest.mark.parametrize("slip", [10.0, 0.1, 60.0])
+def test_a_slip_of_the_clock_is_told(slip):
+    run = heated()
+    found = asked(dataclasses.replace(run, times=slip * run.times))
+    assert found is not None
+    (says,) = found.changes
+    assert says == f"`scale: {1 / slip:.6g}` for the time (`period: 1` of a log without times)"
+
+
+@pytest.mark.parametrize("effects", LARGE)
+def test_rare_and_frequent_samples_are_none(effects):
+    run = heated(effects)
+    assert asked(run) is None
+    for dt in (0.1, 10.0):
+        assert asked(run, dt) is None, dt
+
+
+def test_nothing_is_certain_before_the_clock_is_seen_to():
+    run = heated((ParameterChange("time_constant", 6.0),))
+    found = find_gap(Plate(), [dataclasses.replace(run, times=10.0 * run.times)], minutes=0.5)
+    assert found.conventions is not None
+    assert "`scale: 0.1` for the time" in found.conventions.changes[0]
+    assert all(v.kind == "ambiguous" for v in found.verdicts if v.effect)
