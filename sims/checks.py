@@ -17,6 +17,7 @@ from sims.contract import (
     positions_and_rates,
 )
 from sims.effects.base import Effect
+from sims.effects.joint import ConstantLoad
 from sims.effects.library import library, typical
 from sims.effects.parameter import ParameterChange
 from sims.equations import EquationOfMotion, FirstOrderSystem
@@ -179,11 +180,30 @@ def _effects(simulator: HostSimulator, rng: np.random.Generator) -> Iterator[Fin
             if np.isfinite(after).all():
                 break
         finding = _reaches(check, before, after, f"to {_strength(some)}")
+        if not finding.ok and isinstance(effect, ParameterChange):
+            finding = _beside_loads(plain, some, states, actions) or finding
         by_row = host.take(slice(None)).with_effects([_per_row(some, len(states))])
         rows = by_row.step(by_row.augment(states, -actions), actions)[:, : states.shape[1]]
         if finding.ok and not np.array_equal(rows, after):
             finding = Finding(check, False, "one value per row differs from the same scalar")
         yield finding
+
+
+def _beside_loads(
+    plain: HostSimulator, change: Effect, states: Array, actions: Array
+) -> Finding | None:
+    """Whether a parameter that cancels out, as the mass of a pendulum that swings freely, counts
+    beside a load on every joint; None if it does not."""
+    loads = [e for e in library(plain) if isinstance(e, ConstantLoad)]
+    loaded = [typical(load, plain, 1.0) for load in loads]
+    with np.errstate(all="ignore"):
+        before, after = (
+            plain.with_effects(effects).step(states, actions)
+            for effects in (loaded, [*loaded, change])
+        )
+    says = f"to {_strength(change)} beside a load"
+    finding = _reaches(f"effect {change}", before, after, says)
+    return finding if finding.ok else None
 
 
 def _per_row(effect: Effect, n: int) -> Effect:

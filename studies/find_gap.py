@@ -28,6 +28,7 @@ from residual.gap import GapResult, find_gap
 from residual.gap.find import hosting
 from residual.logs import LogData, LogFormat, read_logs
 from residual.logs.checks import Finding
+from residual.logs.sources import matching
 from residual.step_check import advice
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
@@ -142,9 +143,10 @@ def run(
     hold = holds(simulator, study.hold)
     effects = chosen_effects(simulator, chosen.effects)
     check_output(output)
+    logs, held_out = matching(chosen.logs), matching(chosen.held_out or [])
     # In whatever order the files come, not one digit of the answer changes.
-    data = read(simulator, sorted(chosen.logs), study.columns)
-    held = apart(simulator, chosen.logs, chosen.held_out or [], study.columns)
+    data = read(simulator, sorted(logs), study.columns)
+    held = apart(simulator, logs, held_out, study.columns)
     rows = sum(len(run.times) for run in data.trajectories)
     count = len(data.trajectories)
     tell(f"{count} {'trajectory' if count == 1 else 'trajectories'}, {rows} samples")

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from residual.logs.clocks import Signal
-from residual.logs.sources import signals_of
+from residual.logs.sources import matching, signals_of
 from studies.running.command import Parser
 from studies.running.ending import guarded
 
@@ -52,7 +52,7 @@ def _line(name: str, signal: Signal, width: int) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     given = build_parser().parse_args(arguments)
-    print("\n\n".join(describe(path) for path in given.files))
+    print("\n\n".join(describe(path) for path in matching(given.files)))
 
 
 if __name__ == "__main__":

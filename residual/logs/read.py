@@ -15,7 +15,7 @@ from residual.logs.layout import LogFormat, check_layout, named_column
 from residual.logs.overflow import continued
 from residual.logs.runs import runs_of
 from residual.logs.slower import filled
-from residual.logs.sources import open_log
+from residual.logs.sources import matching, open_log
 from residual.logs.table import LogError
 from residual.logs.timing import Run, report_sampling, tidy
 from residual.trajectories import Trajectory
@@ -50,7 +50,7 @@ def read_logs(
     Args:
         paths: One or several files (``.csv .txt .tsv .dat .log``, ``.parquet .pq``, ``.npz``,
             ``.mcap``, ``.h5 .hdf5``), folders of LeRobot and Minari data sets, data frames, or
-            arrays by name.
+            arrays by name. A pattern (``logs/*.csv``) stands for the files that match.
         state_channels: Of the simulator; those of kind ``"memory"`` are never in a log.
         action_channels: Of the simulator.
         columns: The layout of the files.
@@ -62,7 +62,7 @@ def read_logs(
         LogError: A file or the layout is not usable; one line names file, row, column and fix.
     """
     alone = isinstance(paths, str | Path | Mapping) or hasattr(paths, "columns")
-    paths = [paths] if alone else list(paths)
+    paths = matching([paths] if alone else list(paths))
     columns = columns or LogFormat()
     channels = [c for c in state_channels if c.kind != "memory"]
     if not paths:

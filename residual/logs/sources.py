@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import glob
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,26 @@ HDF5, MCAP = (".h5", ".hdf5"), (".mcap",)
 MINARI = Path("data", "main_data.hdf5")
 #: How much a period may differ from the steps of the times in a file, as a share.
 SAME_STEP = 0.05
+
+
+def matching(paths: Sequence[Any]) -> list[Any]:
+    """The logs, with the files that match in place of a pattern such as ``logs/*.csv``: not every
+    shell has expanded it.
+
+    Raises:
+        LogError: No file matches.
+    """
+    found: list[Any] = []
+    for path in paths:
+        named = isinstance(path, str | Path) and not Path(path).exists()
+        if not named or not set("*?[").intersection(str(path)):
+            found.append(path)
+            continue
+        files = sorted(glob.glob(str(path), recursive=True))
+        if not files:
+            raise LogError("no file matches, expected logs; mend the pattern", path)
+        found += files
+    return found
 
 
 def open_log(

@@ -127,6 +127,25 @@ def test_a_system_without_inputs_can_be_checked():
     assert "effect quadratic_drag@height" in {finding.check for finding in findings}
 
 
+class Swinging(EquationOfMotion):
+    name = "free pendulum"
+    state_channels = (
+        Channel("angle", "rad", "position", angle=True),
+        Channel("rate", "rad/s", "rate", rate_of="angle"),
+    )
+    action_channels = ()
+    parameters = {"mass": Parameter(0.25, "kg", "of the bob")}
+
+    def acceleration(self, q, v, u, force, p):
+        return (force[:, 0] / p.mass - 9.75 * np.sin(q[:, 0]))[:, None]
+
+
+def test_a_mass_that_cancels_counts_beside_a_load():
+    findings = {finding.check: finding for finding in check_simulator(Swinging())}
+    assert findings["effect mass"].ok
+    assert "beside a load" in findings["effect mass"].says
+
+
 @pytest.mark.parametrize(("low", "high"), [(1000.0, 2000.0), (-20.0, -4.0), (5.0, np.inf)])
 def test_an_input_need_not_reach_zero(low, high):
     class Throttled(Good):

@@ -14,6 +14,10 @@ from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
+#: Ranges of a channel by which half the step makes a control period end elsewhere, where the
+#: integration runs away, and where it is settled; times its own sub-steps that are tried.
+RUNS_AWAY, SETTLED, FINEST = 1.0, 0.01, 4096
+
 
 def nominal(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
     """A simulator that breaks down on recorded states."""
@@ -42,7 +46,43 @@ def nominal(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
                 f"({_listed(simulator, states[row])}): mend the simulator, or cut these rows"
             )
             return [refusal("nominal", run.name, says)]
+        if says := _too_coarse(simulator, states[rows], actions):
+            return [refusal("nominal", run.name, says)]
     return []
+
+
+def _too_coarse(simulator: HostSimulator, states: Array, actions: Array) -> str:
+    """What to do about a simulator whose own steps are so long that its integration runs away."""
+    if not simulator.advances_rows_at_once or simulator.effects:
+        return ""
+    ranges = np.ptp(states, axis=0)
+    usual = np.where(ranges > 0, ranges, np.inf)  # what stands still tells of no size
+    durations = np.full(len(states), simulator.dt)
+
+    def after(substeps: int) -> Array:
+        with np.errstate(all="ignore"):
+            return simulator.integrate(
+                states, np.repeat(actions[:, None], substeps, axis=1), durations
+            )
+
+    def apart(one: Array, other: Array) -> Array:
+        with np.errstate(all="ignore"):
+            return np.median(np.abs(one - other)[:, : len(usual)], axis=0) / usual
+
+    own = count = simulator.substeps
+    coarse, fine = after(own), after(2 * own)
+    astray = apart(coarse, fine)
+    column = int(np.argmax(astray))
+    if not RUNS_AWAY < astray[column] < np.inf:
+        return ""
+    while not apart(coarse, fine)[column] < SETTLED and count < FINEST * own:
+        count, coarse, fine = 2 * count, fine, after(4 * count)
+    return (
+        f"the integration of {simulator.name} runs away: its steps of {simulator.dt / own:.3g} s "
+        f"(dt / substeps) are too long for it, with half of them "
+        f"{simulator.physical_channels[column].name} differs by {astray[column]:.3g} times what it "
+        f"does in the log. Set substeps = {count} in its class, or a shorter dt"
+    )
 
 
 def _listed(simulator: HostSimulator, state: Array) -> str:

@@ -49,6 +49,9 @@ BETTER, ALIKE = 2.0, 1.2
 #: The same with two columns in each other's place, and how good they have to be then: no physics
 #: comes near, so that in honest logs it makes forecasts worse.
 EXCHANGED, FAIR = 1.5, 1.0
+#: Error from which on forecasts go astray: what stays where it is errs by 1. Motion the other way
+#: than they say need not be foretold well by a sign to be asked about.
+ASTRAY = 1.0
 #: The same where another convention is so much better that the log as it is said to be is absurd.
 ABSURD = 1.25
 #: Error from which on a sign or an exchange is asked after that makes it so many times smaller:
@@ -94,14 +97,17 @@ def otherwise(
     errors = [(_error(simulator, fitter, one), one) for one in asked]
     least, best = min(errors, key=lambda pair: pair[0], default=(own, as_said(simulator)))
     times, good = (EXCHANGED, FAIR) if best.exchanged else (BETTER, GOOD)
+    if best.sign and own >= ASTRAY:
+        good = max(good, FAIR)
     if CLEARLY * least <= own:
         good = ABSURD
     if (times if poor else CLEARLY) * least > own or least > good:
         return None
-    further = beyond(best)
+    further = None if _smaller_angle(simulator, fitter.samples, best) else beyond(best)
     if further is not None and BETTER * least > _error(simulator, fitter, further):
         return None
-    alike = plainest([one for error, one in errors if error < ALIKE * least])
+    near = [(error, one) for error, one in errors if error < ALIKE * least]
+    alike = plainest([one for _, one in sorted(near, key=lambda pair: pair[0])])
     reason: Literal["zero", "forecasts"] = "zero" if best.turned else "forecasts"
     return Conventions(tuple(one.says for one in alike), own / least, reason)
 
@@ -178,6 +184,19 @@ def beyond_scale(
         if near:
             return Conventions(tuple(near), times, "scale")
     return None
+
+
+def _smaller_angle(simulator: HostSimulator, samples: Samples, convention: Convention) -> bool:
+    """Whether an angle that goes beyond a turn, as said, would be in degrees or a smaller unit yet.
+
+    What swings by little swings alike in every unit that is small enough.
+    """
+    for column in samples.measured:
+        seen, turn = samples.seen[:, column], simulator.physical_channels[column].turn
+        beyond_a_turn = turn is not None and np.nanmax(seen) - np.nanmin(seen) > turn
+        if beyond_a_turn and convention.states[0, column] < 1:
+            return True
+    return False
 
 
 def _error(simulator: HostSimulator, fitter: SmoothFitter, convention: Convention) -> float:
