@@ -25,6 +25,8 @@ NEARLY = 0.2
 FARTHER, LITTLE = 1.5, 0.5
 #: Windows that the records should at least be good for, and where so many show nothing.
 WINDOWS, FEWER = 8, 5
+#: Parts of a length by which it is cut until the records hold the windows that they should.
+SHORTER = np.linspace(1.0, 0.5, 51)
 #: Least samples of a window, and of a forecast of a system that strikes the ground.
 SAMPLES, STRIDE = 8, 10
 
@@ -99,9 +101,19 @@ def other_length(simulator: HostSimulator, asked: float, seconds: float) -> list
 
 
 def longest_horizon(trajectories: Sequence[Trajectory], windows: int = WINDOWS) -> float:
-    """The longest of which the records still hold so many windows, in s."""
-    lengths = [float(t.times[-1] - t.times[0]) for t in trajectories]
-    return (1 - LEAD) * min(sum(lengths) / windows, max(lengths))
+    """The longest of which the records still hold so many windows, in s.
+
+    Every record is divided evenly, so that of six alike eight windows ask for two in each.
+    """
+    lengths = np.array([t.times[-1] - t.times[0] for t in trajectories])
+    most = min(float(lengths.sum()) / windows, float(lengths.max()))
+
+    def held(length: float) -> float:
+        # Of a thinned log the last rows of a record may be lost.
+        return float(np.maximum(np.round(0.95 * lengths / length), 1).sum())
+
+    shorter = (share * most for share in SHORTER if held(share * most) >= windows)
+    return (1 - LEAD) * next(shorter, most)
 
 
 def _period(trajectories: Sequence[Trajectory], column: int, angle: bool) -> float:

@@ -126,6 +126,14 @@ def test_short_records_leave_room_for_windows():
     assert found == pytest.approx((1 - LEAD) * 10.0 / WINDOWS, rel=0.01)
 
 
+@pytest.mark.parametrize("records", [1, 2, 3, 5, 6, 7, 9])
+def test_short_records_alike_hold_eight_windows(records):
+    """Of six that are divided evenly, seven tenths of each made six windows, not eight."""
+    runs = [swing(3.0, 2.0, name=str(number)) for number in range(records)]
+    ready = prepare(PendulumEquation(), runs, longest_horizon(runs))
+    assert len(ready.fitter.blocks.windows) >= 8
+
+
 def test_a_window_has_samples_enough():
     found = usual_horizon(PendulumEquation(), [swing(2.0, 20.0, step=0.4)])
     assert found >= (1 - LEAD) * SAMPLES * 0.4 * (1 - 1e-9)
