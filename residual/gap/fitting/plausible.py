@@ -61,7 +61,7 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
     """
     host, given = model.bind(theta), model.simulator.with_effects(())
     chosen = model.added(theta)
-    for number, ratio in _ratios(host, chosen).items():
+    for number, ratio in ratios(host, chosen).items():
         name = chosen[number].where
         small = ratio > FACTOR and _minor(given, name, ratio)
         if not 1 / FACTOR <= ratio <= FACTOR and not small:
@@ -105,7 +105,7 @@ def _turned_by_a_curve(effects: Sequence[Effect], actuator: str, commands: Array
     return None
 
 
-def _ratios(host: HostSimulator, chosen: Sequence[Effect]) -> dict[int, float]:
+def ratios(host: HostSimulator, chosen: Sequence[Effect]) -> dict[int, float]:
     """Parameters over their nominal values, by the position of their change among those chosen."""
     found = {}
     for number, effect in enumerate(chosen):
@@ -148,7 +148,7 @@ def told_by_data(fit: Fit, nominal: Fit, fitter: Fitter, noise: Array | None) ->
     if noise is None or not isinstance(fitter, SmoothFitter):
         return False
     host, own = fit.model.bind(fit.theta), len(fit.model.simulator.effects)
-    turned = min(_ratios(host, fit.model.added(fit.theta)).values(), default=1.0) < 0
+    turned = min(ratios(host, fit.model.added(fit.theta)).values(), default=1.0) < 0
     if by_commands(host, fitter.samples, own) is not None:
         return False
     far, left = (fitter.over_noise(one, noise) for one in (nominal, fit))

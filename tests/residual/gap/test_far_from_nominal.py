@@ -61,3 +61,15 @@ def test_it_is_not_believed_where_much_of_the_motion_is_left():
     assert not any(verdict.effect == "time_constant" for verdict in found.verdicts)
     reasons = [rival.reason for rival in found.evidence if rival.effects == ("time_constant",)]
     assert any("times its nominal value" in reason for reason in reasons)
+
+
+def test_what_it_would_do_alone_is_told():
+    found = find_gap(Motor(), [stepped(0.005, wander=0.2)], effects=OFFERED)
+    assert not any(verdict.effect == "time_constant" for verdict in found.verdicts)
+    told = [one.words for one in found.quality if "times its nominal value" in one.words]
+    assert [words.startswith("time constant at 0.04") for words in told] == [True], told
+
+
+def test_nothing_is_said_of_a_parameter_that_does_little():
+    found = find_gap(Motor(), [stepped(0.1, wander=0.3)], effects=OFFERED)
+    assert not any("times its nominal value" in one.words for one in found.quality)
