@@ -21,10 +21,10 @@ TINY = [
     "--estimator", "residual.Linear",
     "--budget.true_samples", "60",
     "--budget.iterations", "1",
-    "--budget.idealised_steps", "600",
-    "--budget.difference_steps", "400",
+    "--budget.idealised_steps", "300",
+    "--budget.difference_steps", "250",
     "--ddpg.hidden", "[32, 32]",
-    "--ddpg.warm_up", "200",
+    "--ddpg.warm_up", "100",
 ]  # fmt: skip
 
 
