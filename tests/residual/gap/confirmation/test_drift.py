@@ -33,7 +33,7 @@ def in_a_room_that_warms(by):
     return named(warmed(steps(0, DUTIES, 0.0, lag=0.0), by))
 
 
-@pytest.mark.parametrize("by", [1.0, 3.0])
+@pytest.mark.parametrize("by", [1.0, pytest.param(3.0, marks=pytest.mark.long)])
 def test_a_room_that_warms_has_no_name_that_is_certain(by):
     found = in_a_room_that_warms(by)
     assert not [verdict.label for verdict in found if verdict.kind == "confirmed"]
