@@ -51,9 +51,7 @@ def ramps(fine: int = 100) -> Trajectory:
 
 
 #: Enough to be wrong with.
-OFFERED = (
-    "stribeck_friction", "coulomb_friction", "viscous_friction", "gain", "time_constant",
-)  # fmt: skip
+OFFERED = ("stribeck_friction", "coulomb_friction", "gain", "time_constant")
 
 
 @pytest.fixture(scope="module")
