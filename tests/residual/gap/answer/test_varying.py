@@ -14,7 +14,7 @@ from studies.gap.summary import summary
 
 DT, ROWS = 0.05, 1200
 #: What may be missing.
-ASKED = ("resistance", "torque_constant", "inertia", "coulomb_friction")
+ASKED = ("resistance", "inertia", "coulomb_friction")
 
 
 class Motor(FirstOrderSystem):
