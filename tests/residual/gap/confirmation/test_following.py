@@ -54,7 +54,7 @@ class Inhibited(Chemostat):
 
 def records(system, seed, rows=600):
     rng, found = np.random.default_rng(seed), []
-    for number in range(3):
+    for number in range(2):
         dilution = np.repeat(rng.uniform(0.08, 0.3, rows // 60), 60)
         feed = np.repeat(rng.uniform(5.0, 14.0, rows // 100), 100)
         inputs = np.column_stack([dilution, feed])

@@ -31,7 +31,7 @@ def named(inertia, wind, **options):
     """The first answer for a pendulum with more inertia, in a wind that no library holds."""
     simulator = PendulumEquation()
     offered = ["inertia", "delay"]
-    logs = make_logs(Truth(inertia=inertia, wind=wind), 11, "strong", "A", 4)
+    logs = make_logs(Truth(inertia=inertia, wind=wind), 11, "strong", "A", 3)
     found = find_gap(simulator, logs, effects=offered, hold="zero", **options)
     assert not found.adequate
     return found.verdicts[0]
