@@ -48,12 +48,12 @@ CHECKED = [
 
 @pytest.fixture(autouse=True)
 def short_training(monkeypatch):
-    """Networks take 250 gradient steps at most: what is held here is no matter of how many."""
+    """Networks take 150 gradient steps at most: what is held here is no matter of how many."""
     plan = DropoutNet._plan
 
     def brief(net, rows):
         planned = plan(net, rows)
-        return dataclasses.replace(planned, steps=min(planned.steps, 250))
+        return dataclasses.replace(planned, steps=min(planned.steps, 150))
 
     monkeypatch.setattr(DropoutNet, "_plan", brief)
 

@@ -126,6 +126,7 @@ def test_no_file_is_a_pickle(undisturbed):
             assert all(data[name].dtype != object for name in data)
 
 
+@pytest.mark.long  # tests/fuzz/soak.py does the same many times
 def test_a_study_killed_again_and_again_ends_with_the_same_results(tmp_path):
     random.seed(os.getpid())
     command = [*TINY, "--output", str(tmp_path / "run")]
