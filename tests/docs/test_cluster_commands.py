@@ -125,7 +125,8 @@ def test_local_processes_listen_nowhere(cluster):
     assert not cluster.study(line)
 
 
-def test_a_documented_dask_cluster_listens_on_the_loopback_only(cluster):
+def dask(cluster):
+    """Start what the page starts, and return the page's study once all of it listens."""
     pytest.importorskip("distributed")
     *lines, study = blocks("dask scheduler")
     for line in lines:
@@ -135,6 +136,17 @@ def test_a_documented_dask_cluster_listens_on_the_loopback_only(cluster):
     while len(cluster.listening()) < 4:
         assert time.monotonic() < end, cluster.listening()
         time.sleep(0.5)
+    return study
+
+
+def test_a_documented_dask_cluster_listens_on_the_loopback_only(cluster):
+    dask(cluster)
+    assert on_loopback(found := cluster.listening()), found
+
+
+@pytest.mark.long
+def test_a_study_on_a_documented_dask_cluster_listens_nowhere_else(cluster):
+    study = dask(cluster)
     assert on_loopback(found := cluster.study(study)), found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
 
@@ -43,6 +44,18 @@ CHECKED = [
     DropoutNet(hidden=(32,), dropout=0.0, epochs=30, batch_size=32, paper=True, random_state=0),
     ChannelFeatures(),
 ]
+
+
+@pytest.fixture(autouse=True)
+def short_training(monkeypatch):
+    """Networks take 150 gradient steps at most: what is held here is no matter of how many."""
+    plan = DropoutNet._plan
+
+    def brief(net, rows):
+        planned = plan(net, rows)
+        return dataclasses.replace(planned, steps=min(planned.steps, 150))
+
+    monkeypatch.setattr(DropoutNet, "_plan", brief)
 
 
 @parametrize_with_checks(CHECKED)

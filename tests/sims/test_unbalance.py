@@ -95,7 +95,9 @@ def test_it_is_named_where_it_shows():
     runs = [record(0), record(1)]
     for run in runs:
         run.states[:] += rng.normal(0.0, [2e-3, 3e-2], run.states.shape)
-    (named,) = [v for v in find_gap(Wheel(), runs).verdicts if v.kind != "needs_data"]
+    offered = ("unbalance", "linear_spring", "constant_load", "coulomb_friction", "actuator_gain")
+    found = find_gap(Wheel(), runs, effects=offered)
+    (named,) = [v for v in found.verdicts if v.kind != "needs_data"]
     assert (named.kind, named.effect) == ("confirmed", "unbalance")
     for name, true in (("sine", SINE), ("cosine", COSINE)):
         number = named.parameters[name]

@@ -15,8 +15,8 @@ from safetensors.numpy import load_file
 
 # budgets.yaml with tiny steps, budgets and networks.
 GRID = """
-budget: {iterations: 1, idealised_steps: 500, difference_steps: 400}
-ddpg: {hidden: [16, 16], warm_up: 300}
+budget: {iterations: 1, idealised_steps: 300, difference_steps: 250}
+ddpg: {hidden: [16, 16], warm_up: 200}
 grid:
 - seed: [0, 1]
   budget.true_samples: [40]

@@ -35,6 +35,7 @@ BUDGET = Budget(
     control_steps=60,
     corrected_steps=60,
 )
+LINEAR = Linear()
 DDPG = DDPGConfig(hidden=(8, 8), warm_up=50, batch=8)
 SYSTEM = System(
     name="short pendulum",
@@ -126,9 +127,24 @@ def timeless(records):
     return [{k: v for k, v in record.items() if "seconds" not in k} for record in records]
 
 
-def test_in_memory_is_the_same_as_kept_on_disk(learnt):
-    rule, outcome = learnt
-    memory = learnt_with(None, rule)
+@pytest.fixture(scope="module")
+def watched(learnt):
+    """The same loop in memory, and each random stream that it drew with what it was for."""
+    drawn = []
+
+    def watching(seed, *purpose):
+        found = streams.stream(seed, *purpose)
+        drawn.append((found, (seed, *purpose)))
+        return found
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (steps_module, training, testing):
+            patch.setattr(module, "stream", watching)
+        return learnt_with(None, learnt[0]), drawn
+
+
+def test_in_memory_is_the_same_as_kept_on_disk(learnt, watched):
+    outcome, memory = learnt[1], watched[0]
     assert timeless(memory.policies) == timeless(outcome.policies)
     assert timeless(memory.accuracy) == timeless(outcome.accuracy)
     for name, kept in outcome.trainings.items():
@@ -137,17 +153,8 @@ def test_in_memory_is_the_same_as_kept_on_disk(learnt):
             np.testing.assert_array_equal(ours[array], theirs[array])
 
 
-def test_no_two_steps_share_a_random_stream(monkeypatch):
-    drawn = []
-
-    def watched(seed, *purpose):
-        found = streams.stream(seed, *purpose)
-        drawn.append((found, (seed, *purpose)))
-        return found
-
-    for module in (steps_module, training, testing):
-        monkeypatch.setattr(module, "stream", watched)
-    learnt_with(None)
+def test_no_two_steps_share_a_random_stream(watched):
+    drawn = watched[1]
     # Tests of policies that are to be compared begin alike; that stream is theirs alone.
     common = [pair for pair in drawn if pair[1] == (0, "test starts")]
     drawn = [pair for pair in drawn if pair not in common] + common[:1]
@@ -161,10 +168,10 @@ def test_no_two_steps_share_a_random_stream(monkeypatch):
     assert {("difference", 1), ("difference", 2), ("control", 1), ("cold", 0)} <= trainings
 
 
-def quickly(nominal, true, task, **options):
+def quickly(nominal, true, task, estimator=LINEAR, **options):
     """The loop with next to no training."""
     return learn_by_difference(
-        nominal, true, task, estimator=Linear(), samples=40, updates=1, steps=60,
+        nominal, true, task, estimator=estimator, samples=40, updates=1, steps=60,
         ddpg=DDPG, progress=Silent(), **options,
     )  # fmt: skip
 
@@ -176,7 +183,8 @@ def test_a_true_system_with_hidden_memory_is_learnt_and_measured():
             return -np.abs(angle) - rate**2
 
     lagging = PendulumEquation(effects=[ActuatorLag("voltage", 0.1)])
-    (accuracy,) = quickly(PendulumEquation(), lagging, Named(horizon=30)).accuracy
+    found = quickly(PendulumEquation(), lagging, Named(horizon=30), evaluation=SYSTEM.evaluation)
+    (accuracy,) = found.accuracy
     for where in ("visited", "uniform"):
         assert set(accuracy[where]["one_step"]) == {"angle", "rate"}
 
@@ -215,40 +223,38 @@ def test_a_control_period_of_seconds_is_measured_over_enough_of_them():
     assert list(accuracy["visited"]["multi_step"]) == ["10 s", "40 s"]
 
 
-def test_the_python_call_is_the_loop(tmp_path):
-    arguments = dict(
-        estimator=Linear(), samples=40, updates=1, steps=120, ddpg=DDPG, progress=Silent()
-    )
-    system = SYSTEM.nominal, SYSTEM.true, SYSTEM.task
-    found = learn_by_difference(*system, **arguments, evaluation=SYSTEM.evaluation, seed=3)
-    assert [p["name"] for p in found.policies] == ["idealised", "difference"]
-    assert found.policy.act(np.zeros(3)).shape == (1,)
-    assert found.model.predict(np.zeros((1, 2)), np.zeros((1, 1))).shape == (1, 2)
-    assert len(repr(found)) < 200 and "<table" in found._repr_html_()
-    assert list(found.to_dataframe()["name"]) == ["idealised", "difference"]
-    assert found.plot().axes
-    page = found.report(tmp_path / "page.html")
+@pytest.fixture(scope="module")
+def called():
+    """One call from Python, with the estimator that names effects."""
+    return learn_by_difference(
+        SYSTEM.nominal, SYSTEM.true, SYSTEM.task, estimator=NamedEffects(), samples=40, updates=1,
+        steps=120, ddpg=DDPG, evaluation=SYSTEM.evaluation, progress=Silent(), seed=3,
+    )  # fmt: skip
+
+
+def test_the_python_call_is_the_loop(called, tmp_path):
+    assert [p["name"] for p in called.policies] == ["idealised", "difference"]
+    assert called.policy.act(np.zeros(3)).shape == (1,)
+    assert called.model.predict(np.zeros((1, 2)), np.zeros((1, 1))).shape == (1, 2)
+    assert len(repr(called)) < 200 and "<table" in called._repr_html_()
+    assert list(called.to_dataframe()["name"]) == ["idealised", "difference"]
+    assert called.plot().axes
+    page = called.report(tmp_path / "page.html")
     assert page == tmp_path / "page.html" and "closing the simulation gap" in page.read_text()
 
 
-def test_what_named_effects_named_is_told(tmp_path):
-    found = learn_by_difference(
-        SYSTEM.nominal, SYSTEM.true, SYSTEM.task, estimator=NamedEffects(), samples=40, updates=1,
-        steps=120, ddpg=DDPG, evaluation=SYSTEM.evaluation, progress=Silent(),
-    )  # fmt: skip
-    (record,) = found.accuracy
-    assert record["says"] == found.model.fitted().says_ and "mass" in record["says"]
-    page = found.report(tmp_path / "page.html").read_text()
+def test_what_named_effects_named_is_told(called, tmp_path):
+    (record,) = called.accuracy
+    assert record["says"] == called.model.fitted().says_ and "mass" in record["says"]
+    page = called.report(tmp_path / "page.html").read_text()
     assert record["says"] in page.replace("\u00a0", " ")
 
 
 def test_an_estimator_that_has_a_length_is_taken_as_well():
     """An ensemble of trees that is not fitted yet has no length, and asking for it raises."""
     trees = ExtraTreesRegressor(3, random_state=0)
-    found = learn_by_difference(
-        SYSTEM.nominal, SYSTEM.true, SYSTEM.task, estimator=trees, samples=40, updates=1,
-        steps=120, ddpg=DDPG, evaluation=SYSTEM.evaluation, progress=Silent(),
-    )  # fmt: skip
+    options = {"estimator": trees, "evaluation": SYSTEM.evaluation}
+    found = quickly(SYSTEM.nominal, SYSTEM.true, SYSTEM.task, **options)
     assert type(found.model.estimator).__name__ == "ExtraTreesRegressor"
 
 

@@ -21,10 +21,10 @@ TINY = [
     "--estimator", "residual.Linear",
     "--budget.true_samples", "60",
     "--budget.iterations", "1",
-    "--budget.idealised_steps", "600",
-    "--budget.difference_steps", "400",
+    "--budget.idealised_steps", "300",
+    "--budget.difference_steps", "250",
     "--ddpg.hidden", "[32, 32]",
-    "--ddpg.warm_up", "200",
+    "--ddpg.warm_up", "100",
 ]  # fmt: skip
 
 
@@ -126,6 +126,7 @@ def test_no_file_is_a_pickle(undisturbed):
             assert all(data[name].dtype != object for name in data)
 
 
+@pytest.mark.long  # tests/fuzz/soak.py does the same many times
 def test_a_study_killed_again_and_again_ends_with_the_same_results(tmp_path):
     random.seed(os.getpid())
     command = [*TINY, "--output", str(tmp_path / "run")]

@@ -152,8 +152,9 @@ def test_the_judge_finds_the_errors_that_the_keys_state(folder, nominal, repaire
 
 @needs_data
 @pytest.mark.parametrize("folder", [
-    "airtrack", "heater",
-    # Its names are asked of the same log in test_invariances.py.
+    "heater",
+    # Their names are asked of the same logs in test_invariances.py.
+    pytest.param("airtrack", marks=pytest.mark.long),
     pytest.param("phone-drop", marks=pytest.mark.long),
 ])  # fmt: skip
 def test_find_gap_names_what_the_key_names(folder, tmp_path):

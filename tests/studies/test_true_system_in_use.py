@@ -43,36 +43,37 @@ class Loose(Foreign):
 def test_what_was_trained_is_kept_if_the_robot_fails_in_a_test(tmp_path, monkeypatch):
     monkeypatch.setattr(Loose, "taken", 0)
     monkeypatch.setattr(Loose, "loose_at", 10)
-
-    def once():
-        return learn_by_difference(
-            PendulumEquation(), Loose, SwingUp(horizon=30), keep=tmp_path, **QUICK
-        )
-
     with pytest.raises(ValueError, match="no answer"):
-        once()
+        with_loose(tmp_path)
     (trained,) = [path for path in tmp_path.iterdir() if path.name.startswith("idealised-")]
     when = trained.stat().st_mtime_ns
-    learnt = once()
+    learnt = with_loose(tmp_path)
     assert trained.stat().st_mtime_ns == when
     assert [policy["name"] for policy in learnt.policies] == ["idealised", "difference"]
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """What is learnt of a robot that does not break off, its steps, and where it was kept."""
+    folder = tmp_path_factory.mktemp("whole")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Loose, "taken", 0)
+        patch.setattr(Loose, "loose_at", 0)
+        return with_loose(folder), Loose.taken, folder
+
+
+def with_loose(folder):
+    return learn_by_difference(PendulumEquation(), Loose, SwingUp(horizon=30), keep=folder, **QUICK)
+
+
 @pytest.mark.parametrize("loose_at", [1 + 45, 1 + 150 + 35, 1 + 150 + 60 + 150 + 40])
-def test_a_robot_that_breaks_off_costs_the_episode_at_hand(tmp_path, monkeypatch, loose_at):
-    monkeypatch.setattr(Loose, "taken", 0)
-
-    def once(folder):
-        options = {"keep": tmp_path / folder, **QUICK}
-        return learn_by_difference(PendulumEquation(), Loose, SwingUp(horizon=30), **options)
-
-    whole = once("whole")
-    needed = Loose.taken
+def test_a_robot_that_breaks_off_costs_the_episode_at_hand(whole, tmp_path, monkeypatch, loose_at):
+    whole, needed, kept = whole
     monkeypatch.setattr(Loose, "taken", 0)
     monkeypatch.setattr(Loose, "loose_at", loose_at)
     with pytest.raises(ValueError, match="no answer"):
-        once("broken")
-    broken = once("broken")
+        with_loose(tmp_path)
+    broken = with_loose(tmp_path)
     # The check that it steps at all comes again, and so does the episode at hand.
     assert Loose.taken - needed <= 1 + 30
     measured = [
@@ -86,8 +87,8 @@ def test_a_robot_that_breaks_off_costs_the_episode_at_hand(tmp_path, monkeypatch
         for one, other in zip(broken.runs, whole.runs, strict=True)
     )
     left = [
-        sorted(path.name.rsplit("-", 1)[0] for path in (tmp_path / name).iterdir())
-        for name in ("broken", "whole")
+        sorted(path.name.rsplit("-", 1)[0] for path in folder.iterdir())
+        for folder in (tmp_path, kept)
     ]
     assert left[0] == left[1] and "collect" in left[0] and "episode" not in left[0]
 

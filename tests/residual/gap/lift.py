@@ -1,5 +1,6 @@
 """Trips of a lift with a load of their own each, and friction of its guides."""
 
+import functools
 from typing import ClassVar
 
 import numpy as np
@@ -57,4 +58,7 @@ def trip(load, seed):
     return Trajectory(f"trip {seed}", 0.05 * np.arange(500.0), states, actions)
 
 
-TRIPS = [trip(load, 1 + i) for i, load in enumerate(LOADS)]
+@functools.cache
+def trips():
+    """A trip with each load."""
+    return [trip(load, 1 + i) for i, load in enumerate(LOADS)]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from held import path
 
 from residual.gap import find_gap
 from residual.gap.data.samples import Samples
@@ -40,18 +40,13 @@ def log(unit):
     """The shaft in rad as SciPy integrates it with a cogging that no simulator has."""
     rng = np.random.default_rng(4)
     drive = np.repeat(0.7 * rng.uniform(-1, 1, 24), 40)
-    rows, x = [np.zeros(2)], np.zeros(2)
-    for u in drive:
-        found = solve_ivp(
-            lambda _, x, u=u: [
-                x[1], GAIN * u - DAMPING * x[1] + SINE * math.sin(ORDER * x[0])
-            ],
-            (0.0, DT), x, rtol=1e-8, atol=1e-10,
-        )  # fmt: skip
-        x = found.y[:, -1]
-        rows.append(x)
-    states = np.array(rows) + rng.normal(0.0, [2e-3, 2e-2], (len(rows), 2))
-    times = np.arange(len(rows)) * DT
+
+    def moves(_, x, u):
+        return [x[1], GAIN * u - DAMPING * x[1] + SINE * math.sin(ORDER * x[0])]
+
+    states = path(moves, [0.0, 0.0], drive, DT, atol=1e-10)
+    states = states + rng.normal(0.0, [2e-3, 2e-2], states.shape)
+    times = np.arange(len(states)) * DT
     return Trajectory("run", times, states * TURNS[unit] / math.tau, drive[:, None])
 
 
@@ -78,7 +73,8 @@ def test_quarter_turns_are_those_of_the_unit():
 
 
 def test_the_answer_is_the_same_in_degrees():
-    found = {unit: find_gap(motor(unit)(), [log(unit)]) for unit in ("rad", "deg")}
+    offered = ("cogging", "viscous_friction", "coulomb_friction", "constant_load", "actuator_gain")
+    found = {unit: find_gap(motor(unit)(), [log(unit)], effects=offered) for unit in ("rad", "deg")}
     named = {
         unit: {v.effect: v for v in answer.verdicts if v.kind in ("confirmed", "minor")}
         for unit, answer in found.items()

@@ -1,8 +1,10 @@
 """An encoder with other counts per turn, by SciPy, and where only one of two sensors is off."""
 
+import functools
+
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from held import path
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
@@ -45,7 +47,7 @@ class Tank(FirstOrderSystem):
         return u - x
 
 
-def moves(t, x, push, pull):
+def moved(t, x, push, pull):
     return [x[1], push - 5.0 * x[1] - pull * np.sin(x[0])]
 
 
@@ -55,12 +57,9 @@ def logs(system, of_angle=1.0, of_speed=1.0, gain=1.0):
     runs = []
     for k in range(2):
         volts = np.repeat(system.level * rng.uniform(-1, 1, ROWS // HOLD + 1), HOLD)[:ROWS, None]
-        path = [np.zeros(2)]
-        for u in volts:
-            pushed = (8.0 * gain * u[0], system.pull)
-            step = solve_ivp(moves, (0.0, DT), path[-1], args=pushed, rtol=1e-9, atol=1e-10)
-            path.append(step.y[:, -1])
-        seen = np.array(path) * [of_angle, of_speed] + rng.normal(0, NOISE, (ROWS + 1, 2))
+        moves = functools.partial(moved, pull=system.pull)
+        states = path(moves, [0.0, 0.0], 8.0 * gain * volts[:, 0], DT, rtol=1e-9, atol=1e-10)
+        seen = states * [of_angle, of_speed] + rng.normal(0, NOISE, (ROWS + 1, 2))
         runs.append(Trajectory(f"run {k}", DT * np.arange(ROWS + 1), seen, volts))
     return runs
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from held import path
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
@@ -40,11 +40,8 @@ def log(conductance, wall, seed=0):
         flow = conductance * (x[0] - x[1])
         return [(watts - LOSS * (x[0] - ROOM) - flow) / CAPACITY, flow / wall]
 
-    states = [np.array([ROOM, ROOM])]
-    for watts in power:
-        done = solve_ivp(rates, (0, DT), states[-1], args=(watts,), rtol=1e-8)
-        states.append(done.y[:, -1])
-    air = np.array(states)[:, :1] + 0.3 * rng.standard_normal((len(states), 1))
+    air = path(rates, [ROOM, ROOM], power, DT)[:, :1]
+    air = air + 0.3 * rng.standard_normal(air.shape)
     return Trajectory("oven", DT * np.arange(len(air)), air, power[:, None])
 
 

@@ -82,7 +82,8 @@ def test_inputs_are_alike_if_everything_declared_of_them_is():
 
 
 def named(logs):
-    found = find_gap(Rover(), logs)
+    offered = ("delay", "actuator_gain", "actuator_lag", "saturation", "faster", "slower")
+    found = find_gap(Rover(), logs, effects=offered)
     assert found.adequate
     return {(v.effect, v.where): v for v in found.verdicts if v.kind in ("confirmed", "ambiguous")}
 

@@ -11,7 +11,7 @@ from sims.pendulum_equation import PendulumEquation
 
 RUNS, SWINGING, REST = 3, 60, 500
 #: Enough to be wrong with.
-OFFERED = ("viscous_friction", "coulomb_friction", "quadratic_drag", "mass", "sensor_offset")
+OFFERED = ("viscous_friction", "coulomb_friction", "mass")
 
 
 def kicked_and_left_alone(load: float) -> list[Trajectory]:

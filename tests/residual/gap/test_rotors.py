@@ -28,7 +28,7 @@ class Arm(EquationOfMotion):
     """Two links in a vertical plane with masses at their ends, motors without inertia."""
 
     dt = DT
-    substeps = 4
+    substeps = 2
     state_channels = (*joint("shoulder"), *joint("elbow"))
     action_channels = (
         Channel("shoulder torque", "N m", "input", scale=3.0),
@@ -80,9 +80,12 @@ def measured(rotors, seed, rows=500):
     return Trajectory(f"run {seed}", DT * np.arange(rows), np.array(states), np.array(torques[:-1]))
 
 
-@pytest.mark.parametrize("rotors", [(0.0, 0.02), (0.15, 0.03)])
+@pytest.mark.parametrize(
+    "rotors", [pytest.param((0.0, 0.02), marks=pytest.mark.long), (0.15, 0.03)]
+)
 def test_the_inertia_of_rotors_is_named_and_no_mass_or_length_for_it(rotors):
-    found = find_gap(Arm(), [measured(rotors, seed) for seed in range(4)])
+    offered = ("added_inertia", "viscous_friction", "delay", "upper", "lower", "first", "second")
+    found = find_gap(Arm(), [measured(rotors, seed) for seed in range(3)], effects=offered)
     named = {v.label: v for v in found.verdicts if v.kind == "confirmed"}
     names = ["added_inertia@shoulder", "added_inertia@elbow"]
     assert set(named) == {name for name, inertia in zip(names, rotors, strict=True) if inertia}

@@ -13,6 +13,8 @@ from sims.effects import ActuatorLag, Delay
 from studies.gap import lead
 
 ROWS, HOLD, STEP = 400, 10, 5.0
+#: What made up for rows that were read late, and what is there.
+OFFERED = ("actuator_gain", "slow", "second_store", "delay", "actuator_lag")
 
 
 def record(late, seed=0, weak=0.8, follows=0.0):
@@ -41,7 +43,7 @@ def told(result):
 def test_a_weak_heater_is_all_that_is_named(late):
     """Read a row late, time constant and store made up for it, and were certain."""
     held = record(late, seed=1)
-    result = find_gap(Oven(), [record(late)], held_out=[held])
+    result = find_gap(Oven(), [record(late)], held_out=[held], effects=OFFERED)
     assert told(result) == late
     (named,) = (v for v in result.verdicts if v.parameters)
     assert (named.kind, named.effect) == ("confirmed", "actuator_gain")

@@ -44,7 +44,8 @@ def heated(lag, rise, rows=260, seed=0):
 
 def test_a_step_from_rest_is_asked_with_lags_beside_what_was_not_chosen():
     """Taken to have gone on before, it leads to a delay and twice the time constant."""
-    result = find_gap(Block(), heated(26.0, 1100.0))
+    offered = ("actuator_lag", "delay", "actuator_gain", "rise", "time_constant", "constant_load")
+    result = find_gap(Block(), heated(26.0, 1100.0), effects=offered)
     named = {verdict.effect: verdict for verdict in result.verdicts if verdict.parameters}
     lag = named["actuator_lag"].parameters["time_constant"]
     assert lag.value == pytest.approx(26.0, abs=1.5)
@@ -80,7 +81,8 @@ def test_when_an_input_came_on_that_never_changes_is_not_certain():
     times = 0.02 * np.arange(300)
     speeds = 24.0 * (1 - np.exp(-np.maximum(times - 0.1, 0.0) / 0.2))
     records = [wheel(speeds * share, np.full(300, share), k) for k, share in enumerate((0.5, 1.0))]
-    result = find_gap(Wheel(), records)
+    offered = ("delay", "actuator_lag", "actuator_gain", "full_speed", "time_constant")
+    result = find_gap(Wheel(), records, effects=offered)
     timed = [v for v in result.verdicts if v.effect == "delay"]
     assert all(v.kind != "confirmed" for v in timed)
     assert timed and all("clock" in v.doubts for v in timed if v.kind == "ambiguous")

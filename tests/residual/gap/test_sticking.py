@@ -98,7 +98,10 @@ def test_forecasts_of_parts_tell_breakaway_from_twice_the_friction(breakaway, se
     assert misses[0] + np.log(9) < misses[1:].min()
 
 
-@pytest.mark.parametrize(("breakaway", "seed"), [(90.0, 41), (110.0, 42), (90.0, 43)])
+@pytest.mark.parametrize(
+    ("breakaway", "seed"),
+    [(90.0, 41), (110.0, 42), pytest.param(90.0, 43, marks=pytest.mark.long)],
+)
 def test_friction_that_slopes_miss_is_found(breakaway, seed):
     prepared, model = ready(breakaway, seed)
     fitter = prepared.fitter

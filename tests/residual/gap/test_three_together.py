@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from held import path
 
 from residual.gap import find_gap
 from residual.gap.model.candidates import candidates
@@ -45,16 +45,14 @@ def levels(seed):
     """Random steps of the pump, by SciPy, with noise; the lower tank leaks a bit."""
     rng = np.random.default_rng(seed)
     pump = np.repeat(rng.uniform(0.6, 3.0, 30), 7)
-    states = [np.array([2.0, 2.0])]
 
     def rate(t, x, u):
         out = UPPER * np.sqrt(max(x[0], 0.0))
         leak = 0.0015 * x[1]  # What no simulator has all of.
         return [0.05 * u + INFLOW - out, out - LOWER * np.sqrt(max(x[1], 0.0)) - leak + 0.002]
 
-    for u in pump:
-        states.append(solve_ivp(rate, (0, DT), states[-1], args=(u,), rtol=1e-8).y[:, -1])
-    seen = np.array(states) + rng.normal(0, 0.004, (len(states), 2))
+    states = path(rate, [2.0, 2.0], pump, DT)
+    seen = states + rng.normal(0, 0.004, states.shape)
     return Trajectory(f"run {seed}", DT * np.arange(len(seen)), seen, pump[:, None])
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
+import pytest
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
@@ -54,6 +55,7 @@ def records(rows=400, count=2):
     return found
 
 
+@pytest.mark.long
 def test_a_curve_that_turns_commands_round_is_told_and_not_certain():
     answer = find_gap(Battery(), records(), minutes=4)
     named = {verdict.label: verdict for verdict in answer.verdicts if verdict.parameters}

@@ -45,7 +45,8 @@ def test_a_sign_that_is_wrong_beside_a_spring_that_is_missing():
         states = true.rollout([0.2, 0.0], torque)
         states += np.array([5e-4, 0.01]) * rng.standard_normal(states.shape)
         runs.append(Trajectory(f"run {seed}", 0.01 * np.arange(len(states)), states, torque))
-    found = find_gap(Gimbal(), runs)
+    offered = ("linear_spring", "constant_load", "inertia", "unbalance", "damping")
+    found = find_gap(Gimbal(), runs, effects=offered)
     named = {v.effect: v for v in found.verdicts if v.kind in ("confirmed", "ambiguous")}
     assert set(named) == {"linear_spring", "unbalance"}
     turned = named["unbalance"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from held import path
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
@@ -45,11 +45,8 @@ def log(conductance, seed=0):
         light = POWER * percent - LOSS * (x[0] - ROOM) - flow
         return [light / LIGHT, (flow - LOSS * (x[1] - ROOM)) / HEAVY]
 
-    states = [np.array([ROOM, ROOM])]
-    for percent in steps:
-        done = solve_ivp(rates, (0, DT), states[-1], args=(percent,), rtol=1e-8)
-        states.append(done.y[:, -1])
-    seen = np.array(states) + 0.05 * rng.standard_normal((len(states), 2))
+    states = path(rates, [ROOM, ROOM], steps, DT)
+    seen = states + 0.05 * rng.standard_normal(states.shape)
     return Trajectory("bodies", times, seen, steps[:, None])
 
 
@@ -61,4 +58,7 @@ def test_an_exchange_is_named_with_both_rates(conductance):
     for field, capacity in (("into_first", LIGHT), ("into_second", HEAVY)):
         number = named.parameters[field]
         assert number.low <= conductance / capacity <= number.high
+
+
+def test_without_an_exchange_none_is_named():
     assert not any(v.effect == "exchange" for v in find_gap(Apart(), [log(0.0)]).verdicts)

@@ -1,7 +1,10 @@
 """States that nobody measured: their start is free in every window, and they are no noise."""
 
+import functools
+
 import numpy as np
 import pytest
+from held import path
 from scipy.integrate import solve_ivp
 
 from residual.gap import find_gap
@@ -34,17 +37,14 @@ def levels(outlet, n=400, seed=0):
     """The lower level alone, integrated by SciPy; the log begins with water in both tanks."""
     rng = np.random.default_rng(seed)
     pump = np.repeat(rng.uniform(2.0, 4.0, n // 8), 8)
-    state, seen = np.array([5.0, 6.0]), np.full((n + 1, 2), np.nan)
-    for k in range(n + 1):
-        seen[k, 1] = state[1] + rng.normal(0, NOISE)
-        if k < n:
-            flow = solve_ivp(
-                lambda _, x, u: [
-                    0.05 * (u - np.sqrt(x[0])), 0.05 * np.sqrt(x[0]) - outlet * np.sqrt(x[1])
-                ],
-                (0, 4.0), state, args=(pump[k],), rtol=1e-8, atol=1e-8,
-            )  # fmt: skip
-            state = flow.y[:, -1]
+    states = path(
+        lambda _, x, u: [
+            0.05 * (u - np.sqrt(x[0])), 0.05 * np.sqrt(x[0]) - outlet * np.sqrt(x[1])
+        ],
+        [5.0, 6.0], pump, 4.0, atol=1e-8,
+    )  # fmt: skip
+    seen = np.full((n + 1, 2), np.nan)
+    seen[:, 1] = states[:, 1] + rng.normal(0, NOISE, n + 1)
     return Trajectory("tanks", 4.0 * np.arange(n + 1), seen, pump[:, None])
 
 
@@ -67,30 +67,36 @@ def gyro(n=1200, seed=0):
     """Rates alone, integrated by SciPy."""
     rng = np.random.default_rng(seed)
     times = 0.02 * np.arange(n + 1)
-    path = solve_ivp(
+    swing = solve_ivp(
         lambda _, x: [x[1], -9.81 / 0.5 * np.sin(x[0])],
         (0, times[-1]), [1.2, 0.0], t_eval=times, rtol=1e-9, atol=1e-9,
     ).y.T  # fmt: skip
-    seen = np.column_stack([np.full(n + 1, np.nan), path[:, 1] + rng.normal(0, NOISE, n + 1)])
+    seen = np.column_stack([np.full(n + 1, np.nan), swing[:, 1] + rng.normal(0, NOISE, n + 1)])
     return Trajectory("gyro", times, seen, np.zeros((n, 0)))
 
 
 @pytest.mark.parametrize(
-    ("simulator", "run", "horizon"), [(Tanks(), levels(0.05), 80.0), (Swing(), gyro(), 0.5)]
+    ("simulator", "log", "horizon"),
+    [(Tanks(), functools.partial(levels, 0.05), 80.0), (Swing(), gyro, 0.5)],
 )
-def test_noise_is_found_beside_a_state_that_nobody_measured(simulator, run, horizon):
-    (sigma,) = prepare(simulator, [run], horizon).floor.sigma
+def test_noise_is_found_beside_a_state_that_nobody_measured(simulator, log, horizon):
+    (sigma,) = prepare(simulator, [log()], horizon).floor.sigma
     assert 0.7 * NOISE < sigma < 1.6 * NOISE
 
 
+#: Enough to be wrong with.
+OFFERED = ("outlet", "proportional_loss", "constant_load", "actuator_gain", "delay")
+
+
 def test_a_right_simulator_has_no_gap_although_a_level_was_not_measured():
-    found = find_gap(Tanks(), [levels(0.05)], horizon=80.0, minutes=1, parameter_tolerance=0)
+    options = {"effects": OFFERED, "horizon": 80.0, "parameter_tolerance": 0}
+    found = find_gap(Tanks(), [levels(0.05)], **options)
     assert {v.kind for v in found.verdicts} <= {"no_gap", "needs_data"}
     assert found.gap.before.value < 3 * NOISE
 
 
 def test_a_wrong_outlet_is_named_below_a_tank_without_a_sensor():
-    found = find_gap(Tanks(), [levels(0.06)], horizon=80.0, minutes=1)
+    found = find_gap(Tanks(), [levels(0.06)], effects=OFFERED, horizon=80.0)
     first = found.verdicts[0]
     assert "outlet" in {first.effect, *first.same_motion}
     assert first.parameters["change"].value == pytest.approx(0.01, rel=0.2)
@@ -120,11 +126,11 @@ def rubbing(_, x, volts):
 
 def test_friction_of_a_speed_without_a_sensor_is_found_in_the_current():
     rng = np.random.default_rng(0)
-    volts, state, seen = np.repeat(rng.uniform(-6, 6, 16), 50), np.zeros(2), []
-    for u in volts:
-        seen.append([np.nan, state[1] + rng.normal(0, 0.005)])
-        state = solve_ivp(rubbing, (0, 0.01), state, args=(u,), rtol=1e-7, atol=1e-7).y[:, -1]
-    log = Trajectory("log", 0.01 * np.arange(len(seen)), np.array(seen), volts[:-1, None])
+    volts = np.repeat(rng.uniform(-6, 6, 16), 50)
+    seen = path(rubbing, [0.0, 0.0], volts[:-1], 0.01, rtol=1e-7, atol=1e-7)
+    seen[:, 0] = np.nan
+    seen[:, 1] += rng.normal(0, 0.005, len(seen))
+    log = Trajectory("log", 0.01 * np.arange(len(seen)), seen, volts[:-1, None])
     offered = ["coulomb_friction", "viscous_friction", "actuator_gain", "constant", "constant_load"]
     first = find_gap(Motor(), [log], effects=offered).verdicts[0]
     assert (first.effect, first.where) == ("coulomb_friction", "speed")

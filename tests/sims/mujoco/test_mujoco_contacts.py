@@ -94,7 +94,7 @@ def test_a_gap_of_a_motion_that_touches_nothing_is_found_as_of_one_without_conta
     simulator = lift(tmp_path)
     true = simulator.with_effects([AttributeChange("damping of joint lift", change=1.0)])
     assert true.has_contacts
-    runs = [log(true)]
+    runs = [log(true, seconds=4.0)]
     named = find_gap(simulator, runs, effects=["damping of joint lift"], parameter_tolerance=0)
     assert not named.corrected.has_contacts
     (verdict,) = named.verdicts

@@ -14,7 +14,7 @@ from studies.gap.files import gap_record
 from studies.gap.summary import summary
 
 #: What may be missing.
-ASKED = ("mass", "stiffness", "damping", "coulomb_friction", "cubic_spring", "actuator_gain")
+ASKED = ("mass", "stiffness", "damping", "coulomb_friction")
 
 
 def ask(*records):

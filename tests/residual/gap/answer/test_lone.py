@@ -18,7 +18,7 @@ from studies.hidden.data import Truth, make_logs
 
 MIDDLE, LONG = 125, 50
 #: What is hidden among others.
-OFFERED = ("sensor_offset", "mass", "coulomb_friction", "viscous_friction", "delay")
+OFFERED = ("sensor_offset", "mass", "coulomb_friction")
 
 
 def ask(logs):

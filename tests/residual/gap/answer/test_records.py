@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from lift import LOADS, TRIPS, Lift
+from lift import LOADS, Lift, trips
 from lift import OFFERED as OFFERED_LIFT
 
 from residual.gap import find_gap
@@ -75,10 +75,10 @@ def test_records_that_agree_are_not_said_to_differ(truth):
 
 def test_loads_of_a_lift_are_told_in_place_of_what_makes_the_best_of_them():
     """One size for all leads to a dead zone and another counterweight."""
-    found = find_gap(Lift(), TRIPS, effects=OFFERED_LIFT, horizon=1.5)
+    found = find_gap(Lift(), trips(), effects=OFFERED_LIFT, horizon=1.5)
     first = found.unlike[0]
     assert first.label == "cabin" and first.instead
-    sizes = [first.sizes[run.name] for run in TRIPS]
+    sizes = [first.sizes[run.name] for run in trips()]
     assert np.allclose(sizes, LOADS, atol=50.0)
     assert not [v.effect for v in found.verdicts if v.kind == "confirmed"]
     assert "records" in found.verdicts[0].doubts

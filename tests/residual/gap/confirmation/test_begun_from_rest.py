@@ -21,7 +21,7 @@ def told(found):
     return [one.says for one in found.quality if "taken to be rest" in one.says]
 
 
-OFFERED = ("actuator_lag", "delay", "actuator_gain", "constant_load", "slow")
+OFFERED = ("actuator_lag", "delay", "actuator_gain", "slow")
 TESTS = [steps(s, [duty], 0.0, hold=120) for s, duty in enumerate((0.4, 0.8, 0.6, 1.0))]
 
 

@@ -74,7 +74,7 @@ def rubbed(seed, begin, end, n=600):
 
 @pytest.mark.parametrize(("begin", "end"), [(40.0, 14.0), (25.0, 25.0)])
 def test_friction_that_falls_as_it_warms_is_told_with_where_it_begins_and_ends(begin, end):
-    asked = ("coulomb_friction", "viscous_friction", "constant_load", "actuator_gain", "dead_zone")
+    asked = ("coulomb_friction", "viscous_friction", "actuator_gain")
     found = find_gap(Wheel(), [rubbed(seed, begin, end) for seed in (0, 1)], effects=asked)
     (friction,) = [v for v in found.verdicts if v.effect == "coulomb_friction"]
     (level,) = friction.parameters.values()

@@ -128,7 +128,7 @@ def test_a_clean_log_has_no_findings():
 @pytest.mark.parametrize("excitation", ["strong", "weak", "policy"])
 def test_logs_of_known_truth_have_no_findings(truth, excitation):
     for noise in ("A", "C"):
-        assert findings(PendulumEquation(), make_logs(truth, 1, excitation, noise, 2, 100)) == []
+        assert findings(PendulumEquation(), make_logs(truth, 1, excitation, noise, 2, 60)) == []
 
 
 def test_an_input_beyond_its_bounds_is_told_and_one_in_mV_refused():

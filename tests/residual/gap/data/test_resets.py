@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from residual.gap import find_gap
@@ -121,6 +121,7 @@ def joined(parts):
 
 
 @given(seed=st.integers(0, 99), second=st.floats(-1.0, 1.0))
+@settings(max_examples=25)
 def test_a_state_that_the_simulator_does_not_move_so_fast_begins_anew(seed, second):
     first = heated(seed, 20.0)
     runs, findings = cut_at_resets(Kettle(), [joined([first])])

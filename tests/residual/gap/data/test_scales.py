@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from held import path
 
 from residual.gap import find_gap
 from residual.gap.data.scales import in_measured_scales
@@ -52,17 +52,14 @@ class Kettle(FirstOrderSystem):
 def record(seed):
     """Steps of voltage, and what SciPy integrates with a drag that no simulator has."""
     rng = np.random.default_rng(seed)
-    volts, x = np.repeat(rng.uniform(-8.0, 8.0, 25), 20), np.zeros(2)
-    rows = [x]
-    for u in volts:
-        path = solve_ivp(
-            lambda _, x, u=u: [x[1], (GAIN * u - x[1]) / LAG - DRAG * x[1] * abs(x[1])],
-            (0.0, DT), x, rtol=1e-8, atol=1e-8,
-        )  # fmt: skip
-        x = path.y[:, -1]
-        rows.append(x)
-    states = np.array(rows) + rng.normal(0.0, [0.1, 2.0], (len(rows), 2))
-    return Trajectory(f"run {seed}", DT * np.arange(len(rows)), states, volts[:, None])
+    volts = np.repeat(rng.uniform(-8.0, 8.0, 25), 20)
+
+    def moves(_, x, u):
+        return [x[1], (GAIN * u - x[1]) / LAG - DRAG * x[1] * abs(x[1])]
+
+    states = path(moves, [0.0, 0.0], volts, DT, atol=1e-8)
+    states = states + rng.normal(0.0, [0.1, 2.0], states.shape)
+    return Trajectory(f"run {seed}", DT * np.arange(len(states)), states, volts[:, None])
 
 
 def scales(simulator):

@@ -98,7 +98,8 @@ def shaft(orders):
 def test_several_orders_together_are_not_certain():
     """They fit whatever follows the position, as a wind or a path of its own does."""
     for orders, kind in (((3,), "confirmed"), ((3, 5), "ambiguous")):
-        found = find_gap(Free(), [shaft(orders)])
+        offered = ("cogging", "viscous_friction", "coulomb_friction", "unbalance", "actuator_gain")
+        found = find_gap(Free(), [shaft(orders)], effects=offered)
         named = [v for v in found.verdicts if v.effect == "cogging" and v.parameters]
         assert {v.shape["order"] for v in named} == set(orders)
         assert {v.kind for v in named} == {kind}

@@ -57,7 +57,9 @@ def run(seed, coupling=None, noise=NOISE, hold=1, n=1500):
 
 
 def test_a_vibration_between_the_rows_is_no_noise():
-    found = find_gap(Gantry(), [run(seed, (1600.0, 6.0)) for seed in (0, 1)])
+    runs = [run(seed, (1600.0, 6.0)) for seed in (0, 1)]
+    offered = ("mass", "damping", "delay", "actuator_lag", "coulomb_friction", "flexible_part")
+    found = find_gap(Gantry(), runs, effects=offered)
     (sigma, _) = found.noise["x"]
     assert NOISE / 2 < sigma < 3 * NOISE
     assert found.gap.before.value > 10 * sigma
@@ -70,5 +72,6 @@ def test_a_vibration_between_the_rows_is_no_noise():
 
 
 def test_noise_of_a_slow_sensor_is_not_read_between_its_readings():
-    (sigma, _) = find_gap(Gantry(), [run(seed, noise=0.01, hold=16) for seed in (0, 1)]).noise["x"]
+    runs = [run(seed, noise=0.01, hold=16) for seed in (0, 1)]
+    (sigma, _) = find_gap(Gantry(), runs, effects=["mass", "damping"]).noise["x"]
     assert sigma > 0.005

@@ -63,7 +63,8 @@ def test_its_friction_is_all_that_is_found():
         run = record(seed)
         noise = SIGMA * np.random.default_rng(seed).standard_normal(run.states.shape)
         runs.append(dataclasses.replace(run, states=run.states + noise))
-    found = find_gap(Stage(), runs)
+    offered = ("mass", "coulomb_friction", "viscous_friction")
+    found = find_gap(Stage(), runs, effects=offered)
     (named,) = [v for v in found.verdicts if v.kind != "needs_data"]
     assert (named.kind, named.effect) == ("confirmed", "coulomb_friction")
     level = named.parameters["level"]

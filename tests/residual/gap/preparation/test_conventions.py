@@ -114,7 +114,7 @@ def test_zeros_on_which_nothing_depends_are_no_other_convention():
 @pytest.mark.parametrize("factor", [-1.0, 1000.0])
 def test_nothing_is_certain_before_it_is_seen_how_the_log_counts(factor):
     run = log((CoulombFriction("pivot", 0.003),))
-    offered = ["mass", "coulomb_friction@pivot"]
+    offered = ["coulomb_friction@pivot"]
     wrong = dataclasses.replace(run, actions=factor * run.actions)
     free = dataclasses.replace(PendulumEquation.action_channels[0], low=-np.inf, high=np.inf)
     simulator = PendulumEquation(dt=0.02)

@@ -15,7 +15,7 @@ from sims.simulator import Channel, Parameter
 
 #: Truth: speed of a count, time constant, and friction in counts of the command and rad/s.
 GAIN, LAG, SLIDING, BREAKAWAY, SPEED = 0.42, 0.2, 60.0, 110.0, 3.0
-DT, SECONDS, TOP = 0.02, 16.0, 255.0
+DT, SECONDS, TOP = 0.02, 12.0, 255.0
 
 
 class Motor(FirstOrderSystem):
@@ -51,9 +51,7 @@ def ramps(fine: int = 100) -> Trajectory:
 
 
 #: Enough to be wrong with.
-OFFERED = (
-    "stribeck_friction", "coulomb_friction", "viscous_friction", "gain", "time_constant",
-)  # fmt: skip
+OFFERED = ("stribeck_friction", "coulomb_friction", "gain", "time_constant")
 
 
 @pytest.fixture(scope="module")
