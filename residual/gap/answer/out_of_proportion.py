@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.fitting.plausible import ratios
+from residual.gap.fitting.plausible import ratios, stands_still
 from residual.gap.search.comparisons import takes_off
 from residual.gap.search.sets import Key
 
 #: Error over that of what was named up to which a single number does as much.
 AS_MUCH = 1.1
+#: Largest factor between a parameter and its nominal value that a slip in a unit makes.
+FARTHEST = 1000.0
 
 
 def out_of_proportion(answer: Answer) -> str:
@@ -42,9 +44,9 @@ def out_of_proportion(answer: Answer) -> str:
     for one in sorted(found, key=search.error):
         fit = search.tried[one]
         told = ratios(fit.model.bind(fit.theta), fit.model.added(fit.theta))
-        if not told or min(told.values()) <= 0:
-            continue
-        (ratio,) = told.values()
+        ratio = next(iter(told.values()), 0.0)
+        if not 1 / FARTHEST <= ratio <= FARTHEST or stands_still(fit, search.fitter):
+            continue  # it only switches something off
         after = search.validated[one].squares
         taken = search.currency.share(before, after, np.random.default_rng(0))[0]
         name = search.candidates[one[0]].label.replace("_", " ")
