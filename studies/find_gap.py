@@ -144,6 +144,8 @@ def run(
     effects = chosen_effects(simulator, chosen.effects)
     check_output(output)
     logs, held_out = matching(chosen.logs), matching(chosen.held_out or [])
+    # A pattern may match other files another day.
+    config |= {"logs": logs, "held_out": held_out or plain["held_out"]}
     # In whatever order the files come, not one digit of the answer changes.
     data = read(simulator, sorted(logs), study.columns)
     held = apart(simulator, logs, held_out, study.columns)
