@@ -61,7 +61,6 @@ def words_of(page):
     return page.read_text().replace("\N{NO-BREAK SPACE}", " ")
 
 
-@pytest.mark.long
 def test_a_first_try_confirms_the_mass_with_default_options(tmp_path):
     make_log(["--output", str(tmp_path / "logs"), "--runs", "8"])
     logs = sorted((tmp_path / "logs").glob("*.csv"))

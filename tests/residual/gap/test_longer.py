@@ -82,13 +82,16 @@ def verdict(seed, push):
     return found, found.verdicts[0].kind
 
 
-@pytest.mark.parametrize("seed", range(2))
+SEEDS = [0, 1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_slow_error_beneath_rough_readings_is_a_gap(seed):
     """Over the usual length noise hides a push that carries the ball off."""
     found, kind = verdict(seed, push=0.06)
     assert kind != "no_gap" and found.gap.before.value > 5 * found.gap.noise_floor.value
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_rough_readings_alone_are_none(seed):
     assert verdict(seed, push=0.0)[1] in ("no_gap", "needs_data")
