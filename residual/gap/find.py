@@ -174,7 +174,7 @@ def find_gap(
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
     says = [*log.left_out, *other, *on_hold, *read.says, *on_rest, *on_more, *known.says]
     says += [*_searched(answer.found.search.fitter), *inquiry.untried(answer)]
-    says += [one for one in (out_of_proportion(answer),) if one]
+    says += out_of_proportion(answer)
     quality = (*log.findings, *(Finding("search", "", one) for one in says))
     result = told(answer, table, judged.table, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)

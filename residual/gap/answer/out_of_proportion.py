@@ -15,7 +15,7 @@ AS_MUCH = 1.1
 FARTHEST = 1000.0
 
 
-def out_of_proportion(answer: Answer) -> str:
+def out_of_proportion(answer: Answer) -> list[str]:
     """A sentence on the parameter that would do as much alone at a value that nobody believes; none
     if there is none, or something was named for certain.
 
@@ -27,7 +27,7 @@ def out_of_proportion(answer: Answer) -> str:
     """
     search, key = answer.found.search, answer.key
     if any(claim.sure for claim in answer.claims):
-        return ""
+        return []
     before = search.before.squares
     most = AS_MUCH * search.error(key) if key else 1.0
 
@@ -51,8 +51,8 @@ def out_of_proportion(answer: Answer) -> str:
         taken = search.currency.share(before, after, np.random.default_rng(0))[0]
         name = search.candidates[one[0]].label.replace("_", " ")
         beside = ", as much as what is named" if key else ""
-        return (
+        return [
             f"{name} at {ratio:.2g} times its nominal value would take {taken:.0%} of the gap alone"
             f"{beside}: see whether the simulator has it right"
-        )
-    return ""
+        ]
+    return []
