@@ -20,7 +20,7 @@ from residual.gap.answer.verdicts import (
 from residual.gap.beside import Blind
 from residual.gap.confirmation.aliases import hidden
 from residual.gap.confirmation.certainty import TOO_FEW, share
-from residual.gap.fitting.forecasts import fitted_floor, noise_floor
+from residual.gap.fitting.forecasts import fitted_floor
 from residual.gap.result import Gap, GapResult, Verdict
 from residual.gap.search.comparisons import helps, material
 from residual.gap.search.explain import FOOTNOTE
@@ -38,8 +38,10 @@ PARTED = 2.0
 def summed_up(answer: Answer) -> Gap:
     """The table of errors."""
     found, search = answer.found, answer.found.search
-    by_noise = fitted_floor if search.simulator.has_contacts else noise_floor
-    floor = by_noise(search.fitter, search.tried[answer.key], found.floor.sigma)
+    if search.simulator.has_contacts:
+        floor = fitted_floor(search.fitter, search.tried[answer.key], found.floor.sigma)
+    else:
+        floor = found.by_noise(answer.key)
     order = [claim.number for claim in answer.claims]
     return gap(search, answer.key, order, floor, (found.nominal_left.ratio, answer.left.ratio))
 

@@ -38,6 +38,7 @@ DOUBTS: dict[Doubt, str] = {
     "may_be_zero": "its interval holds zero, or nearly",
     "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
     "calibration": "parameters that are a few percent off would do nearly as well",
+    "within": "it may be off by no more than the few percent that are allowed to every parameter",
     "slight": "without it errors are less than 1.5 times as large, and what has no name may favour "
     "it by as much",
     "few_blocks": "much has no name, and there are too few blocks of data to say that it is not "
@@ -64,6 +65,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "numerics": not claim.sound,
         "at_bound": claim.bounded,
         "calibration": claim.calibration and not claim.slight,
+        "within": claim.within and not claim.calibration,
         "slight": claim.slight,
         "no_time": claim.unasked,
         "clock": claim.brief,

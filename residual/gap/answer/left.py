@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.free_parameters import better
-from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.search.sets import Key
 from sims.effects.base import Effect
@@ -42,7 +41,7 @@ def much_is_left(answer: Answer) -> bool:
 def beside_noise(answer: Answer, key: Key) -> tuple[float, float]:
     """Squared forecast error of a set, and what noise alone makes."""
     search = answer.found.search
-    by_noise = noise_floor(search.fitter, search.tried[key], answer.found.floor.sigma)
+    by_noise = answer.found.by_noise(key)
     squares = search.validated[key].squares, by_noise
     left, least = (search.currency.error(one) ** 2 for one in squares)
     return left, least

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from residual.gap.answer.confirmed import Answer
 from residual.gap.data.blocks import ENOUGH, Blocks
 from residual.gap.fitting.contract import Fitter
-from residual.gap.fitting.forecasts import main_channel, noise_floor
+from residual.gap.fitting.forecasts import main_channel
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.fitting.validation import by_block
 from residual.gap.search.comparisons import takes_off
@@ -132,8 +132,7 @@ def off_stretch(answer: Answer) -> str:
     next to nothing; none if there is none, or something was named."""
     if answer.key or not _many_blocks(answer):
         return ""
-    search, floor = answer.found.search, answer.found.floor
-    alone = noise_floor(search.fitter, search.tried[()], floor.sigma)
+    search, alone = answer.found.search, answer.found.by_noise(())
     measured, squares = search.fitter.samples.measured, search.before.squares
     main = main_channel(search.simulator, measured, squares, alone)
     times = np.sqrt(squares[:, main] / np.maximum(alone[:, main], 1e-300))

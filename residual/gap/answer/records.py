@@ -18,7 +18,6 @@ from residual.gap.beside import Unlike
 from residual.gap.confirmation.claim import Claim
 from residual.gap.fitting.bounded import bounded_step
 from residual.gap.fitting.contract import Fit
-from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.screening import beside_starts, constrained, flatten, trials
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.fitting.validation import by_block, validate
@@ -59,7 +58,7 @@ def unlike(answer: Answer) -> tuple[Unlike, ...]:
     names, group = _records(fitter)
     if len(names) < 2 or answer.left.adequate:
         return ()
-    noise = noise_floor(fitter, search.tried[key], answer.found.floor.sigma)
+    noise = answer.found.by_noise(key)
     found = [
         _asked(search, key, base, number, names, group, noise)
         # One size for all may have led to effects that only make the best of it.

@@ -41,6 +41,7 @@ class Claim:
         share: Part of the nominal squared error that it takes off, with a 95 % interval.
         calibration: Whether forecasts are nearly as good without it if parameters of the simulator
             are free within their tolerance.
+        within: Whether it may be a parameter, gain or scale off by no more than its tolerance.
         slight: Whether they are without these, too: the parameters do nothing of its work.
         unasked: Whether there was no time to ask that.
         brief: Whether it is a time too short for the log's own clock.
@@ -74,6 +75,7 @@ class Claim:
     bounded: bool
     share: tuple[float, float, float]
     calibration: bool = False
+    within: bool = False
     slight: bool = False
     unasked: bool = False
     brief: bool = False
@@ -111,6 +113,7 @@ class Claim:
         against = (
             self.bounded,
             self.calibration,
+            self.within,
             self.brief,
             self.sensor,
             self.counted,

@@ -134,9 +134,10 @@ def allow_for_parameters(
         own = np.flatnonzero(beside.fit.model.owner == key.index(claim.number))
         sizes = own[search.candidates[claim.number].linear]
         lost = bool(sizes.size) and not (np.abs(beside.fit.theta) > half)[sizes].any()
-        if (lost and not claim.there) or within(search, claim, tolerance, adequate):
+        if lost and not claim.there:
             claim = dataclasses.replace(claim, calibration=True, slight=False)
-        final.append(claim)
+        small = within(search, claim, tolerance, adequate)
+        final.append(dataclasses.replace(claim, within=small))
     return final
 
 

@@ -62,6 +62,7 @@ class Explanation:
         nominal_left: What the nominal simulator leaves.
         floor: Noise around the chosen set.
         needed: Fall of the cost that earns a name where only noise is left; infinite elsewhere.
+        floors: What was worked out by ``by_noise``.
     """
 
     search: Search
@@ -70,6 +71,15 @@ class Explanation:
     nominal_left: Left
     floor: Noise
     needed: float
+    floors: dict[Key, Array] = dataclasses.field(default_factory=dict, repr=False)
+
+    def by_noise(self, key: Key) -> Array:
+        """Mean squared errors of blocks if a set of effects were the truth, see ``noise_floor``."""
+        if key not in self.floors:
+            self.floors[key] = noise_floor(
+                self.search.fitter, self.search.tried[key], self.floor.sigma
+            )
+        return self.floors[key]
 
     @property
     def key(self) -> Key:

@@ -182,6 +182,7 @@ def test_only_what_leaves_no_doubt_is_confirmed():
         "at_bound": {"bounded": True},
         "share_may_be_zero": {"share": (0.35, -0.3, 0.7)},
         "calibration": {"calibration": True},
+        "within": {"within": True},
         "slight": {"calibration": True, "slight": True},
         "rivals": {"rivals": ("constant_load@pivot",)},
     }.items():
