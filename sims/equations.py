@@ -99,8 +99,8 @@ class EquationOfMotion(_Equations):
     takes = ("q", "v", "u", "force", "p")
 
     def _own_joints(self) -> tuple[Joint, ...]:
-        rates = [channel for channel in self.state_channels if channel.kind == "rate"]
-        joints = tuple(joint_of(rate, self.state_channels) for rate in rates)
+        rates = [channel for channel in self.physical_channels if channel.kind == "rate"]
+        joints = tuple(joint_of(rate, self.physical_channels) for rate in rates)
         values = [{n: k * np.mean(p.value) for n, p in self.parameters.items()} for k in (1, 1.1)]
         added = [
             force_is_added(self.acceleration, len(joints), len(self.action_channels), one)
@@ -237,7 +237,7 @@ class FirstOrderSystem(_Equations):
                 f"{c.unit}/s",
                 c.scale / (10 * self.dt),
             )
-            for c in self.state_channels
+            for c in self.physical_channels
         )
 
     @abc.abstractmethod

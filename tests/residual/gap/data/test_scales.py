@@ -9,6 +9,7 @@ from held import path
 from residual.gap import find_gap
 from residual.gap.data.scales import in_measured_scales
 from residual.trajectories import Trajectory
+from sims.effects import Delay, library
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.simulator import Channel, Parameter
 
@@ -88,6 +89,15 @@ def test_joints_and_effects_go_with_their_states():
     assert plain.force_scale(plain.joints[0]) == 50 * simulator.force_scale(simulator.joints[0])
     states, power = np.array([[40.0], [70.0]]), np.array([[800.0], [0.0]])
     np.testing.assert_array_equal(plain.step(states, power), simulator.step(states, power))
+
+
+def test_what_an_effect_remembers_is_no_joint():
+    """Else every command that is on its way would be one, and effects would be offered at each."""
+    simulator = Kettle()
+    late = simulator.with_effects([Delay("power", 300 * simulator.dt)]).with_scales({"temp": 50.0})
+    assert [joint.name for joint in late.joints] == [joint.name for joint in simulator.joints]
+    assert len(late.state_channels) > 300
+    assert [str(one) for one in library(late)] == [str(one) for one in library(simulator)]
 
 
 def test_a_drag_is_named_in_degrees_whether_or_not_sizes_are_declared():
