@@ -14,7 +14,7 @@ from residual.gap.confirmation.rest import fits_better_from_rest
 from residual.gap.confirmation.twins import exact_twins, with_twins
 from residual.gap.fitting.smooth import LEAD, SmoothFitter
 from residual.gap.log import Log
-from residual.gap.model.candidates import Candidate, candidates
+from residual.gap.model.candidates import Candidate, candidates, one_way
 from residual.gap.offered import Offered
 from residual.gap.once_more import Confirmed, OnceMore
 from residual.gap.preparation.numerics import held_otherwise, how_held
@@ -51,7 +51,7 @@ class Inquiry:
         """The effects that explain a log, see ``explain``; ``more`` of them than are offered."""
         free = {candidate.label for candidate in beside}
         samples = ready.fitter.samples
-        less = [one.taking_away() for one in candidates(simulator, self.offered.less, samples)]
+        less = one_way(simulator, self.offered.less, samples)
         offered = [*self.offered.kept, *more]
         if isinstance(ready.fitter, SmoothFitter):
             for curve in self.offered.asked:

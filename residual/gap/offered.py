@@ -26,7 +26,8 @@ class Offered:
     Attributes:
         by_label: All of them.
         kept: One of each group that no motion tells apart.
-        less: Parameters of which there may be too much, where what is kept cannot be negative.
+        less: Parameters that take away what there may be too much of, with the sign of the change
+            that does, where what is kept cannot be negative.
         groups: Those groups by label.
         sets: Sets of which one is exactly made of the others.
         curves: Curves by points, for where laws of the library only come near.
@@ -36,7 +37,7 @@ class Offered:
 
     by_label: Mapping[str, Effect]
     kept: Sequence[Effect]
-    less: Sequence[Effect]
+    less: Sequence[tuple[Effect, float]]
     groups: dict[str, tuple[str, ...]]
     sets: Sequence[tuple[str, ...]]
     curves: Sequence[Curve]

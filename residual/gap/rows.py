@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from residual.angles import with_whole_turns
 from residual.gap.confirmation.aliases import aliases, representatives
 from residual.gap.fitting.intervals import deviations
-from residual.gap.model.candidates import candidates
+from residual.gap.model.candidates import candidates, one_way
 from residual.gap.preparation.prepare import prepare
 from residual.gap.search.explain import Explanation, explain
 from residual.gap.search.sets import Key
@@ -126,8 +126,8 @@ def look(simulator: HostSimulator, runs: list[Trajectory], exact: bool = True) -
     most = SETS_AT_IMPACTS if simulator.has_contacts else SETS
     effort = dataclasses.replace(prepared.effort, tried=most, parameters=alone)
     samples = prepared.fitter.samples
-    less_of = [one.taking_away() for one in candidates(simulator, less, samples)]
-    pool = prepared.pool([*candidates(simulator, kept, samples), *less_of])
+    away = one_way(simulator, less, samples)
+    pool = prepared.pool([*candidates(simulator, kept, samples), *away])
     found = explain(
         simulator, pool, prepared.fitter, prepared.floor, prepared.weigh, effort, _quiet, np.inf,
     )  # fmt: skip

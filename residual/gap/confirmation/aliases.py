@@ -11,7 +11,7 @@ from residual.gap.fitting.screening import Signatures
 from residual.gap.model.candidates import Candidate
 from residual.trajectories import Trajectory
 from sims.effects.actuator import ActuatorGain
-from sims.effects.aliases import exact_aliases, probes
+from sims.effects.aliases import exact_aliases, linear_columns, probes
 from sims.effects.base import Effect
 from sims.effects.combinations import made_by
 from sims.effects.joint import ConstantLoad, ProportionalLoss
@@ -90,25 +90,37 @@ def beyond_parameters(simulator: HostSimulator, offered: Sequence[Effect]) -> tu
 
 def representatives(
     simulator: HostSimulator, offered: Sequence[Effect], groups: Mapping[str, tuple[str, ...]]
-) -> tuple[list[Effect], list[Effect]]:
+) -> tuple[list[Effect], list[tuple[Effect, float]]]:
     """The offered effects without those that the first of their twins stands for.
 
     Returns:
         Those, and parameters of which a simulator may have too much while the twin that stands for
-        them cannot be negative: damping that is too large is no friction.
+        them cannot be negative, with the sign of the change that takes it away: damping that is
+        too large is no friction. Of several the first that acts as its twin does.
     """
     width = {str(effect): numbers(effect, simulator) for effect in offered}
     either = {str(effect): _goes_either_way(effect, simulator) for effect in offered}
     kept: list[Effect] = []
-    less: dict[str, Effect] = {}
+    too_much: dict[str, list[Effect]] = {}
     for effect in offered:
         name = str(effect)
         first = next(n for n in groups.get(name, (name,)) if width[n] == width[name])
         if first == name:
             kept.append(effect)
         elif isinstance(effect, ParameterChange) and either[name] and not either[first]:
-            less.setdefault(first, effect)
-    return kept, list(less.values())
+            too_much.setdefault(first, []).append(effect)
+    return kept, [_taking_away(simulator, first, found) for first, found in too_much.items()]
+
+
+def _taking_away(
+    simulator: HostSimulator, twin: str, parameters: Sequence[Effect]
+) -> tuple[Effect, float]:
+    """The parameter that undoes a twin, and the sign of its change that does."""
+    plain = simulator.with_effects(())
+    names = [twin, *map(str, parameters)]
+    columns, _ = linear_columns(plain, *probes(plain, np.random.default_rng(0)), names)
+    alike = [one for one in parameters if float(columns[twin] @ columns[str(one)]) > 0]
+    return (alike[0], -1.0) if alike else (parameters[0], 1.0)
 
 
 def _goes_either_way(effect: Effect, simulator: HostSimulator) -> bool:

@@ -82,6 +82,7 @@ class Candidate:
         rough: True if its signature depends on its size (dead zone, delay ...), so that several
             trials are worth a refit.
         bold: Numbers from which it is fitted alone whatever the screen says, or None.
+        less: True if it only takes away what the simulator has too much of.
     """
 
     effect: Effect
@@ -89,6 +90,7 @@ class Candidate:
     trials: tuple[Trial, ...]
     rough: bool
     bold: Array | None = None
+    less: bool = False
 
     @property
     def name(self) -> str:
@@ -105,16 +107,16 @@ class Candidate:
         """True if the effect vanishes at infinity (saturation), so that trials do not scale."""
         return not any(k.strength for k in self.knobs)
 
-    @property
-    def less(self) -> bool:
-        """True if it only takes away what the simulator has too much of."""
-        return all(knob.high <= 0 for knob in self.knobs)
-
-    def taking_away(self) -> Candidate:
-        """The same with numbers that are not positive."""
-        knobs = tuple(dataclasses.replace(knob, high=0.0) for knob in self.knobs)
-        trials = tuple(Trial(-np.abs(t.values), np.ones_like(t.one_sided)) for t in self.trials)
-        return dataclasses.replace(self, knobs=knobs, trials=trials, bold=None)
+    def one_way(self, sign: float) -> Candidate:
+        """The same with numbers that are not positive, or not negative."""
+        knobs = tuple(
+            dataclasses.replace(knob, high=0.0) if sign < 0 else dataclasses.replace(knob, low=0.0)
+            for knob in self.knobs
+        )
+        trials = tuple(
+            Trial(sign * np.abs(t.values), np.ones_like(t.one_sided)) for t in self.trials
+        )
+        return dataclasses.replace(self, knobs=knobs, trials=trials, bold=None, less=True)
 
     @property
     def linear(self) -> NDArray[np.bool_]:
@@ -163,6 +165,17 @@ def candidates(
             fixed = effect.with_values(**dict(zip(whole, values, strict=True)))
             found.append(_candidate(fixed, known, reach))
     return found
+
+
+def one_way(
+    simulator: HostSimulator, changes: Iterable[tuple[Effect, float]], samples: Samples
+) -> list[Candidate]:
+    """Candidates of which only one sign is asked for, given with each, -1.0 or 1.0."""
+    return [
+        candidate.one_way(sign)
+        for effect, sign in changes
+        for candidate in candidates(simulator, [effect], samples)
+    ]
 
 
 def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.fitting.screening import Gain, Signatures, gains, pair_gains, triple_gains
-from residual.gap.search.exchange import from_screen, spelt_out
+from residual.gap.search.exchange import from_screen, of_several_numbers, spelt_out
 from residual.gap.search.redundant import by_points
 from residual.gap.search.sets import Key, Proposals, Search
 from residual.gap.search.significance import score
@@ -138,8 +138,9 @@ def grow(search: Search, key: Key) -> list[Key]:
             found += boldly(search, parameters=False)
             found += driven(search)
         found += partners(search, found)
-        pairs = pair_gains(around, search.effort.pairs, without=by_points(search))
-        found += several(search, pairs)
+        # Laws of many numbers gain more, so that two of one number each have their own turn.
+        for without in (by_points(search), of_several_numbers(search)):
+            found += several(search, pair_gains(around, search.effort.pairs, without=without))
     return list(dict.fromkeys(found))
 
 
@@ -280,10 +281,9 @@ def plainer(search: Search, around: Signatures, ranked: list[Gain], most: int) -
     """The first gains, laws that gain hardly more than a special case of theirs replaced by it.
 
     In the linear picture a law gains no less than its special cases, however little its further
-    numbers tell; as one of their family it has its turn when what is chosen meets its rivals.
+    numbers tell; as one of their family it has its turn when the chosen meets its rivals.
     """
-    owner = [around.variants[gain.variants[0]].candidate for gain in ranked]
-    found: list[Gain] = []
+    owner, found = [around.variants[gain.variants[0]].candidate for gain in ranked], list[Gain]()
     for gain, law in zip(ranked[:most], owner[:most], strict=True):
         cases = [g for g, own in zip(ranked, owner, strict=True) if search.contains(law, own)]
         instead = next((g for g in cases if g.value > HARDLY * gain.value), gain)

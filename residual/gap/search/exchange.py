@@ -20,8 +20,8 @@ HOPELESS = 0.5
 SPELLINGS = 2
 #: Effects that hold still tried in place of one that does, whatever the linear screen says.
 STILL = 3
-#: Pairs that are tried in place of one effect with as many numbers.
-SPLITS = 2
+#: Pairs that are tried in place of one effect of two or three numbers.
+SPLITS, SEVERAL = 2, (2, 3)
 #: Pairs that are tried in place of two members.
 PAIRS = 3
 #: Effects that move as another one does in these data, tried beside it: under a constant input a
@@ -57,7 +57,7 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
             fresh, theta = search.merged(key, [(number, start)], drop=(gone,))
             search.add({fresh: theta})
         _add_plainer(search, key, gone)
-        if len(search.candidates[gone].knobs) == 2:
+        if len(search.candidates[gone].knobs) in SEVERAL:
             _add_split(search, rest, gone)
 
 
@@ -126,17 +126,22 @@ def _add_plainer(search: Search, key: Key, gone: int) -> None:
 
 
 def _add_split(search: Search, rest: Key, gone: int) -> None:
-    """Fit sets in which two effects of one number each stand for one of two."""
+    """Fit sets in which two effects of one number each stand for one of two or three."""
     _add_pairs(search, rest, SPLITS, gone)
 
 
 def _add_pairs(search: Search, rest: Key, most: int, *without: int) -> None:
     """Fit a set with each of the pairs of effects of one number that gain most beside it."""
     around = search.signatures(rest)
-    larger = [n for n, one in enumerate(search.candidates) if len(one.knobs) != 1]
-    for pair in pair_gains(around, most, without=[*larger, *rest, *without]):
+    without = (*of_several_numbers(search), *rest, *without)
+    for pair in pair_gains(around, most, without=without):
         fresh, theta = from_screen(search, rest, pair)
         search.add({fresh: theta} if search.fits_in(fresh) else {})
+
+
+def of_several_numbers(search: Search) -> list[int]:
+    """Candidates of more than one number."""
+    return [n for n, one in enumerate(search.candidates) if len(one.knobs) != 1]
 
 
 def from_screen(search: Search, rest: Key, gain: Gain) -> tuple[Key, Array]:

@@ -1,5 +1,7 @@
 """Which of several effects that move alike is looked for, and what is found by it."""
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from residual.gap.confirmation.aliases import (
 )
 from residual.trajectories import Trajectory
 from sims.effects.library import library
-from sims.equations import FirstOrderSystem
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.simulator import Channel, Parameter
 
 
@@ -65,9 +67,78 @@ def test_too_much_of_a_parameter_is_asked_for_beside_a_twin_that_cannot_be_negat
     wheel = Wheel()
     offered = library(wheel)
     groups, _ = aliases(wheel, offered)
-    kept, less = ([str(e) for e in found] for found in representatives(wheel, offered, groups))
-    assert "viscous_friction@speed" in kept and "damping" not in kept
-    assert less == ["damping"]
+    kept, less = representatives(wheel, offered, groups)
+    names = [str(effect) for effect in kept]
+    assert "viscous_friction@speed" in names and "damping" not in names
+    assert [(str(effect), sign) for effect, sign in less] == [("damping", -1.0)]
+
+
+class Rotor(EquationOfMotion):
+    """What spins down without a drive: of inertia and damping only the ratio shows."""
+
+    dt = 0.01
+    state_channels = (
+        Channel("angle", "rad", "position", angle=True),
+        Channel("speed", "rad/s", "rate", rate_of="angle", scale=500.0),
+    )
+    action_channels = ()
+    parameters: ClassVar = {
+        "inertia": Parameter(5e-6, "kg m^2", "rotor and wheel", low=1e-8),
+        "damping": Parameter(2.5e-5, "N m s/rad", "bearings", low=0.0),
+    }
+
+    def acceleration(self, q, v, u, force, p):
+        return ((force[:, 0] - p.damping * v[:, 0]) / p.inertia)[:, None]
+
+
+class Flywheel(Rotor):
+    """The same with damping that is taken for exact."""
+
+    parameters: ClassVar = {"inertia": Rotor.parameters["inertia"]}
+
+    def acceleration(self, q, v, u, force, p):
+        return ((force[:, 0] - 2.5e-5 * v[:, 0]) / p.inertia)[:, None]
+
+
+@pytest.mark.parametrize(("system", "away"), [
+    (Rotor, ("damping", -1.0)), (Flywheel, ("inertia", 1.0)),
+])  # fmt: skip
+def test_of_parameters_that_act_alike_the_one_and_the_sign_that_brake_less_are_asked(system, away):
+    groups, _ = aliases(system(), library(system()))
+    _, less = representatives(system(), library(system()), groups)
+    assert [(str(effect), sign) for effect, sign in less] == [away]
+
+
+def spun_down(noise, rows, seed):
+    """A quick and a slow run of a rotor, closed form, its angle read each millisecond."""
+    rotor, rng = Rotor(dt=0.001), np.random.default_rng(seed)
+    rate, dry = 1.1e-5 / 5e-6, 0.011 / 5e-6
+    runs = []
+    for begin in (1050.0, 181.0):
+        times = rotor.dt * np.arange(rows)
+        ends = begin + dry / rate
+        angle = ends / rate * (1 - np.exp(-rate * times)) - dry / rate * times
+        moves = ends * np.exp(-rate * times) > dry / rate
+        seen = angle + noise * rng.standard_normal(rows)
+        states = np.stack([seen, np.full(rows, np.nan)], axis=1)[moves]
+        still = np.zeros((len(states) - 1, 0))
+        runs.append(Trajectory(f"from {begin}", times[moves], states, still))
+    return rotor, runs
+
+
+@pytest.mark.parametrize(("noise", "rows", "seed"), [(0.005, 110, 2), (0.02, 90, 1)])
+def test_too_much_damping_is_found_beside_friction_that_is_missing(noise, rows, seed):
+    """Each of the two alone makes nothing better: at high speed the one makes up for the other.
+
+    Under more noise a law whose friction falls with the speed comes first, and is taken apart.
+    """
+    found = {v.label: v for v in find_gap(*spun_down(noise, rows, seed)).verdicts if v.effect}
+    # Of what only spins forwards no motion tells dry friction from a load.
+    (dry,) = [v for name, v in found.items() if name != "damping"]
+    assert "coulomb_friction@angle" in {dry.label, *dry.alternatives}
+    (level,) = dry.parameters.values()
+    assert abs(level.value) == pytest.approx(0.011, rel=0.15)
+    assert found["damping"].parameters["change"].value == pytest.approx(-1.4e-5, rel=0.2)
 
 
 @pytest.mark.parametrize(("damping", "label"), [(0.5, "damping"), (1.6, "viscous_friction@speed")])
