@@ -1,6 +1,8 @@
-"""How far forecasts go if nothing can be named over the usual length."""
+"""How far forecasts go if the usual length shows too little."""
 
 from __future__ import annotations
+
+import dataclasses
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from residual.gap.preparation.horizon import (
 )
 from residual.gap.preparation.prepare import prepare
 from sims.host import HostSimulator
+from sims.simulator import Channel
 
 #: By how much longer forecasts have to be to show something else.
 LONGER = 1.25
@@ -24,6 +27,10 @@ LONGER = 1.25
 #: forecasts and over the spread of the channel, from which on a slow error shows though they are
 #: as few.
 FEWEST, PLAIN, GROWN, MATTERS = (2, 1), 5.0, 3.0, 0.1
+#: Times that these are longer, at least, where something is named, and error over that by noise.
+LONGEST, BESIDE = 4.0, 3.0
+#: Part of such an error that may be left where what makes it is named.
+LESS = 0.7
 #: Draws of noise: of what swings far a few say little.
 DRAWS = 16
 
@@ -43,6 +50,71 @@ def longer_horizon(simulator: HostSimulator, log: Log, answer: Answer) -> float 
     if not answer.found.nominal_left.adequate and not within_noise(summed_up(answer)):
         longer = max(longer, min(log.horizon / PART, longest_horizon(log.recorded, FEWER)))
     return longer if longer >= LONGER * log.horizon else None
+
+
+@dataclasses.dataclass(frozen=True)
+class Slow:
+    """An error of a corrected simulator that grows over forecasts nearly as long as the records.
+
+    Attributes:
+        horizon: Length that was asked for, in s, and ``seconds``: that forecasts have.
+        channel: In which it shows.
+        error: Root mean square of these forecasts, in the channel's unit.
+        noise: What noise alone would make of it; ``usual``: the same over the usual length.
+    """
+
+    horizon: float
+    seconds: float
+    channel: Channel
+    error: float
+    noise: float
+    usual: float
+
+    @property
+    def says(self) -> str:
+        """What is to be said if nothing was found for it."""
+        unit = self.channel.unit
+        return (
+            f"over {self.seconds:.3g} s the corrected simulator errs by {self.error:.3g} {unit} in "
+            f"{self.channel.name} ({self.usual:.3g} over the length of the forecasts): what is "
+            "slow may be missing, such as a little damping; --horizon asks over longer forecasts"
+        )
+
+
+def slow_remainder(log: Log, answer: Answer) -> Slow | None:
+    """What the corrected simulator is plainly off by over forecasts nearly as long as the records,
+    though it is not over the usual ones; None if it is not, or motion is too unstable to tell.
+
+    Over a part of a swing damping takes hardly anything off, and over many it takes half.
+
+    Args:
+        log: What was asked about, and how far its forecasts went.
+        answer: In which something is named.
+    """
+    for windows in FEWEST:
+        horizon = longest_horizon(log.recorded, windows)
+        if horizon < LONGEST * log.horizon:
+            continue
+        slow, spread = error_over(horizon, log, answer)
+        if slow.seconds < LONGEST * answer.found.search.fitter.seconds:
+            continue
+        if max(BESIDE * slow.noise, GROWN * slow.usual, MATTERS * spread) < slow.error < spread:
+            return slow
+    return None
+
+
+def error_over(horizon: float, log: Log, answer: Answer) -> tuple[Slow, float]:
+    """Error of a corrected simulator over forecasts of a length, and the spread of that channel."""
+    search, corrected = answer.found.search, answer.corrected
+    ready = prepare(corrected, log.at(horizon).runs, horizon)
+    fitter = ready.fitter
+    main, error, noise = most_beside_noise(corrected, fitter, ready.floor.sigma, DRAWS)
+    column = fitter.samples.measured[main]
+    usual = float(np.nanmean(search.validated[answer.key].squares[:, main]))
+    spread = float(np.nanstd(fitter.samples.seen[:, column]))
+    channel = search.simulator.physical_channels[column]
+    sizes = [float(np.sqrt(one)) for one in (error, noise, usual)]
+    return Slow(horizon, fitter.seconds, channel, *sizes), spread
 
 
 def slow_error(log: Log, answer: Answer) -> tuple[float, str] | None:

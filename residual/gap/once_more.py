@@ -12,6 +12,7 @@ from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import worth_a_curve
 from residual.gap.answer.free_parameters import better, worth_freeing
 from residual.gap.answer.left import (
+    names_more,
     still_names,
     takes_most_by_itself,
     takes_what_is_left,
@@ -28,7 +29,8 @@ from residual.gap.answer.varying import no_surer, worth_varying
 from residual.gap.data.windows import TooShort
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.log import Log
-from residual.gap.longer import longer_horizon, slow_error
+from residual.gap.longer import LESS, LONGER, error_over, longer_horizon, slow_error, slow_remainder
+from residual.gap.preparation.horizon import longest_horizon
 from residual.gap.preparation.prepare import Prepared, finely
 from residual.gap.search.redundant import by_points
 from sims.effects.base import Effect
@@ -81,7 +83,7 @@ class OnceMore:
         lone = bool(known.says)
         for step in (
             self.with_parameters_free, self.with_varying, self.with_curves, self.with_parts,
-            self.over_longer_forecasts, self.over_the_longest_forecasts,
+            self.over_longer_forecasts, self.over_the_longest_forecasts, self.with_what_is_slow,
         ):  # fmt: skip
             with contextlib.suppress(TooShort):
                 known = step(known)
@@ -206,6 +208,30 @@ class OnceMore:
         what = "the longest forecasts, where a slow error shows"
         ready, answer = self._over(known, horizon, what)
         return Confirmed(ready, answer, (*known.says, says))
+
+    def with_what_is_slow(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found beside it over longer forecasts, of which the records hold as
+        many as are needed, if those as long as the records show a slow error."""
+        answer, search = known.answer, known.answer.found.search
+        if self.log.by_user or not answer.key or search.beside or self._late:
+            return known
+        if search.simulator.has_contacts:
+            return known
+        slow = slow_remainder(self.log, answer)
+        horizon = longest_horizon(self.log.recorded)
+        if slow is None or horizon < LONGER * self.log.horizon:
+            return known
+        ready, longer = self._over(known, horizon, "longer forecasts, for a slow error")
+        left, _ = error_over(slow.horizon, self.log, longer)
+        if left.error >= LESS * slow.error:
+            return known.and_says(slow.says)
+        if not names_more(longer, answer):
+            return known  # the same names, of which longer forecasts tell the sizes better
+        says = (
+            f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s "
+            "what is slow hardly shows"
+        )
+        return Confirmed(ready, longer, (*known.says, says))
 
     def _over(
         self, known: Confirmed, horizon: float, what: str, more: Sequence[Effect] = ()

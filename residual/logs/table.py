@@ -162,10 +162,9 @@ class Table:
                 elif text.lower() in _MISSING:
                     numbers[index] = np.nan
                 else:
-                    comma = "," in text and decimal == "."
-                    fix = "set decimal: ','" if comma else "correct the value or leave it empty"
-                    if comma and "." in text:
-                        fix = "leave out the commas between thousands"
+                    fix = "correct the value or leave it empty"
+                    if "," in text and decimal == ".":
+                        fix = _of_commas(text)
                     if with_unit := _WITH_UNIT.fullmatch(text):
                         unit = with_unit[1]
                         fix = f"leave {unit} out of the cells, and say `unit: {unit}` of the column"
@@ -191,6 +190,15 @@ def _commas(texts: Sequence[str]) -> bool:
         and all(_COMMA.fullmatch(text) for text in commas)
         and any(not _THOUSANDS.fullmatch(text) for text in commas)
     )
+
+
+def _of_commas(text: str) -> str:
+    """What to do about the commas of a number."""
+    if "." in text or text.count(",") > 1:
+        return "leave out the commas between thousands"
+    if _THOUSANDS.fullmatch(text):
+        return "leave out the commas if they part thousands, set decimal: ',' if they are decimal"
+    return "set decimal: ','"
 
 
 def shortened(text: str, length: int = 40) -> str:

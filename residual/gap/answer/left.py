@@ -77,14 +77,28 @@ def takes_most_by_itself(answer: Answer, more: Sequence[Effect]) -> bool:
     return now - least < QUARTER * (left - least)
 
 
+def names_more(answer: Answer, earlier: Answer) -> bool:
+    """Whether an answer names what an earlier one does, or of its family, is sure of all that that
+    one was, and names more."""
+    sure = [claim.number for claim in answer.claims if claim.sure]
+    return (
+        len(answer.key) > len(earlier.key)
+        and _among(answer, answer.key, earlier, earlier.key)
+        and _among(answer, sure, earlier, [c.number for c in earlier.claims if c.sure])
+    )
+
+
 def still_names(answer: Answer, earlier: Answer) -> bool:
     """Whether an answer names all that an earlier one does with certainty, or of its family."""
-    search = answer.found.search
-    there = [search.candidates[number].effect for number in answer.key]
-    known = earlier.found.search.candidates
-    wanted = [known[claim.number].effect for claim in earlier.claims if claim.sure]
+    return _among(answer, answer.key, earlier, [c.number for c in earlier.claims if c.sure])
+
+
+def _among(answer: Answer, there: Sequence[int], earlier: Answer, wanted: Sequence[int]) -> bool:
+    """Whether effects of an earlier answer, or of their families, are among those of another."""
+    own = [answer.found.search.candidates[number].effect for number in there]
+    known = [earlier.found.search.candidates[number].effect for number in wanted]
     return all(
         any(str(one) == str(e) or (e.family and (one.family, one.where) == (e.family, e.where))
-            for one in there)
-        for e in wanted
+            for one in own)
+        for e in known
     )  # fmt: skip

@@ -51,9 +51,10 @@ def test_a_last_row_that_is_no_sample_may_be_deleted(csv):
     assert message.endswith("; if this row is no sample, delete it")
 
 
-def test_commas_between_thousands_are_to_be_left_out(csv):
+@pytest.mark.parametrize("cell", ["1,000.5", "1,000,000"])
+def test_commas_between_thousands_are_to_be_left_out(csv, cell):
     def change(lines):
-        return [*lines[:8], '"1,000.5",1,0,1', *lines[9:]]
+        return [*lines[:8], f'"{cell}",1,0,1', *lines[9:]]
 
     assert error(csv(change)).endswith("leave out the commas between thousands")
 
@@ -72,7 +73,8 @@ def test_a_comma_that_may_part_thousands_is_asked_for(csv):
     def change(lines):
         return [lines[0].replace(",", ";"), *(f"{i};0.1;1;1,50{i % 10}" for i in range(200))]
 
-    assert "set decimal: ','" in error(csv(change))
+    message = error(csv(change))
+    assert "leave out the commas if they part thousands, set decimal: ','" in message
 
 
 @pytest.mark.parametrize("word", ["inf", "-Infinity", "1e999"])
