@@ -77,7 +77,7 @@ class Slow:
         return (
             f"over {self.seconds:.3g} s the corrected simulator errs by {self.error:.3g} {unit} in "
             f"{self.channel.name} ({self.usual:.3g} over the length of the forecasts): what is "
-            "slow may be missing, such as a little damping; --horizon asks over longer forecasts"
+            "slow may be missing (a leak, a little damping); --horizon asks over longer forecasts"
         )
 
 

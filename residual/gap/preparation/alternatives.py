@@ -21,6 +21,8 @@ Places = NDArray[np.intp]
 QUARTERS = (0.0, 0.25, 0.5, -0.25)
 #: Control periods in a sample, or samples in one, that a slip of the clock makes, and how nearly.
 SLIPS, SLIPPED = (10.0, 60.0, 100.0, 1000.0), 0.15
+#: Units of time, one in the other, and control periods in a sample from which on one is far.
+TIMES, FAR = (60.0, 1000.0, 3600.0), 8.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,23 +97,33 @@ def _of_the_clock(
     simulator: HostSimulator, samples: Samples, joints: Sequence[Sequence[int]]
 ) -> list[Convention]:
     """A sample in every control period, where one comes ten, 60, 100 or 1000 times as often or as
-    seldom.
+    seldom; or another unit of time, where samples are far from the control period as they are said
+    to come and near it in that unit.
 
     A measured rate counts as it is, or it was put on the scale of a position whose clock was wrong.
     """
     period = float(np.median(np.concatenate([run.durations for run in samples.recorded])))
     rare = period / simulator.dt
     slips = [n for n in SLIPS for ratio in (rare, 1 / rare) if abs(ratio / n - 1) < SLIPPED]
-    if not slips:
+    also = f" (`period: {simulator.dt:g}` of a log without times)" if slips else ""
+    found = []
+    for clock in [1 / rare] if slips else _units_of_time(rare):
+        says = f"`scale: {clock:.6g}` for the time{also}"
+        plain, pace = (
+            dataclasses.replace(as_said(simulator), says=says, clock=clock) for _ in range(2)
+        )
+        for joint in joints:
+            pace.states[0, joint[1:]] = 1 / clock
+        found += [plain, pace] if any(len(joint) > 1 for joint in joints) else [plain]
+    return found
+
+
+def _units_of_time(rare: float) -> list[float]:
+    """Factors by which another unit of time brings samples near the control period, of which they
+    are ``rare`` times the length."""
+    if 1 / FAR < rare < FAR:
         return []
-    says = (
-        f"`scale: {1 / rare:.6g}` for the time (`period: {simulator.dt:g}` of a log without times)"
-    )
-    plain = dataclasses.replace(as_said(simulator), says=says, clock=1 / rare)
-    pace = dataclasses.replace(as_said(simulator), says=says, clock=1 / rare)
-    for joint in joints:
-        pace.states[0, joint[1:]] = rare
-    return [plain, pace] if any(len(joint) > 1 for joint in joints) else [plain]
+    return [f for n in TIMES for f in (n, 1 / n) if 1 / FAR < rare * f < FAR]
 
 
 def _measured_joints(simulator: HostSimulator, samples: Samples) -> list[list[int]]:

@@ -72,3 +72,12 @@ def test_nothing_is_certain_before_the_clock_is_seen_to():
     assert found.conventions is not None
     assert "`scale: 0.1` for the time" in found.conventions.changes[0]
     assert all(v.kind == "ambiguous" for v in found.verdicts if v.effect)
+
+
+@pytest.mark.parametrize("unit", [1000.0, 1 / 60])
+def test_another_unit_of_time_is_told_where_rows_do_not_come_at_the_control_period(unit):
+    """Milliseconds said of seconds, or seconds of minutes."""
+    run = heated()
+    run = dataclasses.replace(run, times=run.times / unit)
+    found = asked(run, dt=0.4)
+    assert found is not None and found.changes == (f"`scale: {unit:.6g}` for the time",)
