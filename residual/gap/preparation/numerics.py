@@ -69,7 +69,7 @@ def enough_substeps(
         return most
     model = Model(simulator)
     rows = np.unique(np.linspace(0, len(samples) - 1, min(len(samples), 400)).astype(int))
-    states = nodes[rows][None, :, : model.physical]
+    states = model.widen(samples, nodes[:, : model.physical], np.zeros(0))[rows][None]
 
     def after(count: int) -> Array:
         table = dataclasses.replace(samples, substeps=count)
