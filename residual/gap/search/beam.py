@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.fitting.screening import Gain, Signatures, gains, pair_gains, triple_gains
+from residual.gap.search.drives import driven
 from residual.gap.search.exchange import from_screen, of_several_numbers, spelt_out
 from residual.gap.search.redundant import by_points
 from residual.gap.search.sets import Key, Proposals, Search
 from residual.gap.search.significance import score
+from residual.gap.search.sound import sound
 
 Array = NDArray[np.float64]
 
@@ -201,13 +203,6 @@ def guessed_drives(search: Search) -> None:
         extend(search, best)
 
 
-def sound(search: Search, key: Key, theta: Array) -> list[Key]:
-    """The set, fitted if it was not, or those that stand for it; none if nothing may be right, or
-    if one member does again what another does."""
-    made = search.add({key: theta})
-    return [k for k in dict.fromkeys([key, *made]) if k in search.tried and search.sound(k)]
-
-
 def boldly(search: Search, parameters: bool) -> list[Key]:
     """Fit effects of which small trials tell little alone, such as friction that holds a joint.
 
@@ -225,30 +220,6 @@ def boldly(search: Search, parameters: bool) -> list[Key]:
         if start is None or own != parameters or search.late or not search.fits_in(fresh):
             continue
         found += sound(search, fresh, start)
-    return found
-
-
-def driven(search: Search) -> list[Key]:
-    """Fit every effect that holds still beside the gain of its input, or of the best other one.
-
-    When motion begins depends on both, on friction and on the drive that overcomes it; where both
-    are wrong, friction alone ends at numbers from which the linear picture is of no use.
-    """
-    screened = search.candidates[: search.screened]
-    gains = [number for number, candidate in enumerate(screened) if candidate.effect.drives]
-    if not gains:
-        return []
-    best = min(gains, key=lambda n: search.error((n,)) if (n,) in search.tried else np.inf)
-    singles = [key for key in search.tried if len(key) == 1 and key[0] < search.screened]
-    found: list[Key] = []
-    for key in [k for k in singles if screened[k[0]].effect.holds_still]:
-        place = search.place(key[0])
-        gain = next((n for n in gains if search.place(n) == place), best)
-        small = 0.01 * screened[gain].trials[0].values[0]
-        start = search.own((gain,)) if (gain,) in search.tried else small
-        fresh, theta = search.merged(key, [(gain, start)])
-        if not search.late and search.fits_in(fresh):
-            found += sound(search, fresh, theta)
     return found
 
 

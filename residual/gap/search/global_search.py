@@ -12,6 +12,7 @@ Source: Storn and Price, "Differential evolution", J. Global Optimization 11 (19
 
 from __future__ import annotations
 
+import itertools
 import time
 
 import numpy as np
@@ -27,8 +28,9 @@ from residual.gap.model.model import Model
 
 Array = NDArray[np.float64]
 
-#: Part of the time for searching, at most.
-GLOBALLY = 0.3
+#: Part of the time for searching, at most, and part of that for one set: where a fit takes a
+#: second, fewer begin from elsewhere.
+GLOBALLY, EACH = 0.3, 0.1
 #: Part of its squared error that a fit keeps at most if seeking was of use, and how many sets it is
 #: of no use to, one after the other, before it ends; how many of those another search has.
 GAINED, IN_VAIN, ONCE_MORE = 0.9, 10, 3
@@ -67,6 +69,7 @@ class GlobalSearch:
     def __init__(self, noise: Array | None, until: float) -> None:
         self.noise, self.until = noise, until
         self._left = GLOBALLY * (until - time.process_time())
+        self._each = EACH * self._left
         self._in_vain = 0
 
     def after(self, earlier: GlobalSearch) -> None:
@@ -85,28 +88,33 @@ class GlobalSearch:
         if self.noise is None or not isinstance(fitter, SmoothFitter):
             return found
         by_slopes, sought = found.merit, False
+        over = time.process_time() + min(self._each, max(self._left, 0.0))
         for turn in range(len(PARTS)):
             begun = time.process_time()
-            if begun > self.until or self._left < 0 or self._in_vain >= IN_VAIN:
+            if begun > min(self.until, over) or self._in_vain >= IN_VAIN:
                 break
-            starts = begins_elsewhere(fitter, found, self.noise, free, PARTS[turn], turn)
+            starts = begins_elsewhere(fitter, found, self.noise, free, PARTS[turn], turn, over)
             if not len(starts):
                 break
             sought = True
             if not turn:
                 starts = np.vstack([begun_from, starts])
             ways = (fitter.from_forecasts, fitter.fit)
-            fits = [way(found.model, start, found) for start in starts for way in ways]
+            near = found
+            for start, way in itertools.product(starts, ways):
+                if time.process_time() > over:
+                    break
+                found = min(found, way(near.model, start, near), key=lambda fit: fit.merit)
             self._left -= time.process_time() - begun
-            found = min([found, *fits], key=lambda fit: fit.merit)
         if sought:
             self._in_vain = 0 if found.merit < GAINED * by_slopes else self._in_vain + 1
         return found
 
 
 def begins_elsewhere(
-    fitter: SmoothFitter, fit: Fit, noise: Array, free: int, parts: int = 1, seed: int = 0
-) -> Array:
+    fitter: SmoothFitter, fit: Fit, noise: Array, free: int, parts: int = 1, seed: int = 0,
+    over: float = np.inf,
+) -> Array:  # fmt: skip
     """Numbers from which a fit may do better, (k, p), most promising first; none if there is no
     reason to look.
 
@@ -120,6 +128,8 @@ def begins_elsewhere(
         free: How many of its numbers, from the first on, are sought; the others stay.
         parts: That windows are foretold in.
         seed: Of the search.
+        over: When the search ends with the generation it is at, on the clock of
+            ``time.process_time``.
     """
     model = fit.model
     sticks = any(
@@ -143,6 +153,7 @@ def begins_elsewhere(
         list(zip(low, high, strict=True)),
         vectorized=True, updating="deferred", polish=False, tol=0.0, rng=random,
         init=members, maxiter=GENERATIONS * free, x0=begin,
+        callback=lambda *_, **__: time.process_time() > over,
     )  # fmt: skip
     ranked = result.population[np.argsort(result.population_energies)]
     return space.numbers(_apart(ranked, NEAR * (high - low)))
