@@ -19,6 +19,7 @@ from residual.gap.answer.out_of_proportion import out_of_proportion
 from residual.gap.answer.records import stands_for, unlike
 from residual.gap.clock import Clock
 from residual.gap.confirmation.numerics import times_better
+from residual.gap.confirmation.swapped import swapped
 from residual.gap.fitting.contract import Fitter
 from residual.gap.inquiry import Inquiry
 from residual.gap.log import look, settle
@@ -156,11 +157,13 @@ def find_gap(
         table, judged = summed_up(answer), NOT_JUDGED
         if log.apart:
             judged = judged_apart(answer, known.prepared, log.apart, table, rested=bool(on_rest))
+        either = swapped(answer.found.search, answer.key, answer.claims)
         answer = replace(
             answer,
             claims=tuple(
                 replace(
                     claim,
+                    swapped=claim.number in either,
                     counted=conventions is not None or by_an_encoder(claim, log.rescaled),
                     cut_off=bool(log.cut_off),
                     unlike=stands_for(answer, claim, differ),

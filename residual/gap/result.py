@@ -22,16 +22,16 @@ Kind = Literal[
 #: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
 #: between folds or with the numerics, a push that drifts does as well, a load may be a part of it,
 #: it lies at its bound, parameters within their tolerance do as well, it may be one of those, or
-#: there was no time to ask that, it is a time shorter than half a sample, the simulator may cut off
-#: what is there, a number is out of all proportion, it is one of several orders or beside what has
-#: no name, one effect that differs between records does better, records that were set aside are
-#: foretold worse, or no better, its interval holds zero, few blocks of data leave much without a
-#: name, or an effect of another kind does as well.
+#: there was no time to ask that, it is a time below half a sample, or in another one's place,
+#: the simulator may cut off what is there, a number is out of all proportion, it is one of
+#: several orders or beside what has no name, one effect that differs between records does better,
+#: records that were set aside are foretold worse, or no better, its interval holds zero, few blocks
+#: of data leave much without a name, or an effect of another kind does as well.
 Doubt = Literal[
     "not_needed", "unsteady", "creeps", "drift", "one_way", "numerics", "at_bound", "calibration",
-    "within", "slight", "no_time", "clock", "sensor", "conventions", "cut_off", "extreme", "orders",
-    "levels", "records", "law", "set_aside", "no_help", "may_be_zero", "share_may_be_zero",
-    "few_blocks", "rivals",
+    "within", "slight", "no_time", "clock", "swapped", "sensor", "conventions", "cut_off",
+    "extreme", "orders", "levels", "records", "law", "set_aside", "no_help", "may_be_zero",
+    "share_may_be_zero", "few_blocks", "rivals",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.
 WORSE = 1.05

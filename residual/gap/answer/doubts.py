@@ -18,6 +18,8 @@ DOUBTS: dict[Doubt, str] = {
     "at_bound": "its size lies at its bound",
     "clock": "the log does not tell its time well enough: late time stamps, an input that is held, "
     "a filter in a sensor, or an input that came on later would do as well",
+    "swapped": "a lag of the drive and a time constant in each other's place make the same motion, "
+    "and the drive would be the slower of the two",
     "conventions": "it has to be seen first whether the log counts as the simulator does",
     "cut_off": "it has to be seen first whether the simulator is meant to cut an input or a state "
     "off where it does",
@@ -69,6 +71,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "slight": claim.slight,
         "no_time": claim.unasked,
         "clock": claim.brief,
+        "swapped": claim.swapped,
         "sensor": claim.sensor,
         "conventions": claim.counted,
         "cut_off": claim.cut_off,

@@ -55,6 +55,8 @@ class Claim:
         refuted: Whether the corrected simulator forecasts records that were set aside worse.
         helpless: Whether it, or all that was found, forecasts them no better, though they show more
             than noise.
+        swapped: Whether it is a lag of a drive or a time of what it drives, which may have each
+            other's size.
         sensor: Whether it is a sensor wrong as sensors seldom are, beside a remainder.
         by_fit: Whether a fit to all data leaves three times as much without it: forecasts of single
             blocks may go astray all the same, where motion hangs on a hair.
@@ -79,6 +81,7 @@ class Claim:
     slight: bool = False
     unasked: bool = False
     brief: bool = False
+    swapped: bool = False
     sensor: bool = False
     counted: bool = False
     cut_off: bool = False
@@ -115,6 +118,7 @@ class Claim:
             self.calibration,
             self.within,
             self.brief,
+            self.swapped,
             self.sensor,
             self.counted,
             self.cut_off,
