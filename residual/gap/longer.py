@@ -5,11 +5,15 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from numpy.typing import NDArray
 
 from residual.gap.answer.answer import summed_up, within_noise
 from residual.gap.answer.confirmed import Answer
-from residual.gap.fitting.forecasts import most_beside_noise
+from residual.gap.fitting.contract import Fit, Fitter
+from residual.gap.fitting.forecasts import most_beside_noise, noise_floor
+from residual.gap.fitting.validation import validate
 from residual.gap.log import Log
+from residual.gap.model.model import Model
 from residual.gap.preparation.horizon import (
     FEWER,
     PART,
@@ -20,6 +24,8 @@ from residual.gap.preparation.horizon import (
 from residual.gap.preparation.prepare import prepare
 from sims.host import HostSimulator
 from sims.simulator import Channel
+
+Array = NDArray[np.float64]
 
 #: By how much longer forecasts have to be to show something else.
 LONGER = 1.25
@@ -58,16 +64,16 @@ class Slow:
 
     Attributes:
         horizon: Length that was asked for, in s, and ``seconds``: that forecasts have.
-        channel: In which it shows.
+        place: Of the channel in which it shows, among those measured; ``channel``: itself.
         error: Root mean square of these forecasts, in the channel's unit.
-        noise: What noise alone would make of it; ``usual``: the same over the usual length.
+        usual: The same over the usual length.
     """
 
     horizon: float
     seconds: float
+    place: int
     channel: Channel
     error: float
-    noise: float
     usual: float
 
     @property
@@ -91,30 +97,52 @@ def slow_remainder(log: Log, answer: Answer) -> Slow | None:
         log: What was asked about, and how far its forecasts went.
         answer: In which something is named.
     """
+    usual = np.sqrt(np.nanmean(answer.found.search.validated[answer.key].squares, axis=0))
     for windows in FEWEST:
         horizon = longest_horizon(log.recorded, windows)
         if horizon < LONGEST * log.horizon:
             continue
-        slow, spread = error_over(horizon, log, answer)
-        if slow.seconds < LONGEST * answer.found.search.fitter.seconds:
+        long = over(horizon, log, answer)
+        fitter = long.fitter
+        if fitter.seconds < LONGEST * answer.found.search.fitter.seconds:
             continue
-        if max(BESIDE * slow.noise, GROWN * slow.usual, MATTERS * spread) < slow.error < spread:
-            return slow
+        seen = fitter.samples.seen[:, fitter.samples.measured]
+        spread = np.nanstd(seen, axis=0)
+        grown = (long.errors > np.maximum(GROWN * usual, MATTERS * spread)) & (long.errors < spread)
+        if not grown.any():
+            continue  # noise need not be asked
+        floor = noise_floor(fitter, long.fit, long.sigma)
+        plain = grown & (long.errors > BESIDE * np.sqrt(np.nanmean(floor, axis=0)))
+        if plain.any():
+            place = int(np.argmax(np.where(plain, long.errors / spread, 0.0)))
+            channel = long.fit.model.simulator.physical_channels[fitter.samples.measured[place]]
+            sizes = float(long.errors[place]), float(usual[place])
+            return Slow(horizon, fitter.seconds, place, channel, *sizes)
     return None
 
 
-def error_over(horizon: float, log: Log, answer: Answer) -> tuple[Slow, float]:
-    """Error of a corrected simulator over forecasts of a length, and the spread of that channel."""
-    search, corrected = answer.found.search, answer.corrected
+@dataclasses.dataclass(frozen=True)
+class Long:
+    """Forecasts by a corrected simulator over a length.
+
+    Attributes:
+        fitter: With these windows, and ``fit``: of the simulator as it is.
+        errors: Root mean square by measured channel, (m,), and ``sigma``: the noise.
+    """
+
+    fitter: Fitter
+    fit: Fit
+    errors: Array
+    sigma: Array
+
+
+def over(horizon: float, log: Log, answer: Answer) -> Long:
+    """Forecasts by what was corrected over a length in s."""
+    corrected = answer.corrected
     ready = prepare(corrected, log.at(horizon).runs, horizon)
-    fitter = ready.fitter
-    main, error, noise = most_beside_noise(corrected, fitter, ready.floor.sigma, DRAWS)
-    column = fitter.samples.measured[main]
-    usual = float(np.nanmean(search.validated[answer.key].squares[:, main]))
-    spread = float(np.nanstd(fitter.samples.seen[:, column]))
-    channel = search.simulator.physical_channels[column]
-    sizes = [float(np.sqrt(one)) for one in (error, noise, usual)]
-    return Slow(horizon, fitter.seconds, channel, *sizes), spread
+    fit = ready.fitter.fit(Model(corrected), np.zeros(0))
+    errors = np.sqrt(np.nanmean(validate(ready.fitter, fit).squares, axis=0))
+    return Long(ready.fitter, fit, errors, ready.floor.sigma)
 
 
 def slow_error(log: Log, answer: Answer) -> tuple[float, str] | None:

@@ -29,7 +29,7 @@ from residual.gap.answer.varying import no_surer, worth_varying
 from residual.gap.data.windows import TooShort
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.log import Log
-from residual.gap.longer import LESS, LONGER, error_over, longer_horizon, slow_error, slow_remainder
+from residual.gap.longer import LESS, LONGER, longer_horizon, over, slow_error, slow_remainder
 from residual.gap.preparation.horizon import longest_horizon
 from residual.gap.preparation.prepare import Prepared, finely
 from residual.gap.search.redundant import by_points
@@ -222,8 +222,8 @@ class OnceMore:
         if slow is None or horizon < LONGER * self.log.horizon:
             return known
         ready, longer = self._over(known, horizon, "longer forecasts, for a slow error")
-        left, _ = error_over(slow.horizon, self.log, longer)
-        if left.error >= LESS * slow.error:
+        left = over(slow.horizon, self.log, longer).errors[slow.place]
+        if left >= LESS * slow.error:
             return known.and_says(slow.says)
         if not names_more(longer, answer):
             return known  # the same names, of which longer forecasts tell the sizes better
