@@ -139,9 +139,10 @@ class Long:
 def over(horizon: float, log: Log, answer: Answer) -> Long:
     """Forecasts by what was corrected over a length in s."""
     corrected = answer.corrected
-    ready = prepare(corrected, log.at(horizon).runs, horizon)
-    fit = ready.fitter.fit(Model(corrected), np.zeros(0))
-    errors = np.sqrt(np.nanmean(validate(ready.fitter, fit).squares, axis=0))
+    with np.errstate(over="ignore", invalid="ignore"):  # what runs away is no slow error
+        ready = prepare(corrected, log.at(horizon).runs, horizon)
+        fit = ready.fitter.fit(Model(corrected), np.zeros(0))
+        errors = np.sqrt(np.nanmean(validate(ready.fitter, fit).squares, axis=0))
     return Long(ready.fitter, fit, errors, ready.floor.sigma)
 
 
