@@ -111,7 +111,8 @@ def slow_remainder(log: Log, answer: Answer) -> Slow | None:
         grown = (long.errors > np.maximum(GROWN * usual, MATTERS * spread)) & (long.errors < spread)
         if not grown.any():
             continue  # noise need not be asked
-        floor = noise_floor(fitter, long.fit, long.sigma)
+        with np.errstate(over="ignore", invalid="ignore"):
+            floor = noise_floor(fitter, long.fit, long.sigma)
         plain = grown & (long.errors > BESIDE * np.sqrt(np.nanmean(floor, axis=0)))
         if plain.any():
             place = int(np.argmax(np.where(plain, long.errors / spread, 0.0)))
