@@ -115,7 +115,7 @@ def slow_remainder(log: Log, answer: Answer) -> Slow | None:
             floor = noise_floor(fitter, long.fit, long.sigma)
         plain = grown & (long.errors > BESIDE * np.sqrt(np.nanmean(floor, axis=0)))
         if plain.any():
-            place = int(np.argmax(np.where(plain, long.errors / spread, 0.0)))
+            place = int(np.argmax(np.where(plain, long.errors / np.where(plain, spread, 1.0), 0.0)))
             channel = long.fit.model.simulator.physical_channels[fitter.samples.measured[place]]
             sizes = float(long.errors[place]), float(usual[place])
             return Slow(horizon, fitter.seconds, place, channel, *sizes)
