@@ -34,12 +34,10 @@ def swapped(search: Search, key: Key, claims: Sequence[Claim]) -> frozenset[int]
     numbers = {claim.number: np.flatnonzero(fit.model.owner == key.index(claim.number))
                for claim in claims}  # fmt: skip
     for lag, time in itertools.permutations(numbers, 2):
-        change = search.candidates[time].effect
-        (knob,) = search.candidates[time].knobs[:1]
-        drive = search.candidates[lag].effect
-        if not isinstance(drive, ActuatorLag) or knob.unit != "s":
+        drive, change = (search.candidates[number].effect for number in (lag, time))
+        if not (isinstance(drive, ActuatorLag) and isinstance(change, ParameterChange)):
             continue
-        if not isinstance(change, ParameterChange):
+        if search.simulator.parameters[change.parameter].unit != "s":
             continue
         nominal = float(np.mean(search.simulator.parameters[change.parameter].value))
         own, its = fit.theta[numbers[lag][0]], nominal + fit.theta[numbers[time][0]]
