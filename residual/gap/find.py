@@ -157,7 +157,7 @@ def find_gap(
         table, judged = summed_up(answer), NOT_JUDGED
         if log.apart:
             judged = judged_apart(answer, known.prepared, log.apart, table, rested=bool(on_rest))
-        either = swapped(answer.found.search, answer.key, answer.claims)
+        either = swapped(answer.found.search, answer.key)
         answer = replace(
             answer,
             claims=tuple(

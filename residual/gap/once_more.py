@@ -215,11 +215,11 @@ class OnceMore:
         answer, search = known.answer, known.answer.found.search
         if self.log.by_user or not answer.key or search.beside or self._late:
             return known
-        if search.simulator.has_contacts:
+        horizon = longest_horizon(self.log.recorded)
+        if search.simulator.has_contacts or horizon < LONGER * self.log.horizon:
             return known
         slow = slow_remainder(self.log, answer)
-        horizon = longest_horizon(self.log.recorded)
-        if slow is None or horizon < LONGER * self.log.horizon:
+        if slow is None:
             return known
         ready, longer = self._over(known, horizon, "longer forecasts, for a slow error")
         left = over(slow.horizon, self.log, longer).errors[slow.place]

@@ -80,17 +80,20 @@ def takes_most_by_itself(answer: Answer, more: Sequence[Effect]) -> bool:
 def names_more(answer: Answer, earlier: Answer) -> bool:
     """Whether an answer names what an earlier one does, or of its family, is sure of all that that
     one was, and names more."""
-    sure = [claim.number for claim in answer.claims if claim.sure]
     return (
         len(answer.key) > len(earlier.key)
         and _among(answer, answer.key, earlier, earlier.key)
-        and _among(answer, sure, earlier, [c.number for c in earlier.claims if c.sure])
+        and _among(answer, _sure(answer), earlier, _sure(earlier))
     )
 
 
 def still_names(answer: Answer, earlier: Answer) -> bool:
     """Whether an answer names all that an earlier one does with certainty, or of its family."""
-    return _among(answer, answer.key, earlier, [c.number for c in earlier.claims if c.sure])
+    return _among(answer, answer.key, earlier, _sure(earlier))
+
+
+def _sure(answer: Answer) -> list[int]:
+    return [claim.number for claim in answer.claims if claim.sure]
 
 
 def _among(answer: Answer, there: Sequence[int], earlier: Answer, wanted: Sequence[int]) -> bool:

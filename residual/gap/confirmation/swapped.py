@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 
 import numpy as np
 
-from residual.gap.confirmation.claim import Claim
 from residual.gap.search.sets import Key, Search
 from sims.effects.actuator import ActuatorLag
 from sims.effects.parameter import ParameterChange
@@ -18,7 +16,7 @@ SAME = 1.05
 LONGER = 1.5
 
 
-def swapped(search: Search, key: Key, claims: Sequence[Claim]) -> frozenset[int]:
+def swapped(search: Search, key: Key) -> frozenset[int]:
     """Candidates that are a lag and a time of the simulator with each other's size.
 
     From rest, two lags in a row make one motion whichever comes first. Where the drive would be the
@@ -28,23 +26,22 @@ def swapped(search: Search, key: Key, claims: Sequence[Claim]) -> frozenset[int]
     Args:
         search: With what was tried.
         key: The chosen set.
-        claims: Of its members.
     """
     fit, found = search.tried[key], set[int]()
-    numbers = {claim.number: np.flatnonzero(fit.model.owner == key.index(claim.number))
-               for claim in claims}  # fmt: skip
-    for lag, time in itertools.permutations(numbers, 2):
+    for lag, time in itertools.permutations(key, 2):
         drive, change = (search.candidates[number].effect for number in (lag, time))
         if not (isinstance(drive, ActuatorLag) and isinstance(change, ParameterChange)):
             continue
-        if search.simulator.parameters[change.parameter].unit != "s":
+        parameter = search.simulator.parameters[change.parameter]
+        if parameter.unit != "s":
             continue
-        nominal = float(np.mean(search.simulator.parameters[change.parameter].value))
-        own, its = fit.theta[numbers[lag][0]], nominal + fit.theta[numbers[time][0]]
+        nominal = float(np.mean(parameter.value))
+        at, its_at = (np.argmax(fit.model.owner == key.index(number)) for number in (lag, time))
+        own, its = fit.theta[at], nominal + fit.theta[its_at]
         if own < LONGER * its:
             continue
         theta = fit.theta.copy()
-        theta[numbers[lag][0]], theta[numbers[time][0]] = its, own - nominal
+        theta[at], theta[its_at] = its, own - nominal
         if search.fitter.fit(fit.model, theta, fit).merit <= SAME * fit.merit:
             found |= {lag, time}
     return frozenset(found)

@@ -69,6 +69,10 @@ class Signatures:
     matrix: Array
     residual: Array
 
+    def rows_of(self, channels: Sequence[int], measured: int) -> NDArray[np.bool_]:
+        """Which rows are of some channels, by their places among so many measured, (rows,)."""
+        return np.isin(np.arange(len(self.residual)) % measured, channels)
+
     @property
     def strengths(self) -> Array:
         """Squared norm of every column."""

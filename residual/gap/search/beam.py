@@ -252,9 +252,10 @@ def plainer(search: Search, around: Signatures, ranked: list[Gain], most: int) -
     """The first gains, laws that gain hardly more than a special case of theirs replaced by it.
 
     In the linear picture a law gains no less than its special cases, however little its further
-    numbers tell; as one of their family it has its turn when the chosen meets its rivals.
+    numbers tell; as one of their family it has its turn when what is chosen meets its rivals.
     """
-    owner, found = [around.variants[gain.variants[0]].candidate for gain in ranked], list[Gain]()
+    owner = [around.variants[gain.variants[0]].candidate for gain in ranked]
+    found: list[Gain] = []
     for gain, law in zip(ranked[:most], owner[:most], strict=True):
         cases = [g for g, own in zip(ranked, owner, strict=True) if search.contains(law, own)]
         instead = next((g for g in cases if g.value > HARDLY * gain.value), gain)
@@ -266,6 +267,5 @@ def _by_gain(search: Search, around: Signatures, group: tuple[int, ...]) -> list
     """Gains counted on the channels of one joint."""
     if len(search.currency.groups) < 2:
         return gains(around)
-    measured = len(search.fitter.samples.measured)
-    rows = np.isin(np.arange(len(around.residual)) % measured, group)
+    rows = around.rows_of(group, len(search.fitter.samples.measured))
     return gains(around, around.residual[rows], around.matrix[rows])

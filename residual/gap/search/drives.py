@@ -53,7 +53,6 @@ def _drive_of(search: Search, place: str, gains: Sequence[int]) -> int:
     if not own:
         return min(gains, key=lambda n: search.error((n,)) if (n,) in search.tried else np.inf)
     around = search.signatures(())
-    rows = np.isin(np.arange(len(around.residual)) % len(measured), own)
-    moves = np.linalg.norm(around.matrix[rows], axis=0)
+    moves = np.linalg.norm(around.matrix[around.rows_of(own, len(measured))], axis=0)
     by_candidate = {one.candidate: moves[one.columns[0]] for one in around.variants}
     return max(gains, key=lambda number: by_candidate.get(number, 0.0))
