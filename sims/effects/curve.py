@@ -104,10 +104,10 @@ def _basis(points: int) -> NDArray[np.float64]:
     """Coefficients of the cubic splines that are 1 at one of equidistant points and 0 at others.
 
     Returns:
-        shape (pieces, 4, points): by piece between two points, by power of the way into it.
+        shape (points, 4, pieces): by power of the way into a piece between two points.
     """
     spline = CubicSpline(np.arange(points), np.eye(points), bc_type="not-a-knot")
-    return np.ascontiguousarray(spline.c[::-1].transpose(1, 0, 2))
+    return np.ascontiguousarray(spline.c[::-1].transpose(2, 0, 1))
 
 
 def through(way: Value, values: Sequence[Value]) -> Value:
@@ -120,11 +120,9 @@ def through(way: Value, values: Sequence[Value]) -> Value:
     basis = _basis(len(values))
     t = np.clip(way, 0.0, 1.0) * (len(values) - 1)
     # What is no number, as of a trial that ran away, stays none.
-    piece = np.minimum(np.nan_to_num(np.asarray(t)).astype(int), len(basis) - 1)
-    into, of_piece = t - piece, basis[piece]
-    found = 0.0 * t
-    for j, value in enumerate(values):
-        a, b, c, d = np.moveaxis(of_piece[..., j], -1, 0)
+    piece = np.minimum(np.where(np.isnan(t), 0.0, t).astype(int), basis.shape[-1] - 1)
+    into, found = t - piece, 0.0 * t
+    for value, (a, b, c, d) in zip(values, basis.take(piece, axis=-1), strict=True):
         found = found + value * (a + into * (b + into * (c + into * d)))
     return found
 
