@@ -40,6 +40,7 @@ def worked(tmp_path_factory):
     return json.loads((folder / "gap" / "gap.json").read_text()), told, used
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("effect", "where", "truth"),
     [("coulomb_friction", "cart", 0.8), ("viscous_friction", "hinge", 0.01)],
@@ -51,6 +52,7 @@ def test_both_frictions_are_named_within_their_intervals(worked, effect, where, 
     assert number["low"] <= truth <= number["high"]
 
 
+@pytest.mark.long
 def test_nothing_else_is_claimed_and_the_gap_closes(worked):
     gap, told, used = worked
     assert len([v for v in gap["verdicts"] if v["effect"]]) == 2

@@ -145,5 +145,5 @@ def test_a_mujoco_environment_is_the_true_system(here, learner):
         logs = sorted(map(str, (here / output / "samples").glob("*.csv")))
         given = [word for word in asked[3:] if "samples" not in word]
         at = given.index("--logs") + 1
-        find_gap.main([*given[:at], *logs, *given[at:], "--minutes", "0.2"])
+        find_gap.main([*given[:at], *logs, *given[at:], "--minutes", "0.05"])
         assert (here / "gap" / "corrected.yaml").exists()

@@ -16,6 +16,8 @@ from studies import learn
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial-mujoco.md"
 
+pytestmark = pytest.mark.long
+
 
 def run(words, folder):
     paths = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])

@@ -50,6 +50,7 @@ def test_named_effects_refuse_a_simulator_that_hosts_none(here, capsys):
     assert NamedEffects.__name__ in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_wrapped_engine_hosts_effects_and_is_asked(here, capsys):
     from lever import Lever
 

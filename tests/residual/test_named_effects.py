@@ -100,6 +100,7 @@ class PendulumWithoutMass(Pendulum):
         self.parameters = {}
 
 
+@pytest.mark.long
 def test_two_effects_from_a_few_dozen_rows():
     true = PendulumEquation.true().with_effects([CoulombFriction("pivot", 1e-3)])
     model = DifferenceModel(NamedEffects(), PendulumEquation())

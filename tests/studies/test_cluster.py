@@ -112,6 +112,7 @@ def on(cluster):
     return ["--backend", "dask", "--scheduler", cluster.scheduler_address]
 
 
+@pytest.mark.long
 def test_a_killed_worker_loses_no_finished_trial(alone, cluster, tmp_path):
     kept = {}
 

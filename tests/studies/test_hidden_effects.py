@@ -59,6 +59,7 @@ def test_play_moves_as_in_the_simulator():
     assert crossed > 20
 
 
+@pytest.mark.long
 def test_play_is_named_with_its_width():
     # Of four runs it hangs on a processor's rounding whether a delay does as well.
     logs = make_logs(Truth(backlash=0.35), 8, "strong", "A", 6)
@@ -67,6 +68,7 @@ def test_play_is_named_with_its_width():
     assert verdict.parameters["width"].low <= 0.35 <= verdict.parameters["width"].high
 
 
+@pytest.mark.long
 def test_what_only_one_run_shows_is_named():
     # One run turns far away from a cubic spring's centre; its blocks are spread over the folds.
     strength = 5.923225897069604e-11

@@ -122,7 +122,7 @@ def comparable(learnt):
     return json.dumps([{k: v for k, v in r.items() if "seconds" not in k} for r in records])
 
 
-@pytest.mark.parametrize("rule", ["first", "all"])
+@pytest.mark.parametrize("rule", ["first", pytest.param("all", marks=pytest.mark.long)])
 def test_a_flipped_byte_in_any_kept_file_is_healed(tmp_path, caplog, rule):
     whole = comparable(learn(tmp_path, rule))
     kinds = {}

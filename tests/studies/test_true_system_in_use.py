@@ -66,7 +66,10 @@ def with_loose(folder):
     return learn_by_difference(PendulumEquation(), Loose, SwingUp(horizon=30), keep=folder, **QUICK)
 
 
-@pytest.mark.parametrize("loose_at", [1 + 45, 1 + 150 + 35, 1 + 150 + 60 + 150 + 40])
+@pytest.mark.parametrize(
+    "loose_at",
+    [pytest.param(1 + 45, marks=pytest.mark.long), 1 + 150 + 35, 1 + 150 + 60 + 150 + 40],
+)
 def test_a_robot_that_breaks_off_costs_the_episode_at_hand(whole, tmp_path, monkeypatch, loose_at):
     whole, needed, kept = whole
     monkeypatch.setattr(Loose, "taken", 0)

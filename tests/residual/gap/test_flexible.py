@@ -90,6 +90,7 @@ def test_a_load_on_a_spring_has_its_name_its_mass_and_its_frequency():
     ]  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_shaft_that_twists_shows_in_the_speed_of_the_motor():
     rng = np.random.default_rng(2)
     swing, damping, ratio = 2 * np.pi * 15.0, 0.05, 0.6

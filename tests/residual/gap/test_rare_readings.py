@@ -69,7 +69,8 @@ def test_noise_is_told_from_motion(every):
 
 
 @pytest.mark.parametrize(("effects", "kind"), [
-    ((CoulombFriction("pivot", 0.003),), "confirmed"), ((), "no_gap"),
+    pytest.param((CoulombFriction("pivot", 0.003),), "confirmed", marks=pytest.mark.long),
+    ((), "no_gap"),
 ])  # fmt: skip
 def test_an_answer_does_not_take_every_row_for_a_reading(effects, kind):
     result = find_gap(PendulumEquation(dt=0.01), [log(effects, (5, 5), 12.0)], effects=OFFERED)

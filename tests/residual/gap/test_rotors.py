@@ -80,9 +80,8 @@ def measured(rotors, seed, rows=500):
     return Trajectory(f"run {seed}", DT * np.arange(rows), np.array(states), np.array(torques[:-1]))
 
 
-@pytest.mark.parametrize(
-    "rotors", [pytest.param((0.0, 0.02), marks=pytest.mark.long), (0.15, 0.03)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("rotors", [(0.0, 0.02), (0.15, 0.03)])
 def test_the_inertia_of_rotors_is_named_and_no_mass_or_length_for_it(rotors):
     offered = ("added_inertia", "viscous_friction", "delay", "upper", "lower", "first", "second")
     found = find_gap(Arm(), [measured(rotors, seed) for seed in range(3)], effects=offered)

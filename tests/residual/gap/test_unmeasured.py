@@ -124,6 +124,7 @@ def rubbing(_, x, volts):
     return [500.0 * x[1] - 40.0 * np.tanh(x[0]), 100.0 * (volts - x[1] - 0.05 * x[0])]
 
 
+@pytest.mark.long
 def test_friction_of_a_speed_without_a_sensor_is_found_in_the_current():
     rng = np.random.default_rng(0)
     volts = np.repeat(rng.uniform(-6, 6, 16), 50)

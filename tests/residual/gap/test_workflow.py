@@ -52,7 +52,9 @@ def effect(truth, kind, name, field, value, *marks):
     [
         # With rates; with an angle in steps and no rate; with a noisy angle alone.
         effect(Truth(mass=0.3), "A", "mass", "change", 0.3 * 0.055),
-        effect(Truth(coulomb_friction=3e-4), "B", "coulomb_friction", "level", 3e-4),
+        effect(
+            Truth(coulomb_friction=3e-4), "B", "coulomb_friction", "level", 3e-4, pytest.mark.long
+        ),
         effect(Truth(delay=0.04), "C", "delay", "time", 0.04, pytest.mark.long),
         effect(Truth(sensor_offset=0.1), "A", "sensor_offset", "offset", 0.1, pytest.mark.long),
         effect(Truth(saturation=2.2), "A", "saturation", "level", 2.2, pytest.mark.long),

@@ -90,6 +90,7 @@ def test_where_positions_are_unknown_it_may_touch(tmp_path):
     assert simulator.for_motion([]).has_contacts
 
 
+@pytest.mark.long
 def test_a_gap_of_a_motion_that_touches_nothing_is_found_as_of_one_without_contacts(tmp_path):
     simulator = lift(tmp_path)
     true = simulator.with_effects([AttributeChange("damping of joint lift", change=1.0)])

@@ -52,6 +52,7 @@ def with_a_stretch(what):
     return [one.says for one in found.quality if "one stretch" in one.says]
 
 
+@pytest.mark.long
 def test_what_the_rest_of_the_log_shows_is_named(monkeypatch):
     """Though nobody saw that the record begins anew."""
     monkeypatch.setattr(examine, "cut_at_resets", lambda simulator, runs: (list(runs), []))

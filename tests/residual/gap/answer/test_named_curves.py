@@ -68,6 +68,7 @@ def braked():
     return find_gap(Rotor(), [log(eddy_brake, 0)], held_out=[log(eddy_brake, 2)], effects=OFFERED)
 
 
+@pytest.mark.long
 def test_a_brake_that_weakens_with_speed_is_a_curve(braked):
     named = [v for v in braked.verdicts if v.kind in ("confirmed", "ambiguous")]
     assert [(v.kind, v.effect) for v in named] == [("confirmed", "friction_curve")]
@@ -175,6 +176,7 @@ def named(found):
     return [(v.kind, v.effect) for v in found.verdicts if v.kind in ("confirmed", "ambiguous")]
 
 
+@pytest.mark.long
 def test_a_magnet_that_repels_far_out_is_a_force_by_position():
     def magnet(x):
         return -400 * np.tanh(6 * x) * x * x
@@ -231,6 +233,7 @@ def test_where_a_law_was_left_out_its_curve_is_left_out_too():
     assert not any(isinstance(effect, Curve) for effect in found.effects)
 
 
+@pytest.mark.long
 def test_a_thruster_that_is_weaker_astern_is_a_curve_of_both_directions():
     commands, thrusts = [-9.0, -4.0, 0.0, 3.0, 6.0, 9.0], [-4.0, -3.5, 0.0, 1.5, 7.0, 8.0]
     thrust = PchipInterpolator(commands, thrusts)

@@ -40,6 +40,7 @@ def payloads():
     return ask(logs(*(Truth(mass=share) for share in (0.0, 0.15, 0.3, 0.45))))
 
 
+@pytest.mark.long
 def test_a_payload_of_each_record_is_found_with_its_size(payloads):
     first = payloads.unlike[0]
     assert (first.label, first.field, first.unit) == ("mass", "change", "kg")
@@ -66,13 +67,16 @@ def test_what_is_the_same_in_all_records_is_named_beside_what_differs():
 
 
 @pytest.mark.parametrize(
-    "truth", [Truth(), Truth(mass=0.2), Truth(wind=4e-3)], ids=["nothing", "mass", "wind"]
+    "truth",
+    [Truth(), Truth(mass=0.2), pytest.param(Truth(wind=4e-3), marks=pytest.mark.long)],
+    ids=["nothing", "mass", "wind"],
 )
 def test_records_that_agree_are_not_said_to_differ(truth):
     """Also where something has no name: a wind that no library holds."""
     assert ask(logs(*[truth] * 3)).unlike == ()
 
 
+@pytest.mark.long
 def test_loads_of_a_lift_are_told_in_place_of_what_makes_the_best_of_them():
     """One size for all leads to a dead zone and another counterweight."""
     found = find_gap(Lift(), trips(), effects=OFFERED_LIFT, horizon=1.5)

@@ -64,6 +64,7 @@ def test_what_is_found_about_them_is_told_as_such(runs):
     assert set(found.held_out.by_channel) == {"angle"}
 
 
+@pytest.mark.long
 def test_an_effect_that_does_not_help_there_is_not_certain(runs):
     """A brake that was on in the records searched, and off in those set aside."""
     braked = make_logs(Truth(mass=0.2, coulomb_friction=2e-3), 3, "strong", "A", runs=4)

@@ -77,6 +77,7 @@ def test_a_parameter_that_nobody_asks_for_is_no_curve():
     assert not any(isinstance(effect, ParameterCurve) for effect in result.effects)
 
 
+@pytest.mark.long
 def test_it_can_be_asked_for_over_what_the_log_holds():
     records = [motor(seed, 0.0039) for seed in (1, 2)]
     asked = "parameter_curve@resistance over temp"
@@ -100,6 +101,7 @@ def test_a_resistance_that_stays_is_no_curve():
     assert not result.effects and result.changing is None
 
 
+@pytest.mark.long
 def test_two_that_make_the_same_motion_are_both_told():
     """A damper that follows the place and a spring that follows the speed."""
 

@@ -37,7 +37,9 @@ def named(inertia, wind, **options):
     return found.verdicts[0]
 
 
-@pytest.mark.parametrize(("inertia", "wind", "sure"), [(0.025, 2e-4, False), (0.3, 1e-3, True)])
+@pytest.mark.parametrize(("inertia", "wind", "sure"), [
+    (0.025, 2e-4, False), pytest.param(0.3, 1e-3, True, marks=pytest.mark.long),
+])  # fmt: skip
 def test_a_change_within_the_tolerance_of_parameters_is_not_certain(inertia, wind, sure):
     exact = named(inertia, wind, parameter_tolerance=0.0)
     allowed = named(inertia, wind)

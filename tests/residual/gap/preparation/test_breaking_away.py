@@ -56,6 +56,7 @@ def test_thinned_rows_are_followed_through_a_jump_from_rest():
     assert enough_substeps(Stage(), samples, nodes, SIGMA, 40) < count
 
 
+@pytest.mark.long
 def test_its_friction_is_all_that_is_found():
     """One jump from rest that was half a row late left 0.7 % without a name."""
     runs = []

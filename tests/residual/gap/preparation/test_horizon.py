@@ -221,6 +221,7 @@ class Lever(EquationOfMotion):
         return ((u[:, 0] + p.weight * np.sin(q[:, 0]) + force[:, 0]) / p.inertia)[:, None]
 
 
+@pytest.mark.long
 def test_of_a_slow_motion_that_is_unstable_without_what_is_missing_rows_are_close_enough():
     friction, times = 30.0, np.arange(0.0, 60.0, 0.01)
     levels = np.random.default_rng(3).uniform(-0.5, 0.5, 21)
