@@ -29,17 +29,18 @@ class Conventions:
 
     Attributes:
         changes: Lines of the column map, any of which makes the nominal simulator forecast far
-            better: a sign, a zero, a unit or a clock; of ``"row"`` the inputs.
+            better: a sign, a zero, a unit or a clock; of ``"row"`` the inputs, of ``"size"``
+            what is left out.
         times: How much smaller the error is then, or how many times its scale a channel is.
         reason: ``"forecasts"`` are far better so, or with the ``"zero"`` of an angle elsewhere; an
             input would be turned round by what was found (``"sign"``); a channel is far beyond the
-            ``"scale"`` that it declares; or what is found with every input a ``"row"``
-            earlier forecasts better.
+            ``"scale"`` that it declares; what is found with every input a ``"row"`` earlier
+            forecasts better; or a channel may hold the ``"size"`` of a speed alone.
     """
 
     changes: tuple[str, ...]
     times: float
-    reason: Literal["forecasts", "zero", "sign", "scale", "row"] = "forecasts"
+    reason: Literal["forecasts", "zero", "sign", "scale", "row", "size"] = "forecasts"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -30,6 +30,7 @@ from residual.gap.preparation.conventions import (
     other_sign,
     otherwise,
     still_open,
+    without_sign,
 )
 from residual.gap.preparation.horizon import other_length
 from residual.gap.preparation.numerics import held_as
@@ -121,6 +122,7 @@ def find_gap(
         clock.begin()
         converted = frozenset[str]().union(*(run.converted for run in log.runs))
         conventions = otherwise(simulator, prepared.fitter, converted)
+        conventions = conventions or without_sign(simulator, prepared.fitter)
         conventions = conventions or beyond_scale(simulator, prepared.fitter.samples, converted)
         if conventions is not None:
             tell(f"does the log count otherwise, by {' or '.join(conventions.changes)}?")

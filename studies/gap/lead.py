@@ -60,6 +60,8 @@ def _conventions(result: GapResult) -> str:
         f"{changes}",
         "row": f"with {' and '.join(other.changes)} a row earlier in the log, what is found errs "
         f"{other.times:.2g} times less, as where rows hold the command that led to them",
+        "size": f"but for {other.changes[0]}, which never goes below zero in the log, the nominal "
+        f"simulator errs {other.times:.2g} times less, as where a sensor does not tell which way",
     }[other.reason]
     return f"First see whether the log counts as the simulator does: {why}. If that is not it: "
 

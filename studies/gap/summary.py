@@ -51,7 +51,8 @@ def summary(result: GapResult, tolerance: float | None = None) -> str:
         blocks += f", {gap.folds} groups of them left out in turn"
     if result.effects and gap.no_better:
         of = f" {gap.channel}" if others else ""
-        blocks += f"; in {gap.no_better} of them the corrected simulator forecasts{of} no better"
+        some = "one block" if gap.no_better == 1 else f"{gap.no_better} blocks"
+        blocks += f"; in {some} the corrected simulator forecasts{of} no better"
     lines += wrapped(blocks, "  ")
     if result.held_out:
         lines += ["", *held_out(result.held_out)]

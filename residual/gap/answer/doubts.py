@@ -43,8 +43,8 @@ DOUBTS: dict[Doubt, str] = {
     "within": "it may be off by no more than the few percent that are allowed to every parameter",
     "slight": "without it errors are less than 1.5 times as large, and what has no name may favour "
     "it by as much",
-    "few_blocks": "much has no name, and there are too few blocks of data to say that it is not "
-    "what this one stands for",
+    "few_blocks": "what has no name is much more than noise, and there are too few blocks of data "
+    "to say that it is not what this one stands for",
     "rivals": "an effect of another kind does nearly as well",
 }
 

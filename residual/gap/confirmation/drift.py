@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 MUCH = 0.5
 #: Records of which it is no chance that a push grows alike in all.
 ALIKE = 3
+#: Part of the largest eigenvalue from which on slopes by differences tell two directions apart: an
+#: input that rises along a record as time does is none that a drift could be told from.
+RESOLVED = 1e-8
 #: Rounds of weighing windows by what is left of them.
 TURNS = 8
 
@@ -129,7 +132,7 @@ def beside(fit: Fit, more: Sequence[Array], cap: float) -> Fall:
     weights, least, best = fit.weights, fit.merit, np.zeros(columns.shape[2])
     for _ in range(TURNS):
         matrix = np.einsum("wij,w->ij", grams, weights)
-        step = np.linalg.pinv(matrix, rcond=1e-12) @ (weights @ rights)
+        step = np.linalg.pinv(matrix, rcond=RESOLVED) @ (weights @ rights)
         left = np.maximum(costs - 2 * rights @ step + grams @ step @ step, 0.0)
         weights = np.minimum(1.0, cap / np.maximum(left, 1e-300))
         loss = float(capped(left, cap).sum())

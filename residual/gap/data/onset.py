@@ -124,8 +124,9 @@ def _beginning(run: Trajectory, on: bool, bands: Array, least: Array) -> _Beginn
     if not moves.size:
         return None
     onset = int(moves[0]) - 1
-    changes = np.abs(np.diff(run.actions[: onset + 1], axis=0)) > least
-    changed = np.flatnonzero(changes.any(axis=1))
+    # From what they are then, not from row to row: a slow ramp changes, too.
+    others = np.abs(run.actions[: onset + 1] - run.actions[onset]) > least
+    changed = np.flatnonzero(others.any(axis=1))
     since = int(changed[-1]) + 1 if changed.size else 0
     waits = float(run.times[onset] - run.times[since])
     return _Beginning(onset, since, waits, on or since > 0, onset > 0 or _gathers(run, away[1]))

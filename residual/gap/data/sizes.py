@@ -28,6 +28,7 @@ ALMOST, SMALL = 0.03, 0.3
 def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
     """Columns that move far more or far less than declared, as they would not in another unit."""
     found = []
+    converted = frozenset[str]().union(*(run.converted for run in trajectories))
     for channel, size, declared in _sizes(simulator, trajectories):
         times = size / declared
         if not times > 0.0 or 1 / FAR < times < FAR:
@@ -35,8 +36,9 @@ def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[
         units = other_units(channel.unit)
         near = [
             *(f"`unit: {n}`" for n, unit in units if _near(times * unit.factor)),
-            *(f"`unit: {channel.unit}` in place of {n}" for n, unit in units
-              if _near(times / unit.factor)),
+            *(f"`unit: {channel.unit}` in place of {n}" if channel.name in converted
+              else f"`scale: {1 / unit.factor:g}`"
+              for n, unit in units if _near(times / unit.factor)),
         ]  # fmt: skip
         if near:
             says = (

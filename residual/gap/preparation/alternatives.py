@@ -54,6 +54,12 @@ class Convention:
         return bool((factors == -1).any() and (np.abs(factors) == 1).all() and not offsets.any())
 
     @property
+    def shifted(self) -> bool:
+        """Whether a unit has another zero, as K for degC."""
+        factors, offsets = np.hstack([self.states, self.inputs])
+        return bool(offsets.any() and (factors > 0).all() and not self.turned)
+
+    @property
     def exchanged(self) -> bool:
         """Whether two columns are in each other's place."""
         return any((np.diff(places) < 0).any() for places in (self.states_from, self.inputs_from))

@@ -8,7 +8,6 @@ better with one of them changed.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Collection, Sequence
 from typing import Literal
@@ -21,8 +20,6 @@ from residual.gap.data.samples import Samples
 from residual.gap.fitting.contract import Fitter
 from residual.gap.fitting.plausible import turned_round
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.model import paths
-from residual.gap.model.model import Model
 from residual.gap.preparation.alternatives import (
     Convention,
     as_said,
@@ -32,6 +29,7 @@ from residual.gap.preparation.alternatives import (
     plainest,
     reversed_sign,
 )
+from residual.gap.preparation.way import mean_error
 from residual.logs.units import other_units
 from sims.effects.base import Effect
 from sims.effects.sensor import SensorOffset
@@ -65,10 +63,9 @@ NEXT = 0.125
 #: Part of what was found makes forecasts better by, from which on another zero does so, too, and
 #: times that it has to be: forecasts that run away are two to three times better where it hangs.
 NEARLY, TENFOLD = 0.33, 10.0
-#: Windows that are looked at: all rows at once, and row by row.
-AT_ONCE, BY_ROW = 120, 20
-#: Error of a window in those units beyond which it is just wrong.
-WRONG = 5.0
+#: Error from which on nearly every window is just wrong, and times that a unit with another zero,
+#: such as K for degC, has to make it smaller: no physics is hundreds of degrees off.
+LOST, FOUND = 4.0, 3.0
 
 
 def otherwise(
@@ -88,28 +85,61 @@ def otherwise(
     """
     if not isinstance(fitter, SmoothFitter):
         return None
-    own = _error(simulator, fitter, as_said(simulator))
+    own = mean_error(simulator, fitter, as_said(simulator))
     if own < HIDDEN:
         return None
     poor = own >= POOR
     possible = conventions(simulator, fitter.samples, converted)
     asked = [one for one in possible if poor or one.sign or one.exchanged]
-    errors = [(_error(simulator, fitter, one), one) for one in asked]
+    errors = [(mean_error(simulator, fitter, one), one) for one in asked]
     least, best = min(errors, key=lambda pair: pair[0], default=(own, as_said(simulator)))
     times, good = (EXCHANGED, FAIR) if best.exchanged else (BETTER, GOOD)
     if best.sign and own >= ASTRAY:
         good = max(good, FAIR)
     if CLEARLY * least <= own:
         good = ABSURD
+    if best.shifted and own >= LOST:
+        good = max(good, own / FOUND)
     if (times if poor else CLEARLY) * least > own or least > good:
         return None
     further = None if _smaller_angle(simulator, fitter.samples, best) else beyond(best)
-    if further is not None and BETTER * least > _error(simulator, fitter, further):
+    if further is not None and BETTER * least > mean_error(simulator, fitter, further):
         return None
     near = [(error, one) for error, one in errors if error < ALIKE * least]
     alike = plainest([one for _, one in sorted(near, key=lambda pair: pair[0])])
     reason: Literal["zero", "forecasts"] = "zero" if best.turned else "forecasts"
     return Conventions(tuple(one.says for one in alike), own / least, reason)
+
+
+def without_sign(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:
+    """A speed of which the log may hold the size alone, as of a sensor that counts and does not
+    tell which way: never below zero, though an input acts both ways; None if there is none.
+
+    Args:
+        simulator: The nominal simulator.
+        fitter: With the windows to forecast.
+    """
+    if not isinstance(fitter, SmoothFitter):
+        return None
+    samples, channels = fitter.samples, simulator.physical_channels
+    low, high = samples.actions.min(axis=0), samples.actions.max(axis=0)
+    if not ((low < 0) & (high > 0)).any():
+        return None
+    measured = {channels[place].name for place in samples.measured}
+    alone = [
+        place
+        for place in samples.measured
+        if channels[place].kind == "rate"
+        and channels[place].rate_of not in measured
+        and np.nanmin(samples.seen[:, place]) >= 0
+    ]
+    said = as_said(simulator)
+    own = mean_error(simulator, fitter, said) if alone else 0.0
+    for place in alone if own >= POOR else ():
+        so = mean_error(simulator, fitter, said, place)
+        if so <= FAIR and BETTER * so <= own:
+            return Conventions((f"the sign of {channels[place].name}",), own / so, "size")
+    return None
 
 
 def still_open(
@@ -197,46 +227,3 @@ def _smaller_angle(simulator: HostSimulator, samples: Samples, convention: Conve
         if beyond_a_turn and convention.states[0, column] < 1:
             return True
     return False
-
-
-def _error(simulator: HostSimulator, fitter: SmoothFitter, convention: Convention) -> float:
-    """Mean error of forecasts straight from what was measured, in units of the usual way."""
-    samples, windows = fitter.samples, fitter.blocks.windows
-    (factor, offset), (gain, bias) = convention.states, convention.inputs
-
-    def acting(actions: Array) -> Array:
-        return gain * actions[..., convention.inputs_from] + bias
-
-    clock = convention.clock
-    samples = dataclasses.replace(
-        samples, seen=factor * samples.seen[:, convention.states_from] + offset,
-        actions=acting(samples.actions), durations=clock * samples.durations,
-        times=clock * samples.times,
-        recorded=tuple(
-            dataclasses.replace(
-                run, actions=acting(run.actions), durations=clock * run.durations,
-                before=None if run.before is None else acting(run.before),
-            )
-            for run in samples.recorded
-        ),
-    )  # fmt: skip
-    model, none = Model(simulator), np.zeros((1, 0))
-    nodes = paths.measured(model, samples, none[0])
-    most = AT_ONCE if simulator.advances_rows_at_once else BY_ROW
-    some = np.unique(np.linspace(0, len(windows) - 1, most).astype(int))
-    index, inside = windows.index[some], windows.inside[some]
-    asked = dataclasses.replace(fitter, samples=samples)
-    shown = asked.shown(
-        model, index[:, 0], nodes[index[:, 0]], index.shape[1] - 1, none,
-        np.zeros(len(some), int),
-    )  # fmt: skip
-    seen = samples.seen[index][..., samples.measured]
-    there = np.isfinite(seen) & inside[..., None]
-    count = np.maximum(there.sum(axis=1), 1)
-    way = np.where(there, seen - nodes[index[:, :1]][..., samples.measured], 0.0)
-    usual = np.sqrt((way**2).sum(axis=(0, 1)) / np.maximum(there.sum(axis=(0, 1)), 1))
-    miss = np.where(there, (shown - seen) / np.where(usual > 0, usual, 1.0), 0.0)
-    with np.errstate(over="ignore"):  # what runs away is wrong, too
-        squares = np.nan_to_num(miss, nan=np.inf) ** 2
-    each = np.sqrt(squares.sum(axis=(1, 2)) / np.maximum(count.sum(axis=1), 1))
-    return float(np.minimum(each, WRONG).mean())
