@@ -8,6 +8,7 @@ import numpy as np
 
 from residual.gap.confirmation.drift import beside
 from residual.gap.data.examine import examine
+from residual.gap.data.sweeps import sweeps
 from residual.trajectories import Trajectory
 from sims import Channel, FirstOrderSystem, Parameter
 
@@ -44,6 +45,25 @@ def test_a_slow_ramp_is_no_late_switch():
     done = examine(Motor(), [ramp()])
     assert len(done.trajectories[0]) == ROWS - 1
     assert "onset" not in {finding.kind for finding in done.findings}
+
+
+def swept(*commands):
+    """Which inputs are told to go one way only, of records of such commands."""
+    runs = [
+        Trajectory(f"run {i}", DT * np.arange(len(u) + 1), np.zeros((len(u) + 1, 1)), u[:, None])
+        for i, u in enumerate(commands)
+    ]
+    return [finding.where for finding in sweeps(Motor(), runs)]
+
+
+def test_a_single_sweep_one_way_is_told():
+    up, noise = np.linspace(1.0, 253.0, 60), np.random.default_rng(0).normal(0.0, 0.5, 60)
+    assert swept(up) == swept(-up) == swept(up + noise) == ["pwm"]
+    for others in (
+        [up, up], [np.append(up, up[::-1])], [np.repeat([0.0, 200.0], 30)], [0 * up],
+        [np.repeat([0.0, 50, 100, 150], 20)],
+    ):  # fmt: skip
+        assert swept(*others) == []
 
 
 def test_a_push_that_grows_as_the_command_does_leaves_sizes_as_they_are():
