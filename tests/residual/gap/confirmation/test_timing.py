@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from residual.gap import find_gap
 from residual.gap.confirmation.timing import untimed
 from residual.gap.data.samples import Samples
 from residual.gap.model.candidates import candidates
@@ -33,3 +34,21 @@ def test_a_time_is_told_by_what_the_log_resolves(effect, hold, samples, changes,
         candidates=tried, fitter=SimpleNamespace(samples=table), simulator=simulator
     )
     assert untimed(search, 0, np.array([samples * 0.05])) is found
+
+
+@pytest.mark.parametrize(("noise", "sure"), [(2e-4, True), (0.6, False)])
+def test_an_interval_that_reaches_below_half_a_sample_is_not_certain(noise, sure):
+    """A delay of 0.6 samples, as clear as the noise lets it be."""
+    rng = np.random.default_rng(0)
+    simulator = PendulumEquation(dt=0.02)
+    volts = np.repeat(rng.uniform(-2.0, 2.0, (1, 80, 1)), 5, axis=1)
+    states = simulator.with_effects([Delay("voltage", 0.012)]).rollout(
+        np.array([[np.pi, 0.0, 0.0]]), volts
+    )[0, :, :2]
+    states += noise * rng.standard_normal(states.shape)
+    run = Trajectory("run", 0.02 * np.arange(len(states)), states, volts[0])
+    result = find_gap(simulator, run, effects=["delay"], parameter_tolerance=0.01)
+    (verdict,) = [v for v in result.verdicts if v.effect == "delay"]
+    (number,) = verdict.parameters.values()
+    assert (number.low > 0.01) is sure
+    assert ("clock" in verdict.doubts) is not sure
