@@ -80,7 +80,6 @@ def mean_error(
     starts = nodes[index[:, 0]]
     each = errors(starts)
     if sizes is not None:
-        starts = starts.copy()
         starts[:, sizes] *= -1.0
         each = np.minimum(each, errors(starts))
     return float(np.minimum(each, WRONG).mean())
