@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import worth_a_curve
 from residual.gap.answer.free_parameters import better, worth_freeing
+from residual.gap.answer.laws import beside_curves
 from residual.gap.answer.left import (
     names_more,
     still_names,
@@ -145,7 +146,12 @@ class OnceMore:
         """The same, or what is found with curves by points if they take most of what is left."""
         curves = worth_a_curve(known.answer, self.inquiry.offered.curves)
         lacking = "a law that the library does not have, a curve by speed, position or command"
-        return self._with_more(known, curves, "curves by points in place of laws", lacking)
+        what = "curves by points in place of laws"
+        found, second = self._asked_with(known, curves, what, lacking)
+        if second is None or found.answer is second:
+            return found
+        beside = beside_curves(found.answer, second, curves)
+        return dataclasses.replace(found, answer=beside)
 
     def with_parts(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with flexible parts if they take most of what is left.
@@ -245,19 +251,26 @@ class OnceMore:
         self, known: Confirmed, more: Sequence[Effect], what: str, lacking: str
     ) -> Confirmed:
         """The same, or what is found with more on offer if that takes most of what is left."""
+        return self._asked_with(known, more, what, lacking)[0]
+
+    def _asked_with(
+        self, known: Confirmed, more: Sequence[Effect], what: str, lacking: str
+    ) -> tuple[Confirmed, Answer | None]:
+        """``_with_more``, and what was found with more on offer, if it was asked."""
         if not more:
-            return known
+            return known, None
         if self._late:
-            return known.and_says(
+            late = known.and_says(
                 f"what is left may be {lacking}: there was no time to look, give more --minutes "
                 "(half of them are for searching, the rest is for confirming)"
             )
+            return late, None
         self.inquiry.tell(f"once more with {what}")
         beside, offered = known.answer.found.search.beside, [*_curves(known), *more]
         second = self.inquiry.asked_again(known, self.tolerance, beside, offered)
         if not takes_what_is_left(second, known.answer, more):
-            return known
-        return dataclasses.replace(known, answer=second)
+            return known, second
+        return dataclasses.replace(known, answer=second), second
 
     @property
     def _late(self) -> bool:

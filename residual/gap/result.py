@@ -25,13 +25,14 @@ Kind = Literal[
 #: there was no time to ask that, it is a time below half a sample, or in another one's place,
 #: the simulator may cut off what is there, a number is out of all proportion, it is one of
 #: several orders or beside what has no name, one effect that differs between records does better,
-#: records that were set aside are foretold worse, or no better, its interval holds zero, few blocks
-#: of data leave much without a name, or an effect of another kind does as well.
+#: records that were set aside are foretold worse, or no better, its interval holds zero or ten
+#: times its size, few blocks of data leave much without a name, or an effect of another kind does
+#: as well.
 Doubt = Literal[
     "not_needed", "unsteady", "creeps", "drift", "one_way", "numerics", "at_bound", "calibration",
     "within", "slight", "no_time", "clock", "swapped", "sensor", "conventions", "cut_off",
     "extreme", "orders", "levels", "records", "law", "set_aside", "no_help", "may_be_zero",
-    "share_may_be_zero", "few_blocks", "rivals",
+    "size_open", "share_may_be_zero", "few_blocks", "rivals",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.
 WORSE = 1.05

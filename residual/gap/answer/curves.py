@@ -69,7 +69,7 @@ def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
     named = [search.candidates[number].effect for number in key]
     found = []
     for curve in curves:
-        if named and not any(_of_its_kind(curve, effect) for effect in (*named, *alike)):
+        if named and not any(of_its_kind(curve, effect) for effect in (*named, *alike)):
             continue
         low, high = _values(curve, fitter, search.simulator)
         if high > low and not _counts_turns(curve, search.simulator, high - low):
@@ -77,7 +77,7 @@ def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
     return found
 
 
-def _of_its_kind(curve: Curve, effect: Effect) -> bool:
+def of_its_kind(curve: Curve, effect: Effect) -> bool:
     """Whether an effect may be an imitation of what follows a curve."""
     if isinstance(curve, StateCurve) and effect.enters == "parameter":
         return True  # a loss that parameters make already is not looked for

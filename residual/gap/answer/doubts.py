@@ -38,6 +38,7 @@ DOUBTS: dict[Doubt, str] = {
     "no_time": "there was no time to ask whether parameters that are a few percent off would do as "
     "well, give more --minutes",
     "may_be_zero": "its interval holds zero, or nearly",
+    "size_open": "it may be more than ten times as large as what fits best",
     "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
     "calibration": "parameters that are a few percent off would do nearly as well",
     "within": "it may be off by no more than the few percent that are allowed to every parameter",
@@ -49,13 +50,16 @@ DOUBTS: dict[Doubt, str] = {
 }
 
 
-def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...]:
+def doubts(
+    claim: Claim, vanishes: bool, thin: bool = False, wide: bool = False
+) -> tuple[Doubt, ...]:
     """Why an effect is not certain.
 
     Args:
         claim: What bears on it.
         vanishes: Whether its interval holds zero, or nearly.
         thin: Whether few blocks of data leave much without a name.
+        wide: Whether it may be many times as large.
     """
     why: dict[Doubt, bool] = {
         "not_needed": not claim.needed,
@@ -82,6 +86,7 @@ def doubts(claim: Claim, vanishes: bool, thin: bool = False) -> tuple[Doubt, ...
         "set_aside": claim.refuted,
         "no_help": claim.helpless,
         "may_be_zero": vanishes,
+        "size_open": wide,
         "share_may_be_zero": not claim.gains,
         "few_blocks": thin,
         "rivals": bool(claim.rivals or claim.alike),

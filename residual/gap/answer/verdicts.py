@@ -8,7 +8,7 @@ from residual.gap.answer.doubts import DOUBTS, doubts
 from residual.gap.beside import Blind
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
 from residual.gap.confirmation.claim import Claim
-from residual.gap.confirmation.size import may_be_none, may_vanish
+from residual.gap.confirmation.size import may_be_none, may_vanish, size_open
 from residual.gap.fitting.contract import Left
 from residual.gap.result import Gap, Kind, Span, Verdict
 from residual.gap.search.sets import Search
@@ -65,8 +65,8 @@ def effect_verdict(
     claim = claim.less(stand_ins)
     effect = search.candidates[claim.number].effect
     vanishes = may_vanish(search, claim) if claim.there else may_be_none(search, claim)
-    thin = blocks < FEW and left > MUCH
-    sure = claim.sure and blocks >= TOO_FEW and not (vanishes or thin)
+    thin, wide = blocks < FEW and left > MUCH, size_open(search, claim)
+    sure = claim.sure and blocks >= TOO_FEW and not (vanishes or thin or wide)
     kind: Kind = "confirmed" if sure else "ambiguous"
     family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""
     numbers = ", ".join(
@@ -95,7 +95,7 @@ def effect_verdict(
     if together:
         sets = " or ".join(" with ".join(names) for names in together[:2])
         says.append(f"{sets}, in one exact proportion, would move alike")
-    why = doubts(claim, vanishes, thin)
+    why = doubts(claim, vanishes, thin, wide)
     says += [DOUBTS[doubt] for doubt in why if doubt != "rivals"]
     if claim.by_fit and not (claim.needed and claim.gains):
         says.append("a fit to all data leaves three times as much without it")

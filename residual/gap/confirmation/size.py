@@ -13,6 +13,8 @@ from sims.effects.curves import StateCurve
 
 #: Part of a strength below which an effect hardly acts.
 NEARLY_NONE = 0.1
+#: Times as large as what was found that a strength may be, beyond which its size is open.
+OPEN = 10.0
 
 
 def may_vanish(search: Search, claim: Claim) -> bool:
@@ -34,6 +36,13 @@ def may_be_none(search: Search, claim: Claim) -> bool:
     numbers = [claim.numbers[knob.field] for knob in strengths(search, claim)]
     told = [n for n in numbers if n.value and not n.at_bound]
     return bool(told) and max(min(n.low / n.value, n.high / n.value) for n in told) < NEARLY_NONE
+
+
+def size_open(search: Search, claim: Claim) -> bool:
+    """Whether every strength of an effect may be many times as large as what was found."""
+    numbers = [claim.numbers[knob.field] for knob in strengths(search, claim)]
+    told = [n for n in numbers if n.value and not n.at_bound]
+    return bool(told) and min(max(n.low / n.value, n.high / n.value) for n in told) > OPEN
 
 
 def with_size(search: Search, claim: Claim) -> Claim:

@@ -171,18 +171,26 @@ def near_best(search: Search) -> list[Key]:
 
 def carried(earlier: Search, search: Search) -> Proposals:
     """The best sets of an earlier search, as sets of another one's candidates."""
-    places = {candidate.effect: i for i, candidate in enumerate(search.candidates)}
     found: Proposals = {}
     for key in near_best(earlier):
-        effects = [earlier.candidates[i].effect for i in key]
-        if not key or not all(effect in places for effect in effects):
-            continue
-        numbers = [places[effect] for effect in effects]
-        model, theta = earlier.tried[key].model, earlier.own(key)
-        own = {n: theta[model.owner[: len(theta)] == at] for at, n in enumerate(numbers)}
-        fresh = tuple(sorted(own))
-        found[fresh] = np.concatenate([own[n] for n in fresh])
+        found |= brought(earlier, key, search) if key else {}
     return found
+
+
+def brought(earlier: Search, key: Key, search: Search) -> Proposals:
+    """A set of an earlier search with what was fitted, as one of another search's candidates.
+
+    Nothing if these lack one of its effects.
+    """
+    places = {candidate.effect: i for i, candidate in enumerate(search.candidates)}
+    effects = [earlier.candidates[i].effect for i in key]
+    if not all(effect in places for effect in effects):
+        return {}
+    model, theta = earlier.tried[key].model, earlier.own(key)
+    owner = model.owner[: len(theta)]
+    own = {places[effect]: theta[owner == at] for at, effect in enumerate(effects)}
+    fresh = tuple(sorted(own))
+    return {fresh: np.concatenate([own[n] for n in fresh]) if fresh else np.zeros(0)}
 
 
 def settle(search: Search, floor: Noise) -> Explanation:

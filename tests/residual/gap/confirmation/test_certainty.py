@@ -272,6 +272,15 @@ def test_what_may_be_zero_is_not_confirmed(low, kind):
     assert ("may_be_zero" in verdict.doubts) is (kind == "ambiguous")
 
 
+@pytest.mark.parametrize(("high", "kind"), [(0.09, "confirmed"), (0.11, "ambiguous")])
+def test_what_may_be_ten_times_as_large_is_not_confirmed(high, kind):
+    verdict = effect_verdict(
+        Toy({(0,): 0.3}), claim(numbers={"change": Number(0.01, 0.008, high, "kg")}), 20
+    )
+    assert verdict.kind == kind
+    assert verdict.doubts == (("size_open",) if kind == "ambiguous" else ())
+
+
 @pytest.mark.parametrize(
     ("contacts", "error", "left"),
     [(False, 0.51, ()), (True, 0.51, ("constant_load@pivot",)), (True, 0.56, ())],
