@@ -150,8 +150,8 @@ class OnceMore:
         found, second = self._asked_with(known, curves, what, lacking)
         if second is None or found.answer is second:
             return found
-        beside = beside_curves(found.answer, second, curves)
-        return dataclasses.replace(found, answer=beside)
+        beside, says = beside_curves(found.answer, second, curves)
+        return dataclasses.replace(found, answer=beside, says=(*found.says, *says))
 
     def with_parts(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with flexible parts if they take most of what is left.

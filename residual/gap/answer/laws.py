@@ -19,7 +19,9 @@ from sims.effects.curve import Curve
 LESS = 0.75
 
 
-def beside_curves(first: Answer, second: Answer, curves: Sequence[Curve]) -> Answer:
+def beside_curves(
+    first: Answer, second: Answer, curves: Sequence[Curve]
+) -> tuple[Answer, tuple[str, ...]]:
     """The first answer, with every curve that leaves clearly less in place of its laws beside them.
 
     Laws that come near the true one may be named together, and be needed. What is missing besides
@@ -29,17 +31,26 @@ def beside_curves(first: Answer, second: Answer, curves: Sequence[Curve]) -> Ans
         first: With the library's laws.
         second: What was found with curves on offer, too.
         curves: Those.
+
+    Returns:
+        The answer, and what is to be said of each such curve.
     """
     effects = first.found.search.candidates
-    claims = list(first.claims)
+    claims, says = list(first.claims), []
     for curve in curves:
         laws = [n for n in first.key if _is_law(effects[n].effect, curve)]
-        doubtful = laws if laws and _leaves_less(first, second, curve, laws) else ()
+        if not laws or not _leaves_less(first, second, curve, laws):
+            continue
         claims = [
-            _beside(one, effects[one.number].effect, curve) if one.number in doubtful else one
+            _beside(one, effects[one.number].effect, curve) if one.number in laws else one
             for one in claims
         ]
-    return dataclasses.replace(first, claims=tuple(claims))
+        names = " and ".join(effects[n].label for n in laws)
+        says.append(
+            f"{curve}, a curve by points, forecasts better in place of {names}: to see it, name it "
+            "in --effects with all that may be missing but these"
+        )
+    return dataclasses.replace(first, claims=tuple(claims)), tuple(says)
 
 
 def _is_law(effect: Effect, curve: Curve) -> bool:
