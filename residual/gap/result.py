@@ -19,20 +19,12 @@ Array = NDArray[np.float64]
 Kind = Literal[
     "confirmed", "ambiguous", "calibrated", "minor", "needs_data", "unexplained", "no_gap"
 ]
-#: Why an effect is not certain: forecasts are not clearly worse without it, its size differs
-#: between folds or with the numerics, a push that drifts does as well, a load may be a part of it,
-#: it lies at its bound, parameters within their tolerance do as well, it may be one of those, or
-#: there was no time to ask that, it is a time below half a sample, or in another one's place,
-#: the simulator may cut off what is there, a number is out of all proportion, it is one of
-#: several orders or beside what has no name, one effect that differs between records does better,
-#: records that were set aside are foretold worse, or no better, its interval holds zero or ten
-#: times its size, few blocks of data leave much without a name, or an effect of another kind does
-#: as well.
+#: Why an effect is not certain, each in words in ``residual.gap.answer.doubts.DOUBTS``.
 Doubt = Literal[
-    "not_needed", "unsteady", "creeps", "drift", "one_way", "numerics", "at_bound", "calibration",
-    "within", "slight", "no_time", "clock", "swapped", "sensor", "conventions", "cut_off",
-    "extreme", "orders", "levels", "records", "law", "set_aside", "no_help", "may_be_zero",
-    "size_open", "share_may_be_zero", "few_blocks", "rivals",
+    "not_needed", "unsteady", "creeps", "drift", "one_way", "law", "numerics", "at_bound",
+    "clock", "within_step", "swapped", "conventions", "cut_off", "extreme", "orders", "levels",
+    "records", "set_aside", "no_help", "sensor", "no_time", "may_be_zero", "size_open",
+    "share_may_be_zero", "calibration", "within", "slight", "few_blocks", "rivals",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.
 WORSE = 1.05

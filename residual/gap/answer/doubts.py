@@ -18,6 +18,7 @@ DOUBTS: dict[Doubt, str] = {
     "at_bound": "its size lies at its bound",
     "clock": "the log does not tell its time well enough: late time stamps, an input that is held, "
     "a filter in a sensor, or an input that came on later would do as well",
+    "within_step": "it may be less than one of the steps in which its sensor reads",
     "swapped": "a lag of the drive and a time constant in each other's place make the same motion, "
     "and the drive would be the slower of the two",
     "conventions": "it has to be seen first whether the log counts as the simulator does",
@@ -75,6 +76,7 @@ def doubts(
         "slight": claim.slight,
         "no_time": claim.unasked,
         "clock": claim.brief,
+        "within_step": claim.within_step,
         "swapped": claim.swapped,
         "sensor": claim.sensor,
         "conventions": claim.counted,

@@ -16,7 +16,7 @@ from residual.gap.confirmation.few_levels import by_few_levels
 from residual.gap.confirmation.following import by_another_law
 from residual.gap.confirmation.numerics import STEADY, at_half_step, in_the_limit, survives
 from residual.gap.confirmation.one_way import may_hold_a_load
-from residual.gap.confirmation.timing import untimed
+from residual.gap.confirmation.resolution import untimed
 from residual.gap.fitting.intervals import bounded, deviations, ended
 from residual.gap.fitting.plausible import doubtful_sensor
 from residual.gap.search.comparisons import AT_ONE, no_match

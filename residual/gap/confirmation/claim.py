@@ -45,6 +45,7 @@ class Claim:
         slight: Whether they are without these, too: the parameters do nothing of its work.
         unasked: Whether there was no time to ask that.
         brief: Whether it is a time too short for the log's own clock.
+        within_step: Whether it may be less than a step of the sensor whose zero it is.
         counted: Whether the log may count otherwise than the simulator does.
         cut_off: Whether the simulator stays the same beyond a value that was recorded.
         extreme: Whether a number of its set is out of all proportion to the simulator's.
@@ -81,6 +82,7 @@ class Claim:
     slight: bool = False
     unasked: bool = False
     brief: bool = False
+    within_step: bool = False
     swapped: bool = False
     sensor: bool = False
     counted: bool = False
@@ -118,6 +120,7 @@ class Claim:
             self.calibration,
             self.within,
             self.brief,
+            self.within_step,
             self.swapped,
             self.sensor,
             self.counted,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from residual.gap.confirmation.certainty import CLEARLY, HOPELESS, ratio, where_it_matters
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.drift import Drift
-from residual.gap.confirmation.timing import untimed
+from residual.gap.confirmation.resolution import below_a_step, untimed
 from residual.gap.fitting.bounded import bounded_step
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.intervals import deviations
@@ -70,15 +70,20 @@ def widened(
         claim = _widened(search, key, claim, freed, smaller, best)
         claim = _beside_rivals(search, key, claim, claims)
         claim = _on_the_way(_beside_drifts(search, key, claim, drifts))
-        told.append(_timed(search, claim if adequate else _of_a_misfit(search, key, claim)))
+        told.append(_resolved(search, claim if adequate else _of_a_misfit(search, key, claim)))
     return told
 
 
-def _timed(search: Search, claim: Claim) -> Claim:
-    """A claim that says so if it may be a time too short for the log's own clock."""
+def _resolved(search: Search, claim: Claim) -> Claim:
+    """A claim that says so if it may be a time too short for the log's own clock, or a zero that is
+    off by less than a step of its sensor."""
     knobs = search.candidates[claim.number].knobs
     least = np.array([max(claim.numbers[knob.field].low, 0.0) for knob in knobs])
-    return dataclasses.replace(claim, brief=claim.brief or untimed(search, claim.number, least))
+    return dataclasses.replace(
+        claim,
+        brief=claim.brief or untimed(search, claim.number, least),
+        within_step=below_a_step(search, claim.number, claim.numbers),
+    )
 
 
 def _of_a_misfit(search: Search, key: Key, claim: Claim) -> Claim:

@@ -1,4 +1,4 @@
-"""Times too short for a log's own clock are not certain."""
+"""Times too short for a log's own clock are not certain, nor zeros below a sensor's steps."""
 
 from types import SimpleNamespace
 
@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from residual.gap import find_gap
-from residual.gap.confirmation.timing import untimed
+from residual.gap.confirmation.resolution import below_a_step, untimed
 from residual.gap.data.samples import Samples
 from residual.gap.model.candidates import candidates
+from residual.gap.result import Number
 from residual.trajectories import Trajectory
-from sims.effects import ActuatorLag, Delay
+from sims.effects import ActuatorLag, Delay, SensorOffset, ViscousFriction
 from sims.pendulum_equation import PendulumEquation
 
 
@@ -52,3 +53,28 @@ def test_an_interval_that_reaches_below_half_a_sample_is_not_certain(noise, sure
     (number,) = verdict.parameters.values()
     assert (number.low > 0.01) is sure
     assert ("clock" in verdict.doubts) is not sure
+
+
+@pytest.mark.parametrize(
+    ("effect", "low", "step", "found"),
+    [
+        (SensorOffset("angle", 0.02), 0.003, 0.004, True),
+        (SensorOffset("angle", 0.02), 0.005, 0.004, False),
+        (SensorOffset("angle", 0.02), 0.003, 0.0, False),
+        (ViscousFriction("pivot", 0.02), 0.003, 0.004, False),
+    ],
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_zero_is_told_by_the_steps_of_its_sensor(effect, low, step, found, sign):
+    simulator, times = PendulumEquation(), 0.05 * np.arange(200)
+    angle = 0.03 * np.sin(1.7 * times) + 0.02 * np.sin(0.4 * times)
+    read = np.round(angle / step) * step if step else angle
+    run = Trajectory("run", times, np.stack([read, 0 * read], axis=1), np.ones((199, 1)))
+    table = Samples.join([run], 4)
+    search = SimpleNamespace(
+        candidates=candidates(simulator, [effect], table),
+        fitter=SimpleNamespace(samples=table), simulator=simulator,
+    )  # fmt: skip
+    ends = sorted((sign * low, sign * 0.04))
+    numbers = {"offset": Number(sign * 0.02, *ends, "rad")}
+    assert below_a_step(search, 0, numbers) is found

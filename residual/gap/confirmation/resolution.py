@@ -1,12 +1,17 @@
-"""Whether a log tells time well enough for what an effect makes of it."""
+"""Whether a log resolves an effect: times by its clock, zeros by the steps of a sensor."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.result import Number
 from residual.gap.search.sets import Search
+from residual.logs.faults import rounding
 from sims.effects.actuator import Delay
+from sims.effects.sensor import SensorOffset
 
 Array = NDArray[np.float64]
 
@@ -39,3 +44,21 @@ def untimed(search: Search, number: int, values: Array) -> bool:
         return True
     straight = any(search.simulator.action_channels[j].hold == "linear" for j in acting)
     return bool(min(times) < (HELD if straight else BRIEF) * clock)
+
+
+def below_a_step(search: Search, number: int, numbers: Mapping[str, Number]) -> bool:
+    """Whether the zero of a sensor may be wrong by less than one of the steps that it reads in.
+
+    Args:
+        search: Holds the log.
+        number: The effect's.
+        numbers: Its fitted numbers with their intervals, by field.
+    """
+    effect = search.candidates[number].effect
+    if not isinstance(effect, SensorOffset):
+        return False
+    names = [channel.name for channel in search.simulator.physical_channels]
+    samples, column = search.fitter.samples, names.index(effect.channel)
+    step = rounding([samples.seen[start:stop, column] for start, stop in samples.runs])
+    offset = numbers["offset"]
+    return bool(step) and offset.low < step and offset.high > -step
