@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import worth_a_curve
 from residual.gap.answer.free_parameters import better, worth_freeing
-from residual.gap.answer.laws import beside_curves
+from residual.gap.answer.laws import beside_curves, beside_varying
 from residual.gap.answer.left import (
     names_more,
     still_names,
@@ -26,7 +26,7 @@ from residual.gap.answer.lone import (
     lone_stretch,
     off_stretch,
 )
-from residual.gap.answer.varying import no_surer, worth_varying
+from residual.gap.answer.varying import no_surer, over_unused, worth_varying
 from residual.gap.data.windows import TooShort
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.log import Log
@@ -135,12 +135,17 @@ class OnceMore:
         answer, what = known.answer, "a parameter that changes with a state or an input"
         offered = self.inquiry.offered
         curves = worth_a_curve(answer, offered.curves)
-        varying = worth_varying(answer, curves, offered.by_label)
-        found = self._with_more(known, varying, what, what)
+        varying = {str(one): one for one in worth_varying(answer, curves, offered.by_label)}
+        unused = [one.where for one in self.log.findings if one.kind == "unused"]
+        varying |= {str(one): one for one in over_unused(answer, offered.by_label, unused)}
+        found, second = self._asked_with(known, list(varying.values()), what, what)
         if found.answer is not answer:
             return dataclasses.replace(found, answer=no_surer(found.answer, answer))
+        if second is not None:
+            beside = beside_varying(answer, second, list(varying.values()))
+            found = dataclasses.replace(found, answer=beside)
         late = found.says != known.says
-        return found if late else dataclasses.replace(found, in_vain=tuple(varying))
+        return found if late else dataclasses.replace(found, in_vain=tuple(varying.values()))
 
     def with_curves(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with curves by points if they take most of what is left."""

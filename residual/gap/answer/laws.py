@@ -8,11 +8,13 @@ from collections.abc import Sequence
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import of_its_kind
 from residual.gap.answer.left import beside_noise
+from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.claim import Claim
 from residual.gap.search.explain import brought
 from residual.gap.search.sets import Key, Search
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
+from sims.effects.parameter_curve import ParameterCurve
 
 #: Part of the squared forecast error that laws leave, less what noise makes, that a curve in their
 #: place must leave at most to make them doubtful.
@@ -53,6 +55,31 @@ def beside_curves(
     return dataclasses.replace(first, claims=tuple(claims)), tuple(says)
 
 
+def beside_varying(first: Answer, second: Answer, curves: Sequence[ParameterCurve]) -> Answer:
+    """The first answer, with every parameter that follows a channel beside what it would forecast
+    nearly as well in place of, as any rival would.
+
+    Args:
+        first: Without them.
+        second: What was found with them on offer, too.
+        curves: Those.
+    """
+    search, again = first.found.search, second.found.search
+    numbers = {candidate.effect: n for n, candidate in enumerate(again.candidates)}
+    before, claims = search.validated[first.key].squares, []
+    for claim in first.claims:
+        rivals = []
+        for curve in curves if claim.sure else ():
+            gone = {numbers.get(search.candidates[claim.number].effect, -1)}
+            gone |= {n for effect, n in numbers.items() if curve.contains(effect)}
+            for key in _in_place(search, first.key, again, numbers[curve], gone):
+                after = again.validated[key].squares
+                if search.currency.error(after) <= CLEARLY * search.currency.error(before):
+                    rivals.append(str(curve))
+        claims.append(dataclasses.replace(claim, rivals=(*claim.rivals, *rivals)))
+    return dataclasses.replace(first, claims=tuple(claims))
+
+
 def _is_law(effect: Effect, curve: Curve) -> bool:
     return effect.enters != "parameter" and of_its_kind(curve, effect)
 
@@ -81,13 +108,19 @@ def _leaves_less(first: Answer, second: Answer, curve: Curve, laws: Sequence[int
     return gained > error and now <= LESS * left
 
 
-def _in_place(search: Search, key: Key, again: Search, points: int, gone: set[int]) -> None:
-    """Fit a set of an earlier search as it is, and with a curve in place of some of its members."""
+def _in_place(
+    search: Search, key: Key, again: Search, points: int, gone: set[int]
+) -> tuple[Key, ...]:
+    """Fit a set of an earlier search as it is, and with a curve in place of some of its members;
+    returns that one if it may be right."""
     for own, theta in brought(search, key, again).items():
         again.add({own: theta})
         start = 0.0 * again.candidates[points].trials[0].values[0]
         fresh, begin = again.merged(own, [(points, start)], drop=tuple(gone))
         again.add({fresh: begin} if again.fits_in(fresh) else {})
+        if fresh in again.validated and again.sound(fresh):
+            return (fresh,)
+    return ()
 
 
 def _beside(claim: Claim, effect: Effect, curve: Curve) -> Claim:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from residual.gap.answer.changing import courses_of
 from residual.gap.answer.confirmed import Answer
+from residual.gap.answer.left import much_is_left
+from residual.gap.data.levels import levels
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
@@ -49,6 +51,33 @@ def worth_varying(
     laws = [_moved(fitter, fit, curve) for curve in curves] if found else []
     own = [one for one in found if not _is_one_of(_moved(fitter, fit, one), laws)]
     return own[:MOST]
+
+
+def over_unused(
+    answer: Answer, offered: Collection[str], unused: Collection[str]
+) -> list[ParameterCurve]:
+    """Every parameter over inputs that make no difference to the simulator, while clearly more than
+    noise is left: whoever leaves such an input in it expects that.
+
+    None is left out for what the linear picture says: that holds near the simulator's own values,
+    and an input that is not used may change a parameter many times over.
+
+    Args:
+        answer: What was found with the effects on offer.
+        offered: Labels of the effects that may be missing.
+        unused: Names of those inputs.
+    """
+    search = answer.found.search
+    simulator, fitter = search.simulator, search.fitter
+    if not (isinstance(fitter, SmoothFitter) and simulator.written_out and much_is_left(answer)):
+        return []
+    return [
+        ParameterCurve(name, level.channel).suited_to(*level.reach)
+        for level in levels(simulator, fitter.samples)
+        if level.channel in unused and not level.of_size
+        for name in simulator.parameters
+        if name in offered
+    ][:MOST]
 
 
 def no_surer(answer: Answer, earlier: Answer) -> Answer:
