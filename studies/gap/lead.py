@@ -51,7 +51,7 @@ def _conventions(result: GapResult) -> str:
     if other is None:
         return ""
     changes = f"{' or '.join(other.changes)} in the column map"
-    errs = f"with {changes} the nominal simulator errs {other.times:.2g} times less"
+    errs = f"with {changes} the nominal simulator errs {_times(other.times)} times less"
     why = {
         "forecasts": errs,
         "zero": errs,
@@ -59,11 +59,17 @@ def _conventions(result: GapResult) -> str:
         "scale": f"a channel is {other.times:.0f} times the scale that it declares, as without "
         f"{changes}",
         "row": f"with {' and '.join(other.changes)} a row earlier in the log, what is found errs "
-        f"{other.times:.2g} times less, as where rows hold the command that led to them",
+        f"{_times(other.times)} times less, as where rows hold the command that led to them",
         "size": f"but for {other.changes[0]}, which never goes below zero in the log, the nominal "
-        f"simulator errs {other.times:.2g} times less, as where a sensor does not tell which way",
+        f"simulator errs {_times(other.times)} times less, as where a sensor does not tell which "
+        "way",
     }[other.reason]
     return f"First see whether the log counts as the simulator does: {why}. If that is not it: "
+
+
+def _times(times: float) -> str:
+    """Two digits, without an exponent."""
+    return f"{float(f'{times:.2g}'):g}"
 
 
 def _cut_off(result: GapResult) -> str:

@@ -94,9 +94,13 @@ def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list
         size = max(abs(bound) for bound in (low, high) if np.isfinite(bound))
         if abs(most) > _FAR_BEYOND * size or beyond > 0.5 * total:
             few = beyond <= max(1, _FEW_WILD * total)
+            every = [run.actions[:, column] for run in trajectories]
+            turned = all(((-v >= low - room) & (-v <= high + room)).all() for v in every)
             says = f"{reaches}, in {beyond} of {total} samples{_first(rows)}: " + (
                 "no such command can have been meant; leave those cells empty"
                 if few
+                else "the other sign (`scale: -1`)"
+                if turned
                 else f"another unit ({_misread(channel.unit)}), or bounds of the simulator's "
                 f"channel {channel.name!r} that are not the actuator's"
             )

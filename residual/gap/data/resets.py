@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.nominal import filled
-from residual.gap.data.sizes import wrapped
+from residual.gap.data.turns import wrapped
 from residual.logs.checks import Finding
 from residual.logs.faults import grain
 from residual.trajectories import Trajectory, moment

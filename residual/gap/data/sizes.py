@@ -1,4 +1,4 @@
-"""Columns whose size says that they are in another unit, and angles that were cut at a turn."""
+"""Columns whose size says that they are in another unit."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.data.inspection import measured, refusal
+from residual.gap.data.inspection import measured
 from residual.logs.checks import Finding
 from residual.logs.units import other_units
-from residual.trajectories import Trajectory, moment
+from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 from sims.simulator import UNDECLARED, Channel
 
@@ -19,10 +19,9 @@ Array = NDArray[np.float64]
 #: Times the size that a channel declares, or part of it, from which on another unit is asked after,
 #: and how near to that size values have to be in it.
 FAR, NEAR = 50.0, 4.0
-#: Temperature in K that no column of a simulator with a warmer parameter stays below.
-COLD = 200.0
-#: How nearly a jump has to be a turn, and the share of it that no other step reaches.
-ALMOST, SMALL = 0.03, 0.3
+#: Temperature in K that no column of a simulator with a warmer parameter stays below; 0 degC in K;
+#: what rooms and weather are between, in degC.
+COLD, ZERO, OUTSIDE = 200.0, 273.15, (-10.0, 50.0)
 
 
 def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
@@ -49,16 +48,9 @@ def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[
     return found
 
 
-def too_cold(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
-    """Temperatures in K that are those of another zero, beside what the simulator knows of."""
-    warm = [
-        (float(np.max(parameter.value)), name)
-        for name, parameter in simulator.parameters.items()
-        if parameter.unit == "K" and float(np.max(parameter.value)) > COLD
-    ]
-    if not warm:
-        return []
-    value, name = max(warm)
+def other_zero(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
+    """Temperatures of the log that are those of another zero, beside what the simulator knows of,
+    and what it knows of that is, beside those of the log."""
     columns = [
         *measured(simulator, trajectories),
         *(
@@ -66,18 +58,36 @@ def too_cold(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
             for column, channel in enumerate(simulator.action_channels)
         ),
     ]
-    found = []
+    ends: dict[str, list[tuple[float, str]]] = {"K": [], "degC": []}
     for channel, runs in columns:
-        if channel.unit != "K":
-            continue
-        most = float(_known(runs).max(initial=-np.inf))
-        if most >= COLD:
-            continue
-        says = (
-            f"is never warmer than {most:.3g} K, where {name} is {value:.3g} K: if the column "
-            "counts from 0 degC, set `unit: degC`"
-        )
-        found.append(Finding("size", channel.name, says, {"most": most}, "warning"))
+        known = _known(runs)
+        if channel.unit in ends and known.size:
+            ends[channel.unit] += [(float(known.max()), channel.name)]
+    warm = {
+        unit: [
+            (float(np.max(parameter.value)), name)
+            for name, parameter in simulator.parameters.items()
+            if parameter.unit == unit and float(np.max(parameter.value)) > COLD
+        ]
+        for unit in ends
+    }
+    found = []
+    for most, where in ends["K"] if warm["K"] else ():
+        value, name = max(warm["K"])
+        if most < COLD:
+            says = (
+                f"is never warmer than {most:.3g} K, where {name} is {value:.3g} K: if the column "
+                "counts from 0 degC, set `unit: degC`"
+            )
+            found.append(Finding("size", where, says, {"most": most}, "warning"))
+    hottest, where = max(ends["degC"], default=(np.inf, ""))
+    for value, name in warm["degC"]:
+        if hottest < COLD and OUTSIDE[0] <= value - ZERO <= OUTSIDE[1]:
+            says = (
+                f"is {value:.5g} degC in the simulator, where {where} is never warmer than "
+                f"{hottest:.3g} degC: if that is in K, it is {value - ZERO:.3g} degC"
+            )
+            found.append(Finding("size", name, says, {"most": hottest}, "warning"))
     return found
 
 
@@ -114,29 +124,3 @@ def _known(runs: Sequence[Array]) -> Array:
 
 def _near(times: float) -> bool:
     return 1 / NEAR <= times <= NEAR
-
-
-def wrapped(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
-    """Angles that jump by a turn, of channels that do not say that they are angles."""
-    found = []
-    for channel, runs in measured(simulator, trajectories):
-        turn = channel.turn
-        if turn is None or channel.angle:
-            continue
-        steps = [np.abs(np.diff(values)) for values in runs]
-        jumps = [np.abs(step - turn) < ALMOST * turn for step in steps]
-        others = _known([step[~jump] for step, jump in zip(steps, jumps, strict=True)])
-        rows = [
-            f"{moment(run.times[row + 1])} of {run.name}"
-            for run, jump in zip(trajectories, jumps, strict=True)
-            for row in np.flatnonzero(jump)
-        ]
-        if rows and (not others.size or others.max() < SMALL * turn):
-            often = "once" if len(rows) == 1 else f"{len(rows)} times"
-            fix = "declare it with angle=True" if channel.unit == "rad" else "unwrap the column"
-            says = (
-                f"jumps by a whole turn {often} (the first at {rows[0]}), as an angle "
-                f"does that is cut there: {fix} (numpy.unwrap(values, period={turn:.6g}))"
-            )
-            found.append(refusal("wrapped", channel.name, says))
-    return found

@@ -10,12 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.samples import Samples
+from residual.gap.preparation.convention import (
+    Convention,
+    as_said,
+    of_input,
+    of_states,
+    reversed_sign,
+)
 from residual.logs.units import Unit, other_units
 from sims.host import HostSimulator
 from sims.simulator import Channel
 
 Array = NDArray[np.float64]
-Places = NDArray[np.intp]
 
 #: Zeros from which angles are counted, in turns.
 QUARTERS = (0.0, 0.25, 0.5, -0.25)
@@ -23,51 +29,6 @@ QUARTERS = (0.0, 0.25, 0.5, -0.25)
 SLIPS, SLIPPED = (10.0, 60.0, 100.0, 1000.0), 0.15
 #: Units of time, one in the other, and control periods in a sample from which on one is far.
 TIMES, FAR = (60.0, 1000.0, 3600.0), 8.0
-
-
-@dataclasses.dataclass(frozen=True)
-class Convention:
-    """How columns may count in place of how they are said to.
-
-    Attributes:
-        says: What to change in the column map.
-        states: Factor and offset of every state, (2, n_s).
-        inputs: The same of every input, (2, n_a).
-        states_from: Which column every state is read from, (n_s,).
-        inputs_from: The same of every input, (n_a,).
-        turned: Whether nothing but the zero of an angle is another one, and perhaps its direction.
-        clock: Times as long as said that every step lasts.
-    """
-
-    says: str
-    states: Array
-    inputs: Array
-    states_from: Places
-    inputs_from: Places
-    turned: bool = False
-    clock: float = 1.0
-
-    @property
-    def sign(self) -> bool:
-        """Whether nothing but signs is another one."""
-        factors, offsets = np.hstack([self.states, self.inputs])
-        return bool((factors == -1).any() and (np.abs(factors) == 1).all() and not offsets.any())
-
-    @property
-    def shifted(self) -> bool:
-        """Whether a unit has another zero, as K for degC."""
-        factors, offsets = np.hstack([self.states, self.inputs])
-        return bool(offsets.any() and (factors > 0).all() and not self.turned)
-
-    @property
-    def exchanged(self) -> bool:
-        """Whether two columns are in each other's place."""
-        return any((np.diff(places) < 0).any() for places in (self.states_from, self.inputs_from))
-
-
-def reversed_sign(name: str) -> str:
-    """The line of a column map that reverses a column."""
-    return f"`scale: -1` for {name}"
 
 
 def conventions(
@@ -82,19 +43,21 @@ def conventions(
     """
     found = []
     for place, action in enumerate(simulator.action_channels):
-        found.append(_of_input(simulator, reversed_sign(action.name), place, -1.0))
+        if _may_be_reversed(action, samples.actions[:, place]):
+            found.append(of_input(simulator, reversed_sign(action.name), place, -1.0))
         if 0 <= action.low < action.high < np.inf:
             found.append(_upside_down(simulator, place))
         for name, unit in other_units(action.unit):
             says = f"`unit: {name}` for {action.name} ({_beside_a_unit(unit)})"
-            found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
+            found.append(of_input(simulator, says, place, unit.factor, unit.offset))
         for says, unit in misread(action, converted):
-            found.append(_of_input(simulator, says, place, unit.factor, unit.offset))
+            found.append(of_input(simulator, says, place, unit.factor, unit.offset))
+        found += _thousandfold(simulator, place)
     joints = _measured_joints(simulator, samples)
     for seen in joints:
         found += _turned(simulator, seen) + _in_other_units(simulator, seen)
         for says, unit in misread(simulator.physical_channels[seen[0]], converted):
-            found.append(_of_states(simulator, says, seen[:1], unit.factor, unit.offset))
+            found.append(of_states(simulator, says, seen[:1], unit.factor, unit.offset))
     found += _all_in_other_units(simulator, joints) + _exchanged(simulator, joints)
     return found + _of_the_clock(simulator, samples, joints)
 
@@ -181,7 +144,7 @@ def _turned(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
         names = [channel.name for channel in (channels if sign < 0 else channels[:1])]
         if changes:
             says = f"{' and '.join(changes)} for {' and '.join(names)}"
-            plain = _of_states(simulator, says, joint, sign, zero)
+            plain = of_states(simulator, says, joint, sign, zero)
             found.append(dataclasses.replace(plain, turned=bool(zero)))
     return found
 
@@ -197,7 +160,7 @@ def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Conv
             said += [f"`unit: {one}` for {rate.name}" for one in alike]
         if len(said) == len(channels):
             says = f"{' and '.join(said)} ({_beside_a_unit(unit)})"
-            found.append(_of_states(simulator, says, joint, unit.factor, unit.offset))
+            found.append(of_states(simulator, says, joint, unit.factor, unit.offset))
     return found
 
 
@@ -224,12 +187,32 @@ def _all_in_other_units(
     return found
 
 
+def _thousandfold(simulator: HostSimulator, place: int) -> list[Convention]:
+    """An input a thousand times as large or as small, where no unit of it is known that could say
+    so: tonnes of something, parts, counts."""
+    action = simulator.action_channels[place]
+    if any(name != "%" for name, _ in other_units(action.unit)):
+        return []
+    return [
+        of_input(simulator, f"`scale: {factor:g}` for {action.name}", place, factor)
+        for factor in (1000.0, 0.001)
+    ]
+
+
+def _may_be_reversed(channel: Channel, values: Array) -> bool:
+    """Whether commands are within their bounds the other way round as well: one that is cut off
+    there does nothing, which may be less wrong than what it did."""
+    inside = (values >= channel.low) & (values <= channel.high)
+    reversed_ = (-values >= channel.low) & (-values <= channel.high)
+    return bool(reversed_.sum() >= inside.sum())
+
+
 def _upside_down(simulator: HostSimulator, place: int) -> Convention:
     """A command counted from its other end, as that of a relay that is on at zero."""
     action = simulator.action_channels[place]
     ends = action.low + action.high
     says = f"`scale: -1` and `offset: {ends:g}` for {action.name}"
-    return _of_input(simulator, says, place, -1.0, ends)
+    return of_input(simulator, says, place, -1.0, ends)
 
 
 def misread(channel: Channel, converted: Collection[str]) -> list[tuple[str, Unit]]:
@@ -250,49 +233,3 @@ def _beside_a_unit(unit: Unit) -> str:
     lines = [f"`scale: {unit.factor:.6g}`"] if unit.factor != 1.0 else []
     lines += [f"`offset: {unit.offset:.6g}`"] if unit.offset else []
     return f"{' and '.join(lines)} if a unit is stated"
-
-
-def _of_input(
-    simulator: HostSimulator, says: str, place: int, factor: float, offset: float = 0.0
-) -> Convention:
-    plain = as_said(simulator)
-    plain.inputs[:, place] = factor, offset
-    return dataclasses.replace(plain, says=says)
-
-
-def _of_states(
-    simulator: HostSimulator, says: str, joint: Sequence[int], factor: float, offset: float
-) -> Convention:
-    """A position and its rate count alike, but for its zero."""
-    plain = as_said(simulator)
-    plain.states[0, joint] = factor
-    plain.states[1, joint[0]] = offset
-    return dataclasses.replace(plain, says=says)
-
-
-def plainest(conventions: Sequence[Convention]) -> list[Convention]:
-    """Conventions without those that another zero alone parts from one of the others: where they
-    do as well, nothing depends on it."""
-
-    def without_zero(one: Convention) -> tuple[bytes, ...]:
-        parts = (one.states[0], one.inputs, one.states_from, one.inputs_from)
-        return tuple(part.tobytes() for part in parts)
-
-    plain = {without_zero(one) for one in conventions if not one.states[1].any()}
-    return [one for one in conventions if not one.states[1].any() or without_zero(one) not in plain]
-
-
-def beyond(convention: Convention) -> Convention | None:
-    """With thrice its factors: as good only where they make a force too small to matter."""
-    states, inputs = convention.states.copy(), convention.inputs.copy()
-    for factors in (states[0], inputs[0]):
-        factors[np.abs(factors) != 1.0] *= 3.0
-    same = np.array_equal(states, convention.states) and np.array_equal(inputs, convention.inputs)
-    return None if same else dataclasses.replace(convention, states=states, inputs=inputs)
-
-
-def as_said(simulator: HostSimulator) -> Convention:
-    """As the log is said to count."""
-    sizes = len(simulator.physical_channels), len(simulator.action_channels)
-    states, inputs = (np.vstack([np.ones(n), np.zeros(n)]) for n in sizes)
-    return Convention("", states, inputs, np.arange(sizes[0]), np.arange(sizes[1]))

@@ -20,16 +20,15 @@ from residual.gap.data.samples import Samples
 from residual.gap.fitting.contract import Fitter
 from residual.gap.fitting.plausible import turned_round
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.preparation.alternatives import (
+from residual.gap.preparation.alternatives import conventions, misread
+from residual.gap.preparation.convention import (
     Convention,
     as_said,
     beyond,
-    conventions,
-    misread,
     plainest,
     reversed_sign,
 )
-from residual.gap.preparation.way import mean_error
+from residual.gap.preparation.way import errors_of, mean_error
 from residual.logs.units import other_units
 from sims.effects.base import Effect
 from sims.effects.sensor import SensorOffset
@@ -64,8 +63,9 @@ NEXT = 0.125
 #: times that it has to be: forecasts that run away are two to three times better where it hangs.
 NEARLY, TENFOLD = 0.33, 10.0
 #: Error from which on nearly every window is just wrong, and times that a unit with another zero,
-#: such as K for degC, has to make it smaller: no physics is hundreds of degrees off.
-LOST, FOUND = 4.0, 3.0
+#: such as K for degC, has to make it smaller, or the median window's: no physics is hundreds of
+#: degrees off.
+LOST, FOUND, FAR = 4.0, 3.0, 10.0
 
 
 def otherwise(
@@ -101,14 +101,35 @@ def otherwise(
     if best.shifted and own >= LOST:
         good = max(good, own / FOUND)
     if (times if poor else CLEARLY) * least > own or least > good:
-        return None
+        return _other_zero(simulator, fitter, asked) if own >= LOST else None
     further = None if _smaller_angle(simulator, fitter.samples, best) else beyond(best)
     if further is not None and BETTER * least > mean_error(simulator, fitter, further):
         return None
+    reason: Literal["zero", "forecasts"] = "zero" if best.turned else "forecasts"
+    return Conventions(_as_good(errors, least), own / least, reason)
+
+
+def _other_zero(
+    simulator: HostSimulator, fitter: SmoothFitter, possible: Sequence[Convention]
+) -> Conventions | None:
+    """Units with another zero in which the median window is far less wrong, where the simulator is
+    poor in any: what counts as just wrong hides how wrong it is."""
+
+    def median(one: Convention) -> float:
+        return float(np.median(errors_of(simulator, fitter, one)))
+
+    errors = [(median(one), one) for one in possible if one.shifted]
+    least = min((error for error, _ in errors), default=np.inf)
+    own = median(as_said(simulator))
+    found = 0 < FAR * least <= own
+    return Conventions(_as_good(errors, least), own / least, "forecasts") if found else None
+
+
+def _as_good(errors: Sequence[tuple[float, Convention]], least: float) -> tuple[str, ...]:
+    """What the conventions say that err about as little as the best, best first."""
     near = [(error, one) for error, one in errors if error < ALIKE * least]
     alike = plainest([one for _, one in sorted(near, key=lambda pair: pair[0])])
-    reason: Literal["zero", "forecasts"] = "zero" if best.turned else "forecasts"
-    return Conventions(tuple(one.says for one in alike), own / least, reason)
+    return tuple(one.says for one in alike)
 
 
 def without_sign(simulator: HostSimulator, fitter: Fitter) -> Conventions | None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model import paths
 from residual.gap.model.model import Model
-from residual.gap.preparation.alternatives import Convention
+from residual.gap.preparation.convention import Convention
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -24,7 +24,15 @@ WRONG = 5.0
 def mean_error(
     simulator: HostSimulator, fitter: SmoothFitter, convention: Convention, sizes: int | None = None
 ) -> float:
-    """Mean error of forecasts straight from what was measured, in units of the usual way.
+    """Mean error of forecasts straight from what was measured, in units of the usual way; see
+    ``errors_of``. A window that is just wrong counts no more than that."""
+    return float(np.minimum(errors_of(simulator, fitter, convention, sizes), WRONG).mean())
+
+
+def errors_of(
+    simulator: HostSimulator, fitter: SmoothFitter, convention: Convention, sizes: int | None = None
+) -> Array:
+    """Errors of some windows' forecasts straight from what was measured, in units of the usual way.
 
     Args:
         simulator: The nominal simulator.
@@ -82,4 +90,4 @@ def mean_error(
     if sizes is not None:
         starts[:, sizes] *= -1.0
         each = np.minimum(each, errors(starts))
-    return float(np.minimum(each, WRONG).mean())
+    return each

@@ -145,6 +145,16 @@ def test_an_input_beyond_its_bounds_is_told_and_one_in_mV_refused():
         examine(PendulumEquation(), [dataclasses.replace(run, actions=1000 * run.actions)])
 
 
+def test_a_command_within_its_bounds_the_other_way_round_is_refused_with_the_sign():
+    class OneWay(PendulumEquation):
+        action_channels = (dataclasses.replace(PendulumEquation.action_channels[0], low=0.0),)
+
+    run = noisy()
+    pulled = dataclasses.replace(run, actions=-np.abs(run.actions))
+    with pytest.raises(ValueError, match=r"voltage: reaches .*the other sign \(`scale: -1`\)"):
+        examine(OneWay(), [pulled])
+
+
 def test_a_channel_that_never_changes_is_taken_as_not_measured():
     bad = changed(noisy(), 1, slice(None), 0.0)
     done = examine(PendulumEquation(), [bad])

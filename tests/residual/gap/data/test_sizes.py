@@ -1,4 +1,4 @@
-"""Columns in another unit than they are read in, and angles that were cut at a turn."""
+"""Columns in another unit than they are read in."""
 
 import dataclasses
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from residual.gap.data.examine import examine, findings
+from residual.gap.data.examine import findings
 from residual.trajectories import Trajectory, moment
 from sims.equations import FirstOrderSystem
 from sims.simulator import Channel, Parameter
@@ -56,28 +56,6 @@ def test_a_command_that_was_converted_once_too_often_is_asked_after():
     assert "where 40 deg/s are declared" in says
 
 
-@pytest.mark.parametrize("unit", ["deg", "rad"])
-def test_an_angle_that_is_cut_at_a_turn_is_refused_with_the_fix(unit):
-    turn = {"deg": 360.0, "rad": 2 * np.pi}[unit]
-
-    class Turning(Head):
-        state_channels = (Channel("pan", unit, "other"),)
-
-    run = turning()
-    middle = float(np.median(run.states))
-    states = run.states - middle + turn / 2
-    cut = dataclasses.replace(run, states=(states + turn / 2) % turn - turn / 2)
-    whole = dataclasses.replace(run, states=states)
-    if unit == "rad":
-        states = states - turn / 2
-        states *= 0.02
-        whole = dataclasses.replace(run, states=states + turn / 2)
-        cut = dataclasses.replace(run, states=(whole.states + turn / 2) % turn - turn / 2)
-    assert not [one for one in findings(Turning(), [whole]) if one.kind == "wrapped"]
-    with pytest.raises(ValueError, match=r"pan: jumps by a whole turn .*unwrap"):
-        examine(Turning(), [cut])
-
-
 def test_times_of_a_calendar_are_told_with_their_date():
     assert moment(12.25) == "12.25 s"
     assert moment(1585250253.569) == "1585250253.57 s (2020-03-26 19:17:33.5 UTC)"
@@ -113,3 +91,21 @@ def test_a_temperature_of_another_zero_is_told(zero, ambient, told):
     says = [one.says for one in findings(simulator, [run]) if "warmer" in one.says]
     assert bool(says) is told
     assert not told or "set `unit: degC`" in says[0]
+
+
+@pytest.mark.parametrize(
+    ("ambient", "told"), [(20.0, False), (293.15, True), (900.0, False), (200.0, False)]
+)
+def test_a_room_in_kelvin_beside_degrees_is_told(ambient, told):
+    class InDegrees(Plate):
+        state_channels = (dataclasses.replace(Plate.state_channels[0], unit="degC"),)
+
+        def __init__(self, ambient):
+            super().__init__(ambient)
+            self.parameters = self.parameters | {"ambient": Parameter(ambient, "degC", "room")}
+
+    power = np.repeat(np.random.default_rng(0).uniform(0, 20, 10), 30)[:, None]
+    run = Trajectory("run", np.arange(301.0), Plate().rollout([300.0], power) - 273.15, power)
+    told_of = [one for one in findings(InDegrees(ambient), [run]) if "warmer" in one.says]
+    assert bool(told_of) is told
+    assert not told or (told_of[0].where == "ambient" and "it is 20 degC" in told_of[0].says)

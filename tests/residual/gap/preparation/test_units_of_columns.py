@@ -6,6 +6,7 @@ import dataclasses
 from typing import ClassVar
 
 import numpy as np
+import pytest
 
 from residual.gap.preparation.conventions import otherwise
 from residual.gap.preparation.prepare import prepare
@@ -131,3 +132,53 @@ def test_a_turned_sign_of_any_channel_is_told():
     found = otherwise(Room(), prepare(Room(), [run], 300.0).fitter)
     assert found is not None
     assert "`scale: -1` for room" in found.changes
+
+
+class Thermometer(FirstOrderSystem):
+    """It is taken to be much quicker than it is."""
+
+    dt = 0.25
+    state_channels = (Channel("reading", "degC", "other", scale=5.0),)
+    action_channels = (Channel("water", "degC", "input", scale=5.0),)
+    parameters: ClassVar = {"lag": Parameter(2.0, "s", "of the thermometer", low=0.1)}
+
+    def derivative(self, x, u, p):
+        return (u - x) / p.lag
+
+
+@pytest.mark.parametrize(
+    ("reading", "water", "wanted"),
+    [((1.0, 0.0), (1.0, 0.0), None), ((1.0, 273.15), (1.0, 0.0), "`unit: K` for reading"),
+     ((1.0, 0.0), (1.8, 32.0), "`unit: degF` for water")],
+)  # fmt: skip
+def test_another_zero_is_told_beside_a_simulator_that_is_poor_in_any_unit(reading, water, wanted):
+    """All that the thermometer does in a window is little beside what it is taken to do."""
+    hot = 85.0 + 10.0 * np.repeat(np.random.default_rng(0).uniform(0, 1, 30), 8)
+    warm = [88.0]
+    for one in hot:
+        warm.append(one + (warm[-1] - one) * np.exp(-0.25 / 20.0))
+    states = (reading[0] * np.array(warm) + reading[1])[:, None]
+    actions = (water[0] * hot + water[1])[:, None]
+    run = Trajectory("run", 0.25 * np.arange(len(states)), states, actions)
+    found = otherwise(Thermometer(), prepare(Thermometer(), [run], 4.0).fitter)
+    assert (found is None) if wanted is None else found.changes[0].startswith(wanted)
+
+
+class Carbon(FirstOrderSystem):
+    """What is emitted stays in the air."""
+
+    dt = 1.0
+    state_channels = (Channel("carbon", "1", "other", scale=50.0),)
+    action_channels = (Channel("emitted", "1", "input", scale=5.0, low=0.0),)
+
+    def derivative(self, x, u, p):
+        return u / 2.0
+
+
+def test_thousands_of_what_has_no_unit_are_told_and_no_sign_that_bounds_cut_off():
+    emitted = np.linspace(2.0, 9.0, 60) + np.random.default_rng(0).uniform(-0.5, 0.5, 60)
+    carbon = 300.0 + np.append(0.0, np.cumsum(emitted)) / 2.0
+    for factor, wanted in ((1.0, None), (1000.0, ("`scale: 0.001` for emitted",))):
+        run = Trajectory("air", np.arange(61.0), carbon[:, None], factor * emitted[:, None])
+        found = otherwise(Carbon(), prepare(Carbon(), [run], 6.0).fitter)
+        assert (found and found.changes) == wanted
