@@ -17,6 +17,7 @@ from residual.gap.answer.encoders import by_an_encoder
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.out_of_proportion import out_of_proportion
 from residual.gap.answer.records import stands_for, unlike
+from residual.gap.answer.table import lost
 from residual.gap.clock import Clock
 from residual.gap.confirmation.numerics import times_better
 from residual.gap.confirmation.swapped import swapped
@@ -179,7 +180,7 @@ def find_gap(
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
     says = [*log.left_out, *other, *on_hold, *read.says, *on_rest, *on_more, *known.says]
     says += [*_searched(answer.found.search.fitter), *inquiry.untried(answer)]
-    says += out_of_proportion(answer)
+    says += [*lost(answer.found.search, table), *out_of_proportion(answer)]
     quality = (*log.findings, *(Finding("search", "", one) for one in says))
     result = told(answer, table, judged.table, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)

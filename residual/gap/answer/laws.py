@@ -57,7 +57,7 @@ def beside_curves(
 
 def beside_varying(first: Answer, second: Answer, curves: Sequence[ParameterCurve]) -> Answer:
     """The first answer, with every parameter that follows a channel beside what it would forecast
-    nearly as well in place of, as any rival would.
+    nearly as well in place of, as any rival would; clearly better than that parameter as a number.
 
     Args:
         first: Without them.
@@ -68,13 +68,20 @@ def beside_varying(first: Answer, second: Answer, curves: Sequence[ParameterCurv
     numbers = {candidate.effect: n for n, candidate in enumerate(again.candidates)}
     before, claims = search.validated[first.key].squares, []
     for claim in first.claims:
-        rivals = []
-        for curve in curves if claim.sure else ():
-            gone = {numbers.get(search.candidates[claim.number].effect, -1)}
-            gone |= {n for effect, n in numbers.items() if curve.contains(effect)}
+        rivals, effect = [], search.candidates[claim.number].effect
+        same = {*claim.twins, *claim.form, *claim.alike}
+        # One that moves alike as a constant does as well whatever it follows.
+        others = [
+            curve for curve in curves
+            if claim.sure and curve in numbers and curve.parameter not in same
+        ]  # fmt: skip
+        for curve in others:
+            gone = {numbers.get(effect, -1)}
+            gone |= {n for one, n in numbers.items() if curve.contains(one)}
+            most = LESS**0.5 if curve.contains(effect) else CLEARLY
             for key in _in_place(search, first.key, again, numbers[curve], gone):
                 after = again.validated[key].squares
-                if search.currency.error(after) <= CLEARLY * search.currency.error(before):
+                if search.currency.error(after) <= most * search.currency.error(before):
                     rivals.append(str(curve))
         claims.append(dataclasses.replace(claim, rivals=(*claim.rivals, *rivals)))
     return dataclasses.replace(first, claims=tuple(claims))

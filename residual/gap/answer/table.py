@@ -12,6 +12,7 @@ from residual.gap.answer.calibrated import moved
 from residual.gap.data.blocks import Blocks
 from residual.gap.fitting.contract import Fit, Fitter, Foretold
 from residual.gap.fitting.forecasts import main_channel, span
+from residual.gap.fitting.smooth import LOST, SmoothFitter
 from residual.gap.fitting.validation import Validated, by_block
 from residual.gap.result import ChannelGap, Gap, Rollout, Span, Step
 from residual.gap.search.sets import Key, Search
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 
 #: The step of parameters that are free within their tolerance.
 BESIDE = "parameters within their tolerance"
+#: Part of the largest error that counts, from which on hardly any counts in full.
+NEARLY = 0.97
 #: Forecasts drawn for pictures.
 PICTURES = 6
 #: Squared error of a block over that of noise alone, up to which it is as good as can be.
@@ -79,6 +82,21 @@ def gap(
         Span(*share) if key or search.beside else Span(0.0, 0.0, 0.0), len(blocks), blocks.folds,
         no_better(before.squares[:, main], after.squares[:, main], floor[:, main]),
     )  # fmt: skip
+
+
+def lost(search: Search, table: Gap) -> list[str]:
+    """What is to be said where the nominal simulator errs by as much as any error counts."""
+    samples, simulator = search.fitter.samples, search.simulator
+    names = [simulator.physical_channels[column].name for column in samples.measured]
+    seen = samples.seen[:, samples.measured[names.index(table.channel)]]
+    most = LOST * float(np.nanstd(seen))
+    if not isinstance(search.fitter, SmoothFitter) or table.before.value < NEARLY * most:
+        return []
+    return [
+        f"nominal forecasts of {table.channel} are off by {most:.3g} {table.unit} or more, "
+        f"{LOST:.0f} times the standard deviation of what was measured: every error counts as that "
+        "at the most"
+    ]
 
 
 def no_better(before: Array, after: Array, floor: Array) -> int:
