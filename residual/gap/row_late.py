@@ -79,6 +79,7 @@ def a_row_earlier(
     again = explained(nominal, ready)
     after = forecast_error(again.search, again.key)
     if BETTER**2 * after >= before or _late_by_a_row(again, earlier.runs):
+        tell("not by much: inputs stay as logged")
         return read
     if again.adequate or CLEARLY**2 * after < before:
         says = (

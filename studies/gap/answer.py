@@ -8,11 +8,19 @@ from residual.gap import GapResult
 from residual.gap.answer.doubts import DOUBTS
 from residual.gap.confirmation.certainty import FEW, TOO_FEW
 from residual.gap.preparation.horizon import SAMPLES
-from residual.gap.result import OFF, Gap, Meant, Number, Verdict
+from residual.gap.result import OFF, Gap, Verdict
 from sims.effects import Curve
 from sims.effects.actuator import ActuatorEffect
-from sims.effects.base import Effect
-from sims.host import HostSimulator
+from studies.gap.numbers import (
+    as_commanded,
+    much_surer,
+    numbers_of,
+    shape,
+    span,
+    spelt,
+    times_of,
+    values_of,
+)
 from studies.gap.records import on_the_way
 from studies.gap.words import (
     FOOTNOTE,
@@ -29,7 +37,6 @@ from studies.gap.words import (
     number_text,
     percent,
     quantity_text,
-    rounded,
     six_digits,
     told,
     unit_text,
@@ -41,8 +48,6 @@ NAMELESS = ("unexplained", "calibrated", "needs_data", "no_gap")
 SYMBOL = 2
 #: Error over that by noise from which on there is a gap, however few blocks of data show it.
 PLAINLY = 10.0
-#: Part of an interval below which one with an exact simulator is worth a line.
-MUCH = 0.7
 
 
 def rivals(verdict: Verdict) -> tuple[str, ...]:
@@ -90,49 +95,7 @@ def headline(verdict: Verdict, result: GapResult) -> str:
         own = effect_name(verdict.label)
         return f"{capitalized(verdict.family)}, form undecided: as {own}, {numbers}."
     given = "" if isinstance(effect, Curve) else shape(verdict)
-    return f"{name}{given}: {numbers}{_times(verdict)}."
-
-
-def numbers_of(verdict: Verdict, effect: Effect, simulator: HostSimulator) -> list[str]:
-    """Each number with its name, or where it holds if a curve is given by them."""
-    if isinstance(effect, Curve):
-        return _points(verdict, effect, simulator)
-    return [f"{_spelt(field)} {number_text(n)}" for field, n in verdict.parameters.items()]
-
-
-def _points(verdict: Verdict, curve: Curve, simulator: HostSimulator) -> list[str]:
-    """Values of a curve and where they hold; of many the figure has the intervals."""
-    along = curve.measures(simulator)[curve.along][0]
-    few = len(verdict.parameters) <= FEW_POINTS
-    texts = []
-    for field, number in verdict.parameters.items():
-        value = rounded(number.value, 0.5 * (number.high - number.low))
-        value = number_text(number) if few else minus(value) + unit_text(number.unit)
-        at, _ = curve.point_of(field) or (float("nan"), "")
-        texts.append(f"{value} at {quantity_text(at, along)}")
-    return [f"{curve.gives} {texts[0]}", *texts[1:]]
-
-
-#: Points of a curve up to which the answer has the interval of each.
-FEW_POINTS = 3
-#: Of what a share is one more: actuators receive, and sensors read.
-SHARES = {"gain": "the command", "scale": "what is there"}
-
-
-def _times(verdict: Verdict) -> str:
-    """``, so 1.62 times the command`` of a gain, which is a share more."""
-    found = [(f, n) for f, n in verdict.parameters.items() if f in SHARES and n.unit == "1"]
-    return minus("".join(f", so {1 + n.value:.3g} times {SHARES[f]}" for f, n in found))
-
-
-def _spelt(field: str) -> str:
-    return field.replace("_", " ")
-
-
-def shape(verdict: Verdict) -> str:
-    """Numbers that were chosen rather than fitted, such as the order of a cogging."""
-    words = [f"{_spelt(name)} {value:.4g}" for name, value in verdict.shape.items()]
-    return f" ({', '.join(words)})" if words else ""
+    return f"{name}{given}: {numbers}{times_of(verdict)}."
 
 
 def notes(verdict: Verdict, result: GapResult) -> list[str]:
@@ -153,12 +116,14 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     surer = {f: n for f, n in verdict.parameters.items() if much_surer(n) and not curved}
     if surer:
         single = len(verdict.parameters) == 1
-        spans = [("" if single else f"{_spelt(f)} ") + span(n) for f, n in surer.items()]
+        spans = [("" if single else f"{spelt(f)} ") + span(n) for f, n in surer.items()]
         found.append(f"{', '.join(spans)} if all else in the simulator is exact")
+    if reached := as_commanded(verdict, result):
+        found.append(reached)
     for field, n in verdict.parameters.items():
         if n.along is not None and not result.changing:
             begin, end = (quantity_text(value, n.unit) for value in n.along)
-            name = f"{_spelt(field)} " if len(verdict.parameters) > 1 else ""
+            name = f"{spelt(field)} " if len(verdict.parameters) > 1 else ""
             found.append(
                 f"{name}no constant: about {begin} where records begin and {end} where they end"
             )
@@ -174,7 +139,7 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.form:
         found.append(f"of the same family, {names_of(verdict.form)} would do as well")
     if verdict.same_motion:
-        known = {o.effect: f" ({_values(o)})" for o in verdict.meant}
+        known = {o.effect: f" ({values_of(o)})" for o in verdict.meant}
         names = [f"{effect_name(name)}{known.get(name, '')}" for name in verdict.same_motion]
         found.append(f"no motion can tell it from {listed(names, 'or')}")
     if effect.looks_like and isinstance(effect, ActuatorEffect):
@@ -186,35 +151,10 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     for other in verdict.beside:
         twin = next(v for v in result.verdicts if other.effect in v.same_motion)
         meant, named = effect_name(other.effect), effect_name(twin.label)
-        found.append(f"{_values(other)} if {meant} is meant, not {named}")
+        found.append(f"{values_of(other)} if {meant} is meant, not {named}")
     if verdict.provisional:
         found.append(provisional(result))
     return found
-
-
-def _values(meant: Meant) -> str:
-    """Numbers without an interval, named where there are several."""
-    texts = {
-        field: minus(f"{value:{'+' if field == 'change' else ''}.3g}{unit_text(unit)}")
-        for field, (value, unit) in meant.numbers.items()
-    }
-    if len(texts) == 1:
-        return texts.popitem()[1]
-    return ", ".join(f"{_spelt(field)} {text}" for field, text in texts.items())
-
-
-def much_surer(number: Number) -> bool:
-    """Whether a number would be much better known if all else in the simulator were exact."""
-    low, high = number.if_exact or (number.low, number.high)
-    return not number.at_bound and high - low < MUCH * (number.high - number.low)
-
-
-def span(number: Number) -> str:
-    """Between what a number is if all else in the simulator is exact."""
-    assert number.if_exact is not None
-    low, high = number.if_exact
-    half = 0.5 * (high - low)
-    return minus(f"{rounded(low, half)} to {rounded(high, half)}{unit_text(number.unit)}")
 
 
 def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:

@@ -1,0 +1,109 @@
+"""The numbers of a verdict in words."""
+
+from __future__ import annotations
+
+from scipy.optimize import brentq
+
+from residual.gap import GapResult
+from residual.gap.result import Meant, Number, Verdict
+from sims.effects import Curve
+from sims.effects.actuator import Saturation, StaticActuatorEffect
+from sims.effects.base import Effect
+from sims.host import HostSimulator
+from studies.gap.words import minus, number_text, quantity_text, rounded, unit_text
+
+#: Part of an interval below which one with an exact simulator is worth a line.
+MUCH = 0.7
+#: Times its level that a command is looked for at which a limit is reached.
+FARTHEST = 1e3
+#: Points of a curve up to which the answer has the interval of each.
+FEW_POINTS = 3
+#: Of what a share is one more: actuators receive, and sensors read.
+SHARES = {"gain": "the command", "scale": "what is there"}
+
+
+def numbers_of(verdict: Verdict, effect: Effect, simulator: HostSimulator) -> list[str]:
+    """Each number with its name, or where it holds if a curve is given by them."""
+    if isinstance(effect, Curve):
+        return _points(verdict, effect, simulator)
+    return [f"{spelt(field)} {number_text(n)}" for field, n in verdict.parameters.items()]
+
+
+def _points(verdict: Verdict, curve: Curve, simulator: HostSimulator) -> list[str]:
+    """Values of a curve and where they hold; of many the figure has the intervals."""
+    along = curve.measures(simulator)[curve.along][0]
+    few = len(verdict.parameters) <= FEW_POINTS
+    texts = []
+    for field, number in verdict.parameters.items():
+        value = rounded(number.value, 0.5 * (number.high - number.low))
+        value = number_text(number) if few else minus(value) + unit_text(number.unit)
+        at, _ = curve.point_of(field) or (float("nan"), "")
+        texts.append(f"{value} at {quantity_text(at, along)}")
+    return [f"{curve.gives} {texts[0]}", *texts[1:]]
+
+
+def times_of(verdict: Verdict) -> str:
+    """``, so 1.62 times the command`` of a gain, which is a share more."""
+    found = [(f, n) for f, n in verdict.parameters.items() if f in SHARES and n.unit == "1"]
+    return minus("".join(f", so {1 + n.value:.3g} times {SHARES[f]}" for f, n in found))
+
+
+def spelt(field: str) -> str:
+    """The name of a number in words."""
+    return field.replace("_", " ")
+
+
+def shape(verdict: Verdict) -> str:
+    """Numbers that were chosen rather than fitted, such as the order of a cogging."""
+    words = [f"{spelt(name)} {value:.4g}" for name, value in verdict.shape.items()]
+    return f" ({', '.join(words)})" if words else ""
+
+
+def values_of(meant: Meant) -> str:
+    """Numbers without an interval, named where there are several."""
+    texts = {
+        field: minus(f"{value:{'+' if field == 'change' else ''}.3g}{unit_text(unit)}")
+        for field, (value, unit) in meant.numbers.items()
+    }
+    if len(texts) == 1:
+        return texts.popitem()[1]
+    return ", ".join(f"{spelt(field)} {text}" for field, text in texts.items())
+
+
+def much_surer(number: Number) -> bool:
+    """Whether a number would be much better known if all else in the simulator were exact."""
+    low, high = number.if_exact or (number.low, number.high)
+    return not number.at_bound and high - low < MUCH * (number.high - number.low)
+
+
+def span(number: Number) -> str:
+    """Between what a number is if all else in the simulator is exact."""
+    assert number.if_exact is not None
+    low, high = number.if_exact
+    half = 0.5 * (high - low)
+    return minus(f"{rounded(low, half)} to {rounded(high, half)}{unit_text(number.unit)}")
+
+
+def as_commanded(verdict: Verdict, result: GapResult) -> str:
+    """The command at which a limit is reached, where other effects act on it before; or nothing.
+
+    A limit is one of what comes out of the actuator: 85 after a gain of 8 is 10.6 in the log.
+    """
+    effects = [e for e in result.effects if isinstance(e, StaticActuatorEffect)]
+    limit = next((e for e in effects if str(e) == verdict.label), None)
+    if not isinstance(limit, Saturation):
+        return ""
+    before = [e for e in effects if e.stage < limit.stage and e.meets(limit)]
+    level = float(limit.level)
+
+    def missing(command: float) -> float:
+        for effect in sorted(before, key=lambda one: one.stage):
+            command = float(effect.shape(command))
+        return command - level
+
+    most = FARTHEST * level
+    if not before or missing(0.0) >= 0 or missing(most) <= 0:
+        return ""
+    command = brentq(missing, 0.0, most)
+    unit = verdict.parameters["level"].unit
+    return f"reached at {quantity_text(command, unit)} of the command as logged"
