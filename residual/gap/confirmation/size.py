@@ -39,10 +39,15 @@ def may_be_none(search: Search, claim: Claim) -> bool:
 
 
 def size_open(search: Search, claim: Claim) -> bool:
-    """Whether every strength of an effect may be many times as large as what was found."""
+    """Whether every strength of an effect may be many times as large as what was found, even if all
+    else were exact: friction beside an inertia that may be anything is friction all the same."""
     numbers = [claim.numbers[knob.field] for knob in strengths(search, claim)]
-    told = [n for n in numbers if n.value and not n.at_bound]
-    return bool(told) and min(max(n.low / n.value, n.high / n.value) for n in told) > OPEN
+    told = [
+        max(end / n.value for end in n.if_exact or (n.low, n.high))
+        for n in numbers
+        if n.value and not n.at_bound
+    ]
+    return bool(told) and min(told) > OPEN
 
 
 def with_size(search: Search, claim: Claim) -> Claim:

@@ -279,6 +279,8 @@ def test_what_may_be_ten_times_as_large_is_not_confirmed(high, kind):
     )
     assert verdict.kind == kind
     assert verdict.doubts == (("size_open",) if kind == "ambiguous" else ())
+    wide = Number(0.01, 0.008, 0.5, "kg", if_exact=(0.009, high))  # beside what is not certain
+    assert effect_verdict(Toy({(0,): 0.3}), claim(numbers={"change": wide}), 20).kind == kind
 
 
 @pytest.mark.parametrize(
