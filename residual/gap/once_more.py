@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import worth_a_curve
+from residual.gap.answer.form import of_open_form
 from residual.gap.answer.free_parameters import better, worth_freeing
-from residual.gap.answer.laws import beside_curves, beside_varying
+from residual.gap.answer.laws import beside_curves, beside_others
 from residual.gap.answer.left import (
     names_more,
     still_names,
@@ -142,20 +143,23 @@ class OnceMore:
         if found.answer is not answer:
             return dataclasses.replace(found, answer=no_surer(found.answer, answer))
         if second is not None:
-            beside = beside_varying(answer, second, list(varying.values()))
+            beside = beside_others(answer, second, list(varying.values()))
             found = dataclasses.replace(found, answer=beside)
         late = found.says != known.says
         return found if late else dataclasses.replace(found, in_vain=tuple(varying.values()))
 
     def with_curves(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with curves by points if they take most of what is left."""
-        curves = worth_a_curve(known.answer, self.inquiry.offered.curves)
+        offered = self.inquiry.offered.curves
+        answer = of_open_form(known.answer, offered, self.tolerance)
+        known, curves = dataclasses.replace(known, answer=answer), worth_a_curve(answer, offered)
         lacking = "a law that the library does not have, a curve by speed, position or command"
         what = "curves by points in place of laws"
         found, second = self._asked_with(known, curves, what, lacking)
         if second is None or found.answer is second:
             return found
         beside, says = beside_curves(found.answer, second, curves)
+        beside = beside if self._late else beside_others(beside, second, curves)
         return dataclasses.replace(found, answer=beside, says=(*found.says, *says))
 
     def with_parts(self, known: Confirmed) -> Confirmed:

@@ -54,7 +54,8 @@ def over_the_log(curve: Curve, fitter: SmoothFitter, simulator: HostSimulator) -
 def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
     """The curves to ask for over what the log holds, if clearly more than noise is left.
 
-    That is where a law of their kind was named; if nothing was, everywhere.
+    That is where a law of their kind was named; if nothing was, everywhere. A state that settles
+    follows its input, so that a law of the one may be one of the other.
 
     Args:
         answer: What was found with the effects on offer.
@@ -69,12 +70,18 @@ def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
     named = [search.candidates[number].effect for number in key]
     found = []
     for curve in curves:
-        if named and not any(of_its_kind(curve, effect) for effect in (*named, *alike)):
+        if named and not any(_worth(curve, effect) for effect in (*named, *alike)):
             continue
         low, high = _values(curve, fitter, search.simulator)
         if high > low and not _counts_turns(curve, search.simulator, high - low):
             found.append(curve.suited_to(low, high))
     return found
+
+
+def _worth(curve: Curve, effect: Effect) -> bool:
+    """Whether a curve is worth a look where an effect was named."""
+    settles = isinstance(curve, StateCurve) and isinstance(effect, StaticActuatorEffect)
+    return settles or of_its_kind(curve, effect)
 
 
 def of_its_kind(curve: Curve, effect: Effect) -> bool:

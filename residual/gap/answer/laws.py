@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import of_its_kind
@@ -19,6 +19,8 @@ from sims.effects.parameter_curve import ParameterCurve
 #: Part of the squared forecast error that laws leave, less what noise makes, that a curve in their
 #: place must leave at most to make them doubtful.
 LESS = 0.75
+#: Forecast error of a curve of another kind, over that of the effect in whose place it stands.
+AS_GOOD = 1.0
 
 
 def beside_curves(
@@ -40,11 +42,11 @@ def beside_curves(
     effects = first.found.search.candidates
     claims, says = list(first.claims), []
     for curve in curves:
-        laws = [n for n in first.key if _is_law(effects[n].effect, curve)]
+        laws = [n for n in first.key if is_law(effects[n].effect, curve)]
         if not laws or not _leaves_less(first, second, curve, laws):
             continue
         claims = [
-            _beside(one, effects[one.number].effect, curve) if one.number in laws else one
+            doubted(one, effects[one.number].effect, curve) if one.number in laws else one
             for one in claims
         ]
         names = " and ".join(effects[n].label for n in laws)
@@ -55,9 +57,13 @@ def beside_curves(
     return dataclasses.replace(first, claims=tuple(claims)), tuple(says)
 
 
-def beside_varying(first: Answer, second: Answer, curves: Sequence[ParameterCurve]) -> Answer:
-    """The first answer, with every parameter that follows a channel beside what it would forecast
-    nearly as well in place of, as any rival would; clearly better than that parameter as a number.
+def beside_others(first: Answer, second: Answer, curves: Sequence[Curve]) -> Answer:
+    """The first answer, with every curve that would forecast nearly as well in place of what is
+    certain among its rivals.
+
+    A parameter that follows a channel is one as any other effect is; clearly better it has to be
+    than that parameter as a number, or what is one of its cases. A curve of another kind has more
+    numbers, and is one if it forecasts as well; of its own kind see ``beside_curves``.
 
     Args:
         first: Without them.
@@ -65,20 +71,17 @@ def beside_varying(first: Answer, second: Answer, curves: Sequence[ParameterCurv
         curves: Those.
     """
     search, again = first.found.search, second.found.search
-    numbers = {candidate.effect: n for n, candidate in enumerate(again.candidates)}
+    numbers = _numbers(again)
     before, claims = search.validated[first.key].squares, []
     for claim in first.claims:
         rivals, effect = [], search.candidates[claim.number].effect
         same = {*claim.twins, *claim.form, *claim.alike}
-        # One that moves alike as a constant does as well whatever it follows.
-        others = [
-            curve for curve in curves
-            if claim.sure and curve in numbers and curve.parameter not in same
-        ]  # fmt: skip
-        for curve in others:
+        for curve in curves:
+            most = _most(curve, effect, same) if claim.sure and curve in numbers else 0.0
+            if not most:
+                continue
             gone = {numbers.get(effect, -1)}
             gone |= {n for one, n in numbers.items() if curve.contains(one)}
-            most = LESS**0.5 if curve.contains(effect) else CLEARLY
             for key in _in_place(search, first.key, again, numbers[curve], gone):
                 after = again.validated[key].squares
                 if search.currency.error(after) <= most * search.currency.error(before):
@@ -87,7 +90,22 @@ def beside_varying(first: Answer, second: Answer, curves: Sequence[ParameterCurv
     return dataclasses.replace(first, claims=tuple(claims))
 
 
-def _is_law(effect: Effect, curve: Curve) -> bool:
+def _most(curve: Curve, effect: Effect, same: Container[str]) -> float:
+    """Forecast error with a curve in place of an effect, over that with it, up to which the curve
+    is a rival; 0 if it is none.
+
+    Args:
+        same: What moves alike: as a constant a curve over anything does as well then.
+    """
+    if not isinstance(curve, ParameterCurve):
+        return 0.0 if of_its_kind(curve, effect) else AS_GOOD
+    if curve.parameter in same:
+        return 0.0
+    return LESS**0.5 if curve.contains(effect) else CLEARLY
+
+
+def is_law(effect: Effect, curve: Curve) -> bool:
+    """Whether an effect is a law that may be an imitation of a curve, and no parameter."""
     return effect.enters != "parameter" and of_its_kind(curve, effect)
 
 
@@ -95,12 +113,13 @@ def _leaves_less(first: Answer, second: Answer, curve: Curve, laws: Sequence[int
     """Whether the best set with a curve in place of laws leaves clearly less than the best with
     them, whatever of other kinds is in either."""
     search, again = first.found.search, second.found.search
-    numbers = {candidate.effect: n for n, candidate in enumerate(again.candidates)}
-    if curve not in numbers or not brought(search, first.key, again):
+    numbers = _numbers(again)
+    effects = [search.candidates[n].effect for n in laws]
+    if not {curve, *effects} <= numbers.keys():
         return False
-    points, named = numbers[curve], {numbers[search.candidates[n].effect] for n in laws}
+    points, named = numbers[curve], {numbers[effect] for effect in effects}
     _in_place(search, first.key, again, points, named)
-    alike = {points, *(n for effect, n in numbers.items() if _is_law(effect, curve))}
+    alike = {points, *(n for effect, n in numbers.items() if is_law(effect, curve))}
     with_curve = [key for key in again.usable() if alike & set(key) == {points}]
     with_laws = [key for key in again.usable() if alike & set(key) == named]
     if not with_curve:
@@ -113,6 +132,11 @@ def _leaves_less(first: Answer, second: Answer, curve: Curve, laws: Sequence[int
     _, least = beside_noise(first, first.key)
     left, now = (search.currency.error(squares) ** 2 - least for squares in (before, after))
     return gained > error and now <= LESS * left
+
+
+def _numbers(search: Search) -> dict[Effect, int]:
+    """The place of every candidate, by its effect."""
+    return {candidate.effect: n for n, candidate in enumerate(search.candidates)}
 
 
 def _in_place(
@@ -130,7 +154,7 @@ def _in_place(
     return ()
 
 
-def _beside(claim: Claim, effect: Effect, curve: Curve) -> Claim:
+def doubted(claim: Claim, effect: Effect, curve: Curve) -> Claim:
     """A claim with a curve that may stand in its place: of the same family, its form is open."""
     if curve.family and curve.family == effect.family:
         return dataclasses.replace(claim, form=(*claim.form, str(curve)))

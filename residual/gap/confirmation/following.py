@@ -33,16 +33,18 @@ def by_another_law(search: Search, key: Key, adequate: bool) -> frozenset[int]:
 
     In the linear picture, so that it is as many numbers for one. What strikes the ground is not
     asked. A parameter that follows a channel comes near to many a law; it is the true one where
-    nothing is left.
+    nothing is left. Two that do fit whatever acts there, and nothing is sure beside them.
 
     Args:
         search: With the set, and what is left of it without each member.
         key: The set.
         adequate: Whether it leaves no more than noise.
     """
-    found: set[int] = set()
-    if not adequate:
-        found |= {n for n in key if isinstance(search.candidates[n].effect, ParameterCurve)}
+    found = {n for n in key if isinstance(search.candidates[n].effect, ParameterCurve)}
+    if len(found) > 1:
+        return frozenset(key)
+    if adequate:
+        found.clear()
     if not isinstance(search.fitter, SmoothFitter) or len(search.fitter.blocks) < FEW:
         return frozenset(found)
     courses = [level.course for level in levels(search.simulator, search.fitter.samples)]

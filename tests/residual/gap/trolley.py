@@ -29,7 +29,7 @@ class Trolley(EquationOfMotion):
         return ((force[:, 0] + u[:, 0] - pull) / p.mass)[:, None]
 
 
-def record(seed, stiffness, friction=0.0, damping=lambda place: 1.0):
+def record(seed, stiffness, friction=0.0, damping=lambda place: 1.0, drag=0.0):
     """A record by SciPy; ``stiffness`` of the part of the record that has passed."""
     rng = np.random.default_rng(seed)
     pushes = np.repeat(rng.uniform(-10, 10, ROWS // 20 + 1), 20)[:ROWS]
@@ -39,7 +39,7 @@ def record(seed, stiffness, friction=0.0, damping=lambda place: 1.0):
 
         def moves(_, x, spring=spring, push=push):
             dry = friction * np.tanh(x[1] / 0.01)
-            braked = damping(x[0]) * x[1] + dry
+            braked = damping(x[0]) * x[1] + drag * x[1] * abs(x[1]) + dry
             return [x[1], (push - spring * x[0] - braked) / 2.0]
 
         state = solve_ivp(moves, (0, DT), state, rtol=1e-8, atol=1e-10).y[:, -1]

@@ -1,0 +1,76 @@
+"""Named laws whose form the data reject, where no curve by points was on offer in their place."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+
+from residual.gap.answer.confirmed import Answer
+from residual.gap.answer.curves import over_the_log
+from residual.gap.answer.laws import LESS, doubted, is_law
+from residual.gap.answer.left import much_is_left
+from residual.gap.confirmation.drift import beside
+from residual.gap.confirmation.tolerance import allowed, calibrated
+from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.screening import beside_starts
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.model.candidates import candidates
+from residual.gap.search.significance import size
+from sims.effects.curve import Curve
+from sims.effects.library import curves_in
+
+
+def of_open_form(answer: Answer, offered: Sequence[Curve], tolerance: float) -> Answer:
+    """The answer, with every curve by points beside its laws that takes off what no chance does.
+
+    A law of another form may leave so little that curves are not asked for, and whoever leaves
+    laws out is not offered the curves of which they are cases. What the points of one take off
+    beside the law, in the linear picture, is a test of lack of fit, as of a straight line by a
+    polynomial: beyond the price of so many numbers, a quarter of what noise does not make, and
+    beside parameters that are off within their tolerance, too.
+
+    Args:
+        answer: What was found.
+        offered: Curves that are asked for where much is left, and then no matter of this test.
+        tolerance: How well the simulator's parameters are known, as a share of each.
+    """
+    search, key = answer.found.search, answer.key
+    if not isinstance(search.fitter, SmoothFitter):
+        return answer
+    asked = offered if much_is_left(answer) else ()
+    claims = list(answer.claims)
+
+    @functools.cache
+    def free() -> Fit:
+        return calibrated(search, key, allowed(search, tolerance)).fit
+
+    for curve in curves_in(search.simulator):
+        laws = [n for n in key if is_law(search.candidates[n].effect, curve)]
+        if curve in asked or not laws:
+            continue
+        fits = (lambda: search.tried[key]), free
+        if all(_rejects(answer, search.fitter, fit(), curve) for fit in fits):
+            claims = [
+                doubted(one, search.candidates[one.number].effect, curve)
+                if one.number in laws
+                else one
+                for one in claims
+            ]
+    return dataclasses.replace(answer, claims=tuple(claims))
+
+
+def _rejects(answer: Answer, fitter: SmoothFitter, fit: Fit, curve: Curve) -> bool:
+    """Whether a curve beside what was named takes off what chance does not."""
+    simulator, rows = answer.found.search.simulator, size(answer.found.search)
+    own = beside(fit, [], fitter.cap).loss
+    noise = own / answer.left.ratio**2
+    for points in candidates(simulator, over_the_log(curve, fitter, simulator), fitter.samples):
+        moved = beside_starts(fit, fitter.columns(fit, [points]))
+        price = len(points.knobs) * float(np.log(rows)) * max(1.0, own / rows)
+        most = min(own - price, noise + LESS * (own - noise))
+        if beside(fit, [moved], fitter.cap).loss < most:
+            return True
+    return False
