@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from residual.gap import find_gap
+from residual.gap.confirmation.following import by_another_law
 from residual.trajectories import Trajectory
-from sims.effects import ParameterChange
+from sims.effects import ConstantLoad, ParameterChange
+from sims.effects.parameter_curve import ParameterCurve
 from sims.equations import FirstOrderSystem
 from sims.simulator import Channel, Parameter
 
@@ -89,3 +92,14 @@ def test_numbers_that_are_off_are_certain():
     assert {label for label, verdict in named.items() if verdict.kind == "confirmed"} == {
         "growth", "gain",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("key", "doubtful"), [((0, 1), set()), ((0, 1, 2), {0, 1, 2})], ids=["one", "two"]
+)
+def test_beside_two_parameters_that_follow_something_nothing_is_certain(key, doubtful):
+    """Though nothing but noise is left: two curves at once fit whatever acts there."""
+    curves = [ParameterCurve(name, "substrate") for name in ("growth", "gain")]
+    effects = [ConstantLoad("biomass"), *curves]
+    search = SimpleNamespace(candidates=[SimpleNamespace(effect=e) for e in effects], fitter=None)
+    assert by_another_law(search, key, adequate=True) == doubtful
