@@ -55,7 +55,8 @@ class Inquiry:
         offered = [*self.offered.kept, *more]
         if isinstance(ready.fitter, SmoothFitter):
             for curve in self.offered.asked:
-                offered += over_the_log(curve, ready.fitter, simulator)
+                if str(curve) not in map(str, more):
+                    offered += over_the_log(curve, ready.fitter, simulator)
         pool = ready.pool([*candidates(simulator, offered, samples), *less])
         pool = [candidate for candidate in pool if candidate.label not in free]
         others = {label: e for label, e in self.offered.by_label.items() if label not in free}

@@ -230,8 +230,10 @@ def experiment(label: str, others: Sequence[str], result: GapResult, same: bool)
             f"{effect_name(label)} by a known amount and log again."
         )
     known = known_effects(result)
-    needs = [known[name].needs for name in (label, *others) if name in known]
-    return "Log " + ", and ".join(dict.fromkeys(needs)) + "." if needs else ""
+    needs = list(dict.fromkeys(known[name].needs for name in (label, *others) if name in known))
+    # "Sudden changes, then rest" asks for sudden changes, too.
+    most = [one for one in needs if not any(one != other and one in other for other in needs)]
+    return f"Log {'; '.join(most)}." if most else ""
 
 
 def kind_text(verdict: Verdict) -> str:

@@ -99,7 +99,7 @@ def curves(result: GapResult, folder: Path) -> list[Section]:
         _curve(curve(result, verdict, effect, folder / f"curve-{number}.png"), verdict, effect)
         for number, verdict in enumerate(result.verdicts, start=1)
         for effect in result.effects
-        if isinstance(effect, Curve) and str(effect) == verdict.label
+        if isinstance(effect, Curve) and str(effect) == verdict.label and verdict.parameters
     ]
 
 

@@ -16,8 +16,6 @@ from studies.gap.words import minus, number_text, quantity_text, rounded, unit_t
 MUCH = 0.7
 #: Times its level that a command is looked for at which a limit is reached.
 FARTHEST = 1e3
-#: Points of a curve up to which the answer has the interval of each.
-FEW_POINTS = 3
 #: Of what a share is one more: actuators receive, and sensors read.
 SHARES = {"gain": "the command", "scale": "what is there"}
 
@@ -30,15 +28,12 @@ def numbers_of(verdict: Verdict, effect: Effect, simulator: HostSimulator) -> li
 
 
 def _points(verdict: Verdict, curve: Curve, simulator: HostSimulator) -> list[str]:
-    """Values of a curve and where they hold; of many the figure has the intervals."""
+    """Values of a curve with their intervals, and where they hold."""
     along = curve.measures(simulator)[curve.along][0]
-    few = len(verdict.parameters) <= FEW_POINTS
     texts = []
     for field, number in verdict.parameters.items():
-        value = rounded(number.value, 0.5 * (number.high - number.low))
-        value = number_text(number) if few else minus(value) + unit_text(number.unit)
         at, _ = curve.point_of(field) or (float("nan"), "")
-        texts.append(f"{value} at {quantity_text(at, along)}")
+        texts.append(f"{number_text(number)} at {quantity_text(at, along)}")
     return [f"{curve.gives} {texts[0]}", *texts[1:]]
 
 

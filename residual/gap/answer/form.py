@@ -41,22 +41,20 @@ def of_open_form(answer: Answer, offered: Sequence[Curve], tolerance: float) -> 
     if not isinstance(search.fitter, SmoothFitter):
         return answer
     asked = offered if much_is_left(answer) else ()
-    claims = list(answer.claims)
+    claims, named = list(answer.claims), {n: search.candidates[n].effect for n in key}
 
     @functools.cache
     def free() -> Fit:
         return calibrated(search, key, allowed(search, tolerance)).fit
 
     for curve in curves_in(search.simulator):
-        laws = [n for n in key if is_law(search.candidates[n].effect, curve)]
+        laws = [n for n, one in named.items() if is_law(one, curve) and not isinstance(one, Curve)]
         if curve in asked or not laws:
             continue
         fits = (lambda: search.tried[key]), free
         if all(_rejects(answer, search.fitter, fit(), curve) for fit in fits):
             claims = [
-                doubted(one, search.candidates[one.number].effect, curve)
-                if one.number in laws
-                else one
+                doubted(one, named[one.number], curve) if one.number in laws else one
                 for one in claims
             ]
     return dataclasses.replace(answer, claims=tuple(claims))

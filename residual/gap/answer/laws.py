@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import of_its_kind
@@ -51,8 +51,8 @@ def beside_curves(
         ]
         names = " and ".join(effects[n].label for n in laws)
         says.append(
-            f"{curve}, a curve by points, forecasts better in place of {names}: to see it, name it "
-            "in --effects with all that may be missing but these"
+            f"{curve}, a curve by points, forecasts better in place of {names}: to see it, ask "
+            f"with --effects library {curve}"
         )
     return dataclasses.replace(first, claims=tuple(claims)), tuple(says)
 
@@ -63,7 +63,9 @@ def beside_others(first: Answer, second: Answer, curves: Sequence[Curve]) -> Ans
 
     A parameter that follows a channel is one as any other effect is; clearly better it has to be
     than that parameter as a number, or what is one of its cases. A curve of another kind has more
-    numbers, and is one if it forecasts as well; of its own kind see ``beside_curves``.
+    numbers, and is one if it forecasts as well. Of its own kind it is one in place of several laws
+    that have as many numbers; otherwise see ``beside_curves``. What the whole answer with curves
+    does without, and forecasts as well, has them for rivals, too.
 
     Args:
         first: Without them.
@@ -71,37 +73,69 @@ def beside_others(first: Answer, second: Answer, curves: Sequence[Curve]) -> Ans
         curves: Those.
     """
     search, again = first.found.search, second.found.search
-    numbers = _numbers(again)
-    before, claims = search.validated[first.key].squares, []
-    for claim in first.claims:
-        rivals, effect = [], search.candidates[claim.number].effect
-        same = {*claim.twins, *claim.form, *claim.alike}
-        for curve in curves:
-            most = _most(curve, effect, same) if claim.sure and curve in numbers else 0.0
-            if not most:
+    numbers, before = _numbers(again), search.validated[first.key].squares
+    sure = [claim for claim in first.claims if claim.sure]
+    found: dict[int, list[str]] = {claim.number: [] for claim in first.claims}
+    for curve in curves if sure else ():
+        alone = [((one.number,), _most(curve, one, search)) for one in sure]
+        for group, most in (*alone, (_together(curve, search, first.key), CLEARLY)):
+            if not (group and most and curve in numbers):
                 continue
-            gone = {numbers.get(effect, -1)}
+            gone = {numbers.get(search.candidates[n].effect, -1) for n in group}
             gone |= {n for one, n in numbers.items() if curve.contains(one)}
             for key in _in_place(search, first.key, again, numbers[curve], gone):
                 after = again.validated[key].squares
                 if search.currency.error(after) <= most * search.currency.error(before):
-                    rivals.append(str(curve))
-        claims.append(dataclasses.replace(claim, rivals=(*claim.rivals, *rivals)))
+                    for number in group:
+                        found[number].append(str(curve))
+    for number in _done_without(first, second, curves):
+        found[number] += [str(curve) for curve in curves if numbers.get(curve) in second.key]
+    claims = [
+        dataclasses.replace(one, rivals=tuple(dict.fromkeys((*one.rivals, *found[one.number]))))
+        for one in first.claims
+    ]
     return dataclasses.replace(first, claims=tuple(claims))
 
 
-def _most(curve: Curve, effect: Effect, same: Container[str]) -> float:
-    """Forecast error with a curve in place of an effect, over that with it, up to which the curve
-    is a rival; 0 if it is none.
+def _done_without(first: Answer, second: Answer, curves: Sequence[Curve]) -> list[int]:
+    """What an answer with curves by points that forecasts as well does without."""
+    search, again = first.found.search, second.found.search
+    chosen = [again.candidates[n].effect for n in second.key]
+    named = [one for one in chosen if one in curves and not isinstance(one, ParameterCurve)]
+    errors = [one.currency.error(one.validated[a.key].squares) for one, a in
+              ((search, first), (again, second))]  # fmt: skip
+    if not named or errors[1] > AS_GOOD * errors[0]:
+        return []
+    return [n for n in first.key if search.candidates[n].effect not in chosen]
 
-    Args:
-        same: What moves alike: as a constant a curve over anything does as well then.
-    """
+
+def _most(curve: Curve, claim: Claim, search: Search) -> float:
+    """Forecast error with a curve in place of what is claimed, over that with it, up to which the
+    curve is a rival; 0 if it is none."""
+    effect = search.candidates[claim.number].effect
     if not isinstance(curve, ParameterCurve):
         return 0.0 if of_its_kind(curve, effect) else AS_GOOD
-    if curve.parameter in same:
+    # What moves alike as a constant does as well over anything then.
+    if curve.parameter in (*claim.twins, *claim.form, *claim.alike):
         return 0.0
     return LESS**0.5 if curve.contains(effect) else CLEARLY
+
+
+def _together(curve: Curve, search: Search, key: Key) -> tuple[int, ...]:
+    """The named laws in whose place a curve is that has no more numbers than they have together.
+
+    Where a speed settles by its input, friction is one of the input, too.
+    """
+    settling = {j.name for j in search.simulator.joints if j.rate in (None, j.position)}
+    effects = {n: search.candidates[n].effect for n in key}
+    laws = tuple(
+        n
+        for n, effect in effects.items()
+        if is_law(effect, curve)
+        or (curve.along == "input" and effect.family == "dissipation" and effect.where in settling)
+    )
+    enough = len(curve.strengths()) <= sum(len(search.candidates[n].knobs) for n in laws)
+    return laws if len(laws) > 1 and enough and not isinstance(curve, ParameterCurve) else ()
 
 
 def is_law(effect: Effect, curve: Curve) -> bool:

@@ -14,6 +14,9 @@ from sims.effects.flexible import FlexiblePart
 #: Part of the squared forecast error of the library's laws, less what noise makes, that further
 #: effects may leave.
 QUARTER = 0.25
+#: Effects fewer with which an answer that forecasts as well is the simpler one, whatever numbers
+#: these have.
+FEWER = 2
 #: Residual over noise from which on laws may only imitate the true one.
 NOTABLE = 1.5
 #: Part of the gap without a name that is much, however little it is beside noise.
@@ -48,7 +51,8 @@ def beside_noise(answer: Answer, key: Key) -> tuple[float, float]:
 
 
 def takes_what_is_left(second: Answer, first: Answer, more: Sequence[Effect]) -> bool:
-    """Whether further effects were named and take most of what the library left beside noise.
+    """Whether further effects were named and take most of what the library left beside noise, or
+    stand for three of it and more, and forecast no worse.
 
     Args:
         second: What was found with them on offer, too; ``first``: without.
@@ -59,6 +63,8 @@ def takes_what_is_left(second: Answer, first: Answer, more: Sequence[Effect]) ->
         return False
     left, least = beside_noise(first, first.key)
     now = search.currency.error(again.validated[second.key].squares) ** 2
+    if len(first.key) - len(second.key) >= FEWER and now <= left:
+        return True
     return now - least < QUARTER * (left - least) and better(second, first)
 
 

@@ -24,7 +24,7 @@ from sims.effects.aliases import probes, shortly_after
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.parameter import ParameterChange
-from sims.effects.sensor import SensorEffect, SensorOffset
+from sims.effects.sensor import ScaledSensor, SensorEffect, SensorOffset
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -66,6 +66,10 @@ def absurd(model: Model, theta: Array, samples: Samples) -> tuple[int, str]:
         small = ratio > FACTOR and _minor(given, name, ratio)
         if not 1 / FACTOR <= ratio <= FACTOR and not small:
             return number, f"{name} would be {ratio:.3g} times its nominal value"
+    for number, effect in enumerate(chosen):
+        read = 1 + float(effect.scale) if isinstance(effect, ScaledSensor) else 1.0
+        if not 1 / FACTOR <= read <= FACTOR:
+            return number, f"{effect.where} would be read as {read:.3g} times what is there"
     unsupported = by_commands(host, samples, len(model.simulator.effects))
     if unsupported is not None:
         return unsupported

@@ -27,7 +27,8 @@ Array = NDArray[np.float64]
 QUARTERS = (0.0, 0.25, 0.5, -0.25)
 #: Control periods in a sample, or samples in one, that a slip of the clock makes, and how nearly.
 SLIPS, SLIPPED = (10.0, 60.0, 100.0, 1000.0), 0.15
-#: Units of time, one in the other, and control periods in a sample from which on one is far.
+#: Units of time, one in the other, and control periods in a sample from which on one is far; the
+#: largest command likewise, over a share of it.
 TIMES, FAR = (60.0, 1000.0, 3600.0), 8.0
 
 
@@ -53,6 +54,7 @@ def conventions(
         for says, unit in misread(action, converted):
             found.append(of_input(simulator, says, place, unit.factor, unit.offset))
         found += _thousandfold(simulator, place)
+        found += _as_a_share(simulator, place, samples.actions[:, place])
     joints = _measured_joints(simulator, samples)
     for seen in joints:
         found += _turned(simulator, seen) + _in_other_units(simulator, seen)
@@ -197,6 +199,15 @@ def _thousandfold(simulator: HostSimulator, place: int) -> list[Convention]:
         of_input(simulator, f"`scale: {factor:g}` for {action.name}", place, factor)
         for factor in (1000.0, 0.001)
     ]
+
+
+def _as_a_share(simulator: HostSimulator, place: int, values: Array) -> list[Convention]:
+    """A command logged as a share of the largest one: a duty of 0 to 1 for one of 0 to 255."""
+    action = simulator.action_channels[place]
+    full = action.high if np.isfinite(action.high) else -action.low
+    if not (np.isfinite(full) and full >= FAR and np.abs(values).max(initial=0.0) <= 1.0):
+        return []
+    return [of_input(simulator, f"`scale: {full:g}` for {action.name}", place, full)]
 
 
 def _may_be_reversed(channel: Channel, values: Array) -> bool:

@@ -53,6 +53,7 @@ def said(effect, **values):
         (Saturation("voltage"), {"level": 0.05}, "a weaker actuator"),
         (ParameterChange("mass"), {"change": 0.6}, "mass would be 11.9 times its nominal value"),
         (ParameterChange("inertia"), {"change": -1.8e-4}, "inertia would be 0.0576 times"),
+        (SensorScale("rate"), {"scale": 30.0}, "rate would be read as 31 times what is there"),
     ],
 )
 def test_what_switches_the_system_off_is_refused(effect, values, words):

@@ -48,6 +48,17 @@ def test_degrees_celsius_are_no_kelvin():
         assert (found and found.changes) == wanted
 
 
+def test_a_share_of_the_largest_command_is_told():
+    rng = np.random.default_rng(0)
+    watts = np.repeat(rng.uniform(0.0, 3000.0, (1, 20, 1)), 30, axis=1)
+    warm = Room().rollout(np.array([[293.0]]), watts)[0]
+    warm += 0.1 * rng.standard_normal(warm.shape)
+    run = Trajectory("room", 10.0 * np.arange(len(warm)), warm, watts[0] / 3000.0)
+    found = otherwise(Room(), prepare(Room(), [run], 300.0).fitter)
+    assert found is not None
+    assert found.changes == ("`scale: 3000` for heater",)
+
+
 def test_a_relay_that_is_on_at_zero_is_told():
     rng = np.random.default_rng(0)
     watts = np.repeat(rng.uniform(0.0, 3000.0, (1, 20, 1)), 30, axis=1)
