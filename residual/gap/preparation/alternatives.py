@@ -61,6 +61,7 @@ def conventions(
         for says, unit in misread(simulator.physical_channels[seen[0]], converted):
             found.append(of_states(simulator, says, seen[:1], unit.factor, unit.offset))
     found += _all_in_other_units(simulator, joints) + _exchanged(simulator, joints)
+    found += _counted_from_the_last(simulator, joints)
     return found + _of_the_clock(simulator, samples, joints)
 
 
@@ -130,6 +131,25 @@ def _exchanged(simulator: HostSimulator, joints: Sequence[Sequence[int]]) -> lis
             getattr(plain, field)[[*one, *other]] = [*other, *one]
             says = f"the columns of {names[0]} and of {names[1]} exchanged (`column:` for each)"
             found.append(dataclasses.replace(plain, says=says))
+    return found
+
+
+def _counted_from_the_last(
+    simulator: HostSimulator, joints: Sequence[Sequence[int]]
+) -> list[Convention]:
+    """Angles of a chain that a log counts from outside, and the simulator from the joint before, or
+    the other way round."""
+    channels, found = simulator.physical_channels, []
+    for before, joint in itertools.pairwise(joints):
+        kinds = [[(channels[i].unit, channels[i].kind) for i in each] for each in (before, joint)]
+        if kinds[0] != kinds[1] or channels[joint[0]].turn is None:
+            continue
+        first, own = channels[before[0]].name, channels[joint[0]].name
+        also = " (rates likewise)" if len(joint) > 1 else ""
+        for times, word in ((-1.0, "less"), (1.0, "plus")):
+            relative = tuple((i, j, times) for i, j in zip(joint, before, strict=True))
+            says = f"{own} {word} {first} in place of {own}{also}"
+            found.append(dataclasses.replace(as_said(simulator), says=says, relative=relative))
     return found
 
 

@@ -26,6 +26,7 @@ class Convention:
         inputs_from: The same of every input, (n_a,).
         turned: Whether nothing but the zero of an angle is another one, and perhaps its direction.
         clock: Times as long as said that every step lasts.
+        relative: States to which a multiple of another is added: the places of both, and how often.
     """
 
     says: str
@@ -35,6 +36,15 @@ class Convention:
     inputs_from: Places
     turned: bool = False
     clock: float = 1.0
+    relative: tuple[tuple[int, int, float], ...] = ()
+
+    def states_of(self, seen: Array) -> Array:
+        """States as they count so, (n, n_s), of the columns as they are said to."""
+        factor, offset = self.states
+        states = factor * seen[:, self.states_from] + offset
+        for place, other, times in self.relative:
+            states[:, place] += times * states[:, other]
+        return states
 
     @property
     def sign(self) -> bool:
@@ -82,9 +92,9 @@ def plainest(conventions: Sequence[Convention]) -> list[Convention]:
     """Conventions without those that another zero alone parts from one of the others: where they
     do as well, nothing depends on it."""
 
-    def without_zero(one: Convention) -> tuple[bytes, ...]:
+    def without_zero(one: Convention) -> tuple[object, ...]:
         parts = (one.states[0], one.inputs, one.states_from, one.inputs_from)
-        return tuple(part.tobytes() for part in parts)
+        return (*(part.tobytes() for part in parts), one.relative)
 
     plain = {without_zero(one) for one in conventions if not one.states[1].any()}
     return [one for one in conventions if not one.states[1].any() or without_zero(one) not in plain]

@@ -42,14 +42,14 @@ def errors_of(
             the sign that does better.
     """
     samples, windows = fitter.samples, fitter.blocks.windows
-    (factor, offset), (gain, bias) = convention.states, convention.inputs
+    gain, bias = convention.inputs
 
     def acting(actions: Array) -> Array:
         return gain * actions[..., convention.inputs_from] + bias
 
     clock = convention.clock
     samples = dataclasses.replace(
-        samples, seen=factor * samples.seen[:, convention.states_from] + offset,
+        samples, seen=convention.states_of(samples.seen),
         actions=acting(samples.actions), durations=clock * samples.durations,
         times=clock * samples.times,
         recorded=tuple(
