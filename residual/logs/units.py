@@ -28,22 +28,9 @@ USUAL = (
     *("deg/s", "rev/s", "rpm", "rad/s2", "deg/s2", "m", "km", "cm", "mm", "um", "in", "ft", "nmi"),
     *("m/s", "cm/s", "mm/s", "km/h", "kn", "mph", "ft/s", "ft/min", "m/s2", "cm/s2", "mm/s2", "gn"),
     *("V", "mV", "kV", "A", "mA", "W", "mW", "kW", "ohm", "kohm", "N", "mN", "kN", "N m", "mN m"),
-    *("kN m", "N cm", "N mm", "kg", "g", "lb", "K", "mK", "degC", "degF", "Pa", "mPa", "hPa"),
-    *(
-        "kPa",
-        "bar",
-        "mbar",
-        "psi",
-        "L",
-        "mL",
-        "m3/s",
-        "m3/h",
-        "L/s",
-        "L/min",
-        "mL/min",
-        "Hz",
-        "kHz",
-    ),
+    *("kN m", "N cm", "N mm", "kgf", "kg", "g", "lb", "K", "mK", "degC", "degF", "Pa", "mPa"),
+    *("hPa", "kPa", "bar", "mbar", "psi", "L", "mL", "m3/s", "m3/h", "L/s", "L/min", "mL/min"),
+    *("Hz", "kHz"),
 )
 #: Symbols with exponents of one digit, multiplied or divided: nothing that takes long to work out.
 _SYMBOL = r"(?:[^\W\d_]+|[°%][CF]?)(?:\*\*-?\d|\^-?\d|-?\d|⁻?[¹²³])?"

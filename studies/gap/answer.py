@@ -13,6 +13,7 @@ from sims.effects import Curve
 from sims.effects.actuator import ActuatorEffect
 from studies.gap.numbers import (
     as_commanded,
+    as_in_a_unit,
     much_surer,
     numbers_of,
     shape,
@@ -118,8 +119,8 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         single = len(verdict.parameters) == 1
         spans = [("" if single else f"{spelt(f)} ") + span(n) for f, n in surer.items()]
         found.append(f"{', '.join(spans)} if all else in the simulator is exact")
-    if reached := as_commanded(verdict, result):
-        found.append(reached)
+    told = as_in_a_unit(verdict, result.corrected), as_commanded(verdict, result)
+    found += [one for one in told if one]
     for field, n in verdict.parameters.items():
         if n.along is not None and not result.changing:
             begin, end = (quantity_text(value, n.unit) for value in n.along)

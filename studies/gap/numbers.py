@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 
 from residual.gap import GapResult
 from residual.gap.result import Meant, Number, Verdict
+from residual.logs.units import other_units
 from sims.effects import Curve
 from sims.effects.actuator import Saturation, StaticActuatorEffect
 from sims.effects.base import Effect
@@ -16,6 +17,8 @@ from studies.gap.words import minus, number_text, quantity_text, rounded, unit_t
 MUCH = 0.7
 #: Times its level that a command is looked for at which a limit is reached.
 FARTHEST = 1e3
+#: Upper over lower end of a share up to which it may say a unit.
+NARROW = 1.3
 #: Of what a share is one more: actuators receive, and sensors read.
 SHARES = {"gain": "the command", "scale": "what is there"}
 
@@ -102,3 +105,23 @@ def as_commanded(verdict: Verdict, result: GapResult) -> str:
     command = brentq(missing, 0.0, most)
     unit = verdict.parameters["level"].unit
     return f"reached at {quantity_text(command, unit)} of the command as logged"
+
+
+def as_in_a_unit(verdict: Verdict, simulator: HostSimulator) -> str:
+    """The unit that a command would be in, if that is all that a gain or a scale says; or nothing.
+
+    9.7 times the newtons that were commanded are kilograms-force.
+    """
+    channels = {c.name: c for c in (*simulator.physical_channels, *simulator.action_channels)}
+    channel = channels.get(verdict.where)
+    shares = [n for f, n in verdict.parameters.items() if f in SHARES and n.unit == "1"]
+    if channel is None or not shares:
+        return ""
+    (share,) = shares
+    # An actuator gives a multiple of what was logged, a sensor logs one of what is there.
+    way = 1 if "gain" in verdict.parameters else -1
+    ends = sorted((1 + end) ** way for end in (share.low, share.high) if end > -1)
+    if len(ends) < 2 or ends[1] > NARROW * ends[0]:
+        return ""
+    units = [name for name, unit in other_units(channel.unit) if ends[0] <= unit.factor <= ends[1]]
+    return f"as if {channel.name} were logged in {' or '.join(units)}" if units else ""
