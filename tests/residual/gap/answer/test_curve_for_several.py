@@ -43,7 +43,7 @@ def wound():
 
 #: Among them all cases of a curve of the input, so that it is offered.
 OFFERED = (
-    "actuator_gain", "quadratic_actuator", "dead_zone", "saturation", "stribeck_friction", "slow",
+    "actuator_gain", "quadratic_actuator", "dead_zone", "saturation", "stribeck_friction",
 )  # fmt: skip
 
 

@@ -29,8 +29,15 @@ def fanned(seed):
     return Trajectory("days", np.arange(len(seen)) * 1.0, seen[:, None], power[:, None])
 
 
+#: Among them all cases of curves by state and by input, so that these are offered.
+OFFERED = (
+    "actuator_gain", "quadratic_actuator", "dead_zone", "saturation", "constant_load",
+    "proportional_loss", "time_constant",
+)  # fmt: skip
+
+
 def test_what_holds_the_state_is_no_saturation_of_its_input():
-    found = find_gap(Plate(), [fanned(0)])
+    found = find_gap(Plate(), [fanned(0)], effects=OFFERED)
     named = {v.effect: v for v in found.verdicts if v.kind in ("confirmed", "ambiguous")}
     assert "saturation" not in named
     points = named["state_curve"].parameters
