@@ -88,25 +88,28 @@ def beside_others(first: Answer, second: Answer, curves: Sequence[Curve]) -> Ans
                 if search.currency.error(after) <= most * search.currency.error(before):
                     for number in group:
                         found[number].append(str(curve))
-    for number in _done_without(first, second, curves):
-        found[number] += [str(curve) for curve in curves if numbers.get(curve) in second.key]
-    claims = [
-        dataclasses.replace(one, rivals=tuple(dict.fromkeys((*one.rivals, *found[one.number]))))
-        for one in first.claims
-    ]
+    claims = []
+    for one in first.claims:
+        effect = search.candidates[one.number].effect
+        for curve in _instead_of(effect, first, second, curves):
+            one = doubted(one, effect, curve)
+        rivals = dict.fromkeys((*one.rivals, *found[one.number]))
+        claims.append(dataclasses.replace(one, rivals=tuple(rivals)))
     return dataclasses.replace(first, claims=tuple(claims))
 
 
-def _done_without(first: Answer, second: Answer, curves: Sequence[Curve]) -> list[int]:
-    """What an answer with curves by points that forecasts as well does without."""
+def _instead_of(
+    effect: Effect, first: Answer, second: Answer, curves: Sequence[Curve]
+) -> list[Curve]:
+    """The curves by points that an answer names which does without an effect and forecasts as
+    well."""
     search, again = first.found.search, second.found.search
     chosen = [again.candidates[n].effect for n in second.key]
-    named = [one for one in chosen if one in curves and not isinstance(one, ParameterCurve)]
-    errors = [one.currency.error(one.validated[a.key].squares) for one, a in
-              ((search, first), (again, second))]  # fmt: skip
-    if not named or errors[1] > AS_GOOD * errors[0]:
+    before, after = search.validated[first.key].squares, again.validated[second.key].squares
+    as_good = search.currency.error(after) <= AS_GOOD * search.currency.error(before)
+    if effect in chosen or not as_good:
         return []
-    return [n for n in first.key if search.candidates[n].effect not in chosen]
+    return [one for one in curves if one in chosen and not isinstance(one, ParameterCurve)]
 
 
 def _most(curve: Curve, claim: Claim, search: Search) -> float:
@@ -189,7 +192,7 @@ def _in_place(
 
 
 def doubted(claim: Claim, effect: Effect, curve: Curve) -> Claim:
-    """A claim with a curve that may stand in its place: of the same family, its form is open."""
-    if curve.family and curve.family == effect.family:
-        return dataclasses.replace(claim, form=(*claim.form, str(curve)))
-    return dataclasses.replace(claim, rivals=(*claim.rivals, str(curve)))
+    """A claim with a curve that may stand in its place: of its family there, its form is open."""
+    if curve.family and (curve.family, curve.where) == (effect.family, effect.where):
+        return dataclasses.replace(claim, form=tuple(dict.fromkeys((*claim.form, str(curve)))))
+    return dataclasses.replace(claim, rivals=tuple(dict.fromkeys((*claim.rivals, str(curve)))))
