@@ -105,7 +105,7 @@ class OnceMore:
         stretch = lone_stretch(known.answer)
         if stretch is None:
             return known
-        if self._late or stretch.indispensable:
+        if self._late() or stretch.indispensable:
             return known.and_says(stretch.says(left_out=False))
         self.inquiry.tell("once more without a stretch that nothing explains")
         simulator = known.answer.found.search.simulator
@@ -143,7 +143,7 @@ class OnceMore:
         if found.answer is not answer:
             return dataclasses.replace(found, answer=no_surer(found.answer, answer))
         if second is not None:
-            beside = beside_others(answer, second, list(varying.values()))
+            beside = beside_others(answer, second, list(varying.values()), self._late)
             found = dataclasses.replace(found, answer=beside)
         late = found.says != known.says
         return found if late else dataclasses.replace(found, in_vain=tuple(varying.values()))
@@ -159,7 +159,7 @@ class OnceMore:
         if second is None or found.answer is second:
             return found
         beside, says = beside_curves(found.answer, second, curves)
-        beside = beside if self._late else beside_others(beside, second, curves)
+        beside = beside_others(beside, second, curves, self._late)
         return dataclasses.replace(found, answer=beside, says=(*found.says, *says))
 
     def with_parts(self, known: Confirmed) -> Confirmed:
@@ -175,7 +175,7 @@ class OnceMore:
         if found.answer is not known.answer:
             return found
         known = dataclasses.replace(known, says=found.says)
-        if not asked or self._late or self.log.by_user:
+        if not asked or self._late() or self.log.by_user:
             return known
         if not isinstance(fitter, SmoothFitter) or fitter.samples.stride == 1:
             return known
@@ -198,7 +198,7 @@ class OnceMore:
         if self.log.by_user or known.answer.key or search.beside:
             return known
         horizon = longer_horizon(search.simulator, self.log, known.answer)
-        if horizon is None or self._late:
+        if horizon is None or self._late():
             return known
         what = "longer forecasts, of which the records hold fewer"
         ready, answer = self._over(known, horizon, what)
@@ -214,7 +214,7 @@ class OnceMore:
         """The same, or what is found over forecasts as long as the records where these alone show
         that something is missing, even if nothing can be named from so few."""
         search = known.answer.found.search
-        if self.log.by_user or known.answer.key or search.beside or self._late:
+        if self.log.by_user or known.answer.key or search.beside or self._late():
             return known
         slow = None if search.simulator.has_contacts else slow_error(self.log, known.answer)
         if slow is None:
@@ -228,7 +228,7 @@ class OnceMore:
         """The same, or what is found beside it over longer forecasts, of which the records hold as
         many as are needed, if those as long as the records show a slow error."""
         answer, search = known.answer, known.answer.found.search
-        if self.log.by_user or not answer.key or search.beside or self._late:
+        if self.log.by_user or not answer.key or search.beside or self._late():
             return known
         horizon = longest_horizon(self.log.recorded)
         if search.simulator.has_contacts or horizon < LONGER * self.log.horizon:
@@ -268,7 +268,7 @@ class OnceMore:
         """``_with_more``, and what was found with more on offer, if it was asked."""
         if not more:
             return known, None
-        if self._late:
+        if self._late():
             late = known.and_says(
                 f"what is left may be {lacking}: there was no time to look, give more --minutes "
                 "(half of them are for searching, the rest is for confirming)"
@@ -281,7 +281,6 @@ class OnceMore:
             return known, second
         return dataclasses.replace(known, answer=second), second
 
-    @property
     def _late(self) -> bool:
         return time.process_time() > self.inquiry.clock.search_until
 

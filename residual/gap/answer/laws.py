@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import of_its_kind
@@ -57,7 +57,9 @@ def beside_curves(
     return dataclasses.replace(first, claims=tuple(claims)), tuple(says)
 
 
-def beside_others(first: Answer, second: Answer, curves: Sequence[Curve]) -> Answer:
+def beside_others(
+    first: Answer, second: Answer, curves: Sequence[Curve], late: Callable[[], bool]
+) -> Answer:
     """The first answer, with every curve that would forecast nearly as well in place of what is
     certain among its rivals.
 
@@ -71,6 +73,7 @@ def beside_others(first: Answer, second: Answer, curves: Sequence[Curve]) -> Ans
         first: Without them.
         second: What was found with them on offer, too.
         curves: Those.
+        late: Whether there is no time to fit more.
     """
     search, again = first.found.search, second.found.search
     numbers, before = _numbers(again), search.validated[first.key].squares
@@ -79,7 +82,7 @@ def beside_others(first: Answer, second: Answer, curves: Sequence[Curve]) -> Ans
     for curve in curves if sure else ():
         alone = [((one.number,), _most(curve, one, search)) for one in sure]
         for group, most in (*alone, (_together(curve, search, first.key), CLEARLY)):
-            if not (group and most and curve in numbers):
+            if not (group and most and curve in numbers) or late():
                 continue
             gone = {numbers.get(search.candidates[n].effect, -1) for n in group}
             gone |= {n for one, n in numbers.items() if curve.contains(one)}
