@@ -94,6 +94,11 @@ class Joint:
     scale: float | None = None
     driven: bool = True
 
+    @property
+    def first_order(self) -> bool:
+        """Whether a force on it is a rate of change: of a state, or of a speed without a place."""
+        return self.rate in (None, self.position)
+
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:

@@ -62,7 +62,7 @@ class RateLimit(Effect):
                 f"{simulator.name} cannot host {self.name}: it is no EquationOfMotion and no "
                 "FirstOrderSystem"
             )
-        if joint.rate is None or joint.rate == joint.position:
+        if joint.first_order:
             return {"rate": (joint.unit, simulator.force_scale(joint))}
         channel = next(c for c in simulator.state_channels if c.name == joint.rate)
         return {"rate": (channel.unit, channel.scale)}

@@ -20,7 +20,7 @@ PLACES, ROUNDING = 12, 1e-9
 def pulled_by_position(simulator: HostSimulator, joint: str) -> bool:
     """Whether a force on a joint at rest depends on where it is."""
     own = next(one for one in simulator.joints if one.name == joint)
-    if own.rate in (None, own.position):
+    if own.first_order:
         return False
     scale = next(c.scale for c in simulator.state_channels if c.name == own.position)
     return bool(np.ptp(_after(simulator, joint, scale * np.array(ELSEWHERE))) > 0)

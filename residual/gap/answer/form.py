@@ -6,11 +6,9 @@ import dataclasses
 import functools
 from collections.abc import Sequence
 
-import numpy as np
-
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import over_the_log
-from residual.gap.answer.laws import LESS, doubted, is_law
+from residual.gap.answer.laws import LESS, is_law, open_to
 from residual.gap.answer.left import much_is_left
 from residual.gap.confirmation.drift import beside
 from residual.gap.confirmation.tolerance import allowed, calibrated
@@ -18,7 +16,7 @@ from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
-from residual.gap.search.significance import size
+from residual.gap.search.significance import price
 from sims.effects.curve import Curve
 from sims.effects.library import curves_in
 
@@ -51,24 +49,22 @@ def of_open_form(answer: Answer, offered: Sequence[Curve], tolerance: float) -> 
         laws = [n for n, one in named.items() if is_law(one, curve) and not isinstance(one, Curve)]
         if curve in asked or not laws:
             continue
-        fits = (lambda: search.tried[key]), free
-        if all(_rejects(answer, search.fitter, fit(), curve) for fit in fits):
-            claims = [
-                doubted(one, named[one.number], curve) if one.number in laws else one
-                for one in claims
-            ]
+        if not _rejects(answer, search.fitter, search.tried[key], curve):
+            continue
+        if _rejects(answer, search.fitter, free(), curve):
+            claims = open_to(curve, claims, laws, search)
     return dataclasses.replace(answer, claims=tuple(claims))
 
 
 def _rejects(answer: Answer, fitter: SmoothFitter, fit: Fit, curve: Curve) -> bool:
     """Whether a curve beside what was named takes off what chance does not."""
-    simulator, rows = answer.found.search.simulator, size(answer.found.search)
+    search, simulator = answer.found.search, answer.found.search.simulator
     own = beside(fit, [], fitter.cap).loss
     noise = own / answer.left.ratio**2
     for points in candidates(simulator, over_the_log(curve, fitter, simulator), fitter.samples):
         moved = beside_starts(fit, fitter.columns(fit, [points]))
-        price = len(points.knobs) * float(np.log(rows)) * max(1.0, own / rows)
-        most = min(own - price, noise + LESS * (own - noise))
+        by_chance = len(points.knobs) * price(search, own)
+        most = min(own - by_chance, noise + LESS * (own - noise))
         if beside(fit, [moved], fitter.cap).loss < most:
             return True
     return False

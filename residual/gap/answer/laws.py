@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import of_its_kind
@@ -45,10 +45,7 @@ def beside_curves(
         laws = [n for n in first.key if is_law(effects[n].effect, curve)]
         if not laws or not _leaves_less(first, second, curve, laws):
             continue
-        claims = [
-            doubted(one, effects[one.number].effect, curve) if one.number in laws else one
-            for one in claims
-        ]
+        claims = open_to(curve, claims, laws, first.found.search)
         names = " and ".join(effects[n].label for n in laws)
         says.append(
             f"{curve}, a curve by points, forecasts better in place of {names}: to see it, ask "
@@ -76,7 +73,7 @@ def beside_others(
         late: Whether there is no time to fit more.
     """
     search, again = first.found.search, second.found.search
-    numbers, before = _numbers(again), search.validated[first.key].squares
+    numbers, own = _numbers(again), search.error(first.key)
     sure = [claim for claim in first.claims if claim.sure]
     found: dict[int, list[str]] = {claim.number: [] for claim in first.claims}
     for curve in curves if sure else ():
@@ -88,31 +85,22 @@ def beside_others(
             gone |= {n for one, n in numbers.items() if curve.contains(one)}
             for key in _in_place(search, first.key, again, numbers[curve], gone):
                 after = again.validated[key].squares
-                if search.currency.error(after) <= most * search.currency.error(before):
+                if search.currency.error(after) <= most * own:
                     for number in group:
                         found[number].append(str(curve))
-    claims = []
-    for one in first.claims:
-        effect = search.candidates[one.number].effect
-        for curve in _instead_of(effect, first, second, curves):
-            one = doubted(one, effect, curve)
-        rivals = dict.fromkeys((*one.rivals, *found[one.number]))
-        claims.append(dataclasses.replace(one, rivals=tuple(rivals)))
-    return dataclasses.replace(first, claims=tuple(claims))
-
-
-def _instead_of(
-    effect: Effect, first: Answer, second: Answer, curves: Sequence[Curve]
-) -> list[Curve]:
-    """The curves by points that an answer names which does without an effect and forecasts as
-    well."""
-    search, again = first.found.search, second.found.search
-    chosen = [again.candidates[n].effect for n in second.key]
-    before, after = search.validated[first.key].squares, again.validated[second.key].squares
-    as_good = search.currency.error(after) <= AS_GOOD * search.currency.error(before)
-    if effect in chosen or not as_good:
-        return []
-    return [one for one in curves if one in chosen and not isinstance(one, ParameterCurve)]
+    chosen = {again.candidates[n].effect for n in second.key}
+    without = [n for n in first.key if search.candidates[n].effect not in chosen]
+    its = search.currency.error(again.validated[second.key].squares)
+    claims: Sequence[Claim] = first.claims
+    for curve in curves if its <= AS_GOOD * own else ():
+        if curve in chosen and not isinstance(curve, ParameterCurve):
+            claims = open_to(curve, claims, without, search)
+    return dataclasses.replace(
+        first,
+        claims=tuple(
+            dataclasses.replace(one, rivals=_with(one.rivals, *found[one.number])) for one in claims
+        ),
+    )
 
 
 def _most(curve: Curve, claim: Claim, search: Search) -> float:
@@ -132,7 +120,7 @@ def _together(curve: Curve, search: Search, key: Key) -> tuple[int, ...]:
 
     Where a speed settles by its input, friction is one of the input, too.
     """
-    settling = {j.name for j in search.simulator.joints if j.rate in (None, j.position)}
+    settling = {joint.name for joint in search.simulator.joints if joint.first_order}
     effects = {n: search.candidates[n].effect for n in key}
     laws = tuple(
         n
@@ -194,8 +182,23 @@ def _in_place(
     return ()
 
 
-def doubted(claim: Claim, effect: Effect, curve: Curve) -> Claim:
-    """A claim with a curve that may stand in its place: of its family there, its form is open."""
-    if curve.family and (curve.family, curve.where) == (effect.family, effect.where):
-        return dataclasses.replace(claim, form=tuple(dict.fromkeys((*claim.form, str(curve)))))
-    return dataclasses.replace(claim, rivals=tuple(dict.fromkeys((*claim.rivals, str(curve)))))
+def open_to(
+    curve: Curve, claims: Sequence[Claim], numbers: Collection[int], search: Search
+) -> list[Claim]:
+    """Claims of which those of some candidates may stand for a curve: where it is of the family of
+    one, and at its place, the form of that is open."""
+    found = []
+    for claim in claims:
+        effect = search.candidates[claim.number].effect
+        alike = (curve.family, curve.where) == (effect.family, effect.where) and curve.family
+        if claim.number in numbers and alike:
+            claim = dataclasses.replace(claim, form=_with(claim.form, curve))
+        elif claim.number in numbers:
+            claim = dataclasses.replace(claim, rivals=_with(claim.rivals, curve))
+        found.append(claim)
+    return found
+
+
+def _with(names: tuple[str, ...], *more: object) -> tuple[str, ...]:
+    """Names and more of them, each once."""
+    return tuple(dict.fromkeys((*names, *map(str, more))))

@@ -21,7 +21,7 @@ from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.shooting import capped
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.search.sets import Key, Search
-from residual.gap.search.significance import size
+from residual.gap.search.significance import price
 
 Array = NDArray[np.float64]
 
@@ -70,14 +70,13 @@ class Drift:
             itertools.combinations(rest, count) for count in range(len(rest) + 1)
         )
         own, numbers = search.tried[key].merit, search.numbers(key)
-        # As the information criterion has it where the noise is not known: what is left counts one.
-        price = float(np.log(size(search))) * max(1.0, own / size(search))
+        each = price(search, own)
 
         def behind(k: Key, fall: Fall) -> float:
-            return fall.loss - own + price * (search.numbers(k) + len(fall.numbers) - numbers)
+            return fall.loss - own + each * (search.numbers(k) + len(fall.numbers) - numbers)
 
         return any(
-            behind(k, drifting) <= 0.0 < behind(k, constant) - price
+            behind(k, drifting) <= 0.0 < behind(k, constant) - each
             for k in subsets
             if k in search.tried
             for constant, drifting in self._with_push(k)

@@ -123,8 +123,7 @@ def _exchanged(simulator: HostSimulator, joints: Sequence[Sequence[int]]) -> lis
         ),
     ):
         for one, other in itertools.combinations(groups, 2):
-            kinds = [[(channels[i].unit, channels[i].kind) for i in each] for each in (one, other)]
-            if kinds[0] != kinds[1]:
+            if not _alike(channels, one, other):
                 continue
             names = [" and ".join(channels[i].name for i in each) for each in (one, other)]
             plain = as_said(simulator)
@@ -134,6 +133,12 @@ def _exchanged(simulator: HostSimulator, joints: Sequence[Sequence[int]]) -> lis
     return found
 
 
+def _alike(channels: Sequence[Channel], one: Sequence[int], other: Sequence[int]) -> bool:
+    """Whether channels at some places are of the same units and kinds as those at others."""
+    first, second = ([(channels[i].unit, channels[i].kind) for i in each] for each in (one, other))
+    return first == second
+
+
 def _counted_from_the_last(
     simulator: HostSimulator, joints: Sequence[Sequence[int]]
 ) -> list[Convention]:
@@ -141,8 +146,7 @@ def _counted_from_the_last(
     the other way round."""
     channels, found = simulator.physical_channels, []
     for before, joint in itertools.pairwise(joints):
-        kinds = [[(channels[i].unit, channels[i].kind) for i in each] for each in (before, joint)]
-        if kinds[0] != kinds[1] or channels[joint[0]].turn is None:
+        if not _alike(channels, before, joint) or channels[joint[0]].turn is None:
             continue
         first, own = channels[before[0]].name, channels[joint[0]].name
         also = " (rates likewise)" if len(joint) > 1 else ""

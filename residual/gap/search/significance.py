@@ -33,6 +33,13 @@ def score(search: Search, key: Key) -> float:
     return search.tried[key].merit + np.log(size(search)) * search.numbers(key)
 
 
+def price(search: Search, loss: float) -> float:
+    """What a further number costs beside a loss, as the information criterion has it where the
+    noise is not known: what is left counts one."""
+    rows = size(search)
+    return float(np.log(rows)) * max(1.0, loss / rows)
+
+
 def significant(search: Search, needed: float) -> Key:
     """The set of least score, of which every effect lowers the cost by what chance does not.
 
