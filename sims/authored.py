@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sims.host import Joint
+from sims.motion import Acceleration, DriveForce
 from sims.simulator import Array, Channel
 
 
@@ -83,3 +84,29 @@ def mobility(
     with np.errstate(all="ignore"):
         moved = acceleration(q, rest, np.zeros((2 * n, inputs)), force, SimpleNamespace(**values))
     return np.asarray(moved[n:] - moved[:n])
+
+
+def push_of_inputs(acceleration: Acceleration) -> DriveForce:
+    """The force on the joints that does what the inputs do, (q, v, u, p) -> (joints, n).
+
+    Args:
+        acceleration: Linear in its force, joints first and rows last.
+    """
+
+    def push(q: Array, v: Array, u: Array, p: SimpleNamespace) -> Array:
+        none = np.zeros_like(q)
+        rest = acceleration(q, v, 0.0 * u, none, p)
+        moved = []
+        for j in range(len(q)):
+            force = none.copy()
+            force[j] = 1.0
+            moved.append(acceleration(q, v, 0.0 * u, force, p) - rest)
+        inputs = acceleration(q, v, u, none, p) - rest
+        if len(q) == 1:
+            return inputs / moved[0]
+        matrix = np.stack(moved).transpose(2, 1, 0)
+        matrix[np.linalg.det(matrix) == 0] = np.nan  # what has left all bounds
+        found = np.asarray(np.linalg.solve(matrix, inputs.T[:, :, None]), float)
+        return found[:, :, 0].T
+
+    return push

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sims.authored import by_joint, force_is_added, joint_of, mobility
+from sims.authored import by_joint, force_is_added, joint_of, mobility, push_of_inputs
 from sims.effects.base import Effect
 from sims.effects.pull import ELSEWHERE
 from sims.host import HostSimulator, Joint
@@ -139,7 +139,8 @@ class EquationOfMotion(_Equations):
         """
 
     def drive_force(self, q: Array, v: Array, u: Array, p: Any) -> Array:
-        """Force of the actuators on the joints, part of ``acceleration``; for backlash only."""
+        """Force of the actuators on the joints, part of ``acceleration``; for backlash, and for
+        friction by load, which goes by the inputs alone where it is not told."""
         raise NotImplementedError(f"{type(self).__name__} does not tell its drive force")
 
     def drive_forces(self, states: Array, inputs: Array) -> Array:
@@ -207,7 +208,8 @@ class EquationOfMotion(_Equations):
         names = [joint.name for joint in self.joints]
         places = {str(joint.position): (0, j) for j, joint in enumerate(self.joints)}
         places |= {str(joint.rate): (1, j) for j, joint in enumerate(self.joints)}
-        return motion_of(self, names, places, acceleration, drive_force, span)
+        drive = drive_force if self.has_drive_force else push_of_inputs(acceleration)
+        return motion_of(self, names, places, acceleration, drive, span)
 
 
 class FirstOrderSystem(_Equations):
@@ -255,9 +257,12 @@ class FirstOrderSystem(_Equations):
                 return change + f
             return np.concatenate([change + f[: len(names)], f[len(names) :]])
 
-        # Nothing has play, so nobody asks for a drive force.
+        def drive(q: Array, v: Array, u: Array, p: SimpleNamespace) -> Array:
+            none = np.zeros_like(v)
+            return rates(q, v, u, none, p) - rates(q, v, 0.0 * u, none, p)
+
         places = {name: (1, i) for i, name in enumerate(names)}
-        motion = motion_of(self, names, places, rates, lambda q, v, u, p: np.zeros_like(v))
+        motion = motion_of(self, names, places, rates, drive)
         x = np.asarray(states, float).T
         own, inputs = len(x) - 2 * len(motion.parts), np.asarray(inputs, float)
         state = State(

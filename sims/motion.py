@@ -32,7 +32,7 @@ class Motion:
     Args:
         acceleration: (q, v, u, force, parameters) -> accelerations; all (n_joints, n) but
             u (n_a, n). Linear in the force.
-        drive_force: (q, v, u, parameters) -> (n_joints, n).
+        drive_force: (q, v, u, parameters) -> (n_joints, n), for plays and friction of the drive.
         parameters: Each a scalar or (n,).
         smooth, dry, plays, capped: Effects with the number of the joint they act on.
         flows: The same with the numbers of both states that something flows between.
@@ -180,11 +180,17 @@ class Motion:
             free[i] = push[j] / (push[j] - self.drive(q, faster, u)[j])
         return push, free
 
-    def limits(self, v: Array) -> Array:
+    @property
+    def rubs_by_drive(self) -> bool:
+        """Whether the size of dry friction depends on the force of the actuators."""
+        return any(effect.follows_drive for _, effect in self.dry)
+
+    def limits(self, q: Array, v: Array, u: Array) -> Array:
         """Size of the dry friction on every joint."""
         size = np.zeros(v.shape)
+        push = self.drive(q, v, u) if self.rubs_by_drive else size
         for j, effect in self.dry:
-            size[j] += effect.limit(np.abs(v[j]))
+            size[j] += effect.under(push[j]).limit(np.abs(v[j]))
         return size
 
 

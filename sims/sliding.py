@@ -72,10 +72,12 @@ def advance(motion: Motion, state: State, ends: Array, h: Array) -> State:
         h: Length of every row's sub-steps in seconds, (n,).
     """
     final = State(*(np.empty_like(part) for part in state))
-    clocks, limits = Clocks.start(len(h)), _limits(motion, state)
+    clocks, limits = Clocks.start(len(h)), _limits(motion, state, ends[0, 0])
     while clocks.row.size:
-        span = (clocks.aim - clocks.began) * h
-        attempt = _attempt(motion, limits, state, inputs(ends, clocks), span)
+        span, u = (clocks.aim - clocks.began) * h, inputs(ends, clocks)
+        if motion.rubs_by_drive:
+            limits = _limits(motion, state, u[0])
+        attempt = _attempt(motion, limits, state, u, span)
         mode, state, last = attempt.mode, attempt.after, attempt.slopes[3]
         push = motion.drive(state.q, state.v, attempt.u[1]) if motion.plays else state.v
         early = finish(clocks, h, state, last, push, limits, mode)
@@ -89,16 +91,16 @@ def advance(motion: Motion, state: State, ends: Array, h: Array) -> State:
             motion, state, clocks, h = (
                 motion.take(rest), state.take(rest), clocks.take(rest), h[rest],
             )  # fmt: skip
-            limits = _limits(motion, state)
+            limits = Limits(limits.rest.take(rest, 1), limits.edges.take(rest, 1), limits.joints)
     return final
 
 
-def _limits(motion: Motion, state: State) -> Limits:
+def _limits(motion: Motion, state: State, u: Array) -> Limits:
     edges = np.empty_like(state.x)
     for i, (_, play) in enumerate(motion.plays):
         edges[i] = 0.5 * play.width
     joints = np.array([j for j, _ in motion.plays], np.intp)
-    return Limits(motion.limits(np.zeros(state.v.shape)), edges, joints)
+    return Limits(motion.limits(state.q, 0.0 * state.v, u), edges, joints)
 
 
 def _attempt(motion: Motion, limits: Limits, state: State, u: Array, h: Array) -> Attempt:
@@ -164,7 +166,7 @@ def _loads(
     motion: Motion, limits: Limits, mode: Mode, q: Array, v: Array, x: Array, u: Array
 ) -> tuple[Array, Array]:
     """Forces of effects, friction and open plays on the joints, and speeds in the play."""
-    force = -mode.slip * (limits.rest if motion.even else motion.limits(v))
+    force = -mode.slip * (limits.rest if motion.even else motion.limits(q, v, u))
     running = np.zeros(x.shape)
     if motion.plays and mode.open.any():
         push, free = motion.drive_and_free(q, v, u)

@@ -36,6 +36,11 @@ class Clock:
         self.confirm_until += time.process_time() - begin
 
     @property
+    def searched(self) -> bool:
+        """Whether the time for searching is over."""
+        return time.process_time() > self.search_until
+
+    @property
     def late(self) -> bool:
         """Whether the time for confirming is over, too."""
         return time.process_time() > self.confirm_until

@@ -12,11 +12,12 @@ from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import fits_better, forecast_error
 from residual.gap.confirmation.rest import fits_better_from_rest
 from residual.gap.confirmation.twins import exact_twins, with_twins
+from residual.gap.confirmed import Confirmed
 from residual.gap.fitting.smooth import LEAD, SmoothFitter
 from residual.gap.log import Log
 from residual.gap.model.candidates import Candidate, candidates, one_way
 from residual.gap.offered import Offered
-from residual.gap.once_more import Confirmed, OnceMore
+from residual.gap.once_more import OnceMore
 from residual.gap.preparation.numerics import held_otherwise, how_held
 from residual.gap.preparation.prepare import Prepared, finely, prepare
 from residual.gap.search.explain import Explanation, explain

@@ -12,55 +12,27 @@ from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import worth_a_curve
 from residual.gap.answer.form import of_open_form
 from residual.gap.answer.free_parameters import better, worth_freeing
-from residual.gap.answer.laws import beside_curves, beside_others
+from residual.gap.answer.laws import beside_curves, beside_gears, beside_others
 from residual.gap.answer.left import (
-    names_more,
     still_names,
     takes_most_by_itself,
     takes_what_is_left,
+    worth_a_gear,
     worth_a_part,
 )
-from residual.gap.answer.lone import (
-    explains_the_rest,
-    few_stretches,
-    left_stretch,
-    lone_stretch,
-    off_stretch,
-)
+from residual.gap.answer.lone import few_stretches, left_stretch, off_stretch
 from residual.gap.answer.varying import no_surer, over_unused, worth_varying
+from residual.gap.confirmed import Confirmed
 from residual.gap.data.windows import TooShort
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.log import Log
-from residual.gap.longer import LESS, LONGER, longer_horizon, over, slow_error, slow_remainder
-from residual.gap.preparation.horizon import longest_horizon
-from residual.gap.preparation.prepare import Prepared, finely
+from residual.gap.other_windows import OtherWindows
+from residual.gap.preparation.prepare import finely
 from residual.gap.search.redundant import by_points
 from sims.effects.base import Effect
-from sims.effects.parameter_curve import ParameterCurve
 
 if TYPE_CHECKING:
     from residual.gap.inquiry import Inquiry
-
-
-@dataclasses.dataclass(frozen=True)
-class Confirmed:
-    """What is known in the end.
-
-    Attributes:
-        prepared: The windows that the answer is of.
-        answer: What stays after confirmation.
-        says: What is to be said of how it was found.
-        in_vain: Parameters that follow a channel, asked for and not named.
-    """
-
-    prepared: Prepared
-    answer: Answer
-    says: tuple[str, ...]
-    in_vain: tuple[ParameterCurve, ...] = ()
-
-    def and_says(self, text: str) -> Confirmed:
-        """The same with one more thing to say."""
-        return dataclasses.replace(self, says=(*self.says, text))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,15 +49,20 @@ class OnceMore:
     log: Log
     tolerance: float
 
+    @property
+    def windows(self) -> OtherWindows:
+        """What asks of other windows."""
+        return OtherWindows(self.inquiry, self.log, self.tolerance)
+
     def of(self, known: Confirmed) -> Confirmed:
         """The same, or what is found without a stretch that nothing explains, with parameters
         free, with more than the library on offer, or over longer forecasts."""
         with contextlib.suppress(TooShort):  # here and below, what was found holds without it
-            known = self.without_lone_stretch(known)
+            known = self.windows.without_lone_stretch(known)
         lone = bool(known.says)
         for step in (
-            self.with_parameters_free, self.with_varying, self.with_curves, self.with_parts,
-            self.over_longer_forecasts, self.over_the_longest_forecasts, self.with_what_is_slow,
+            self.with_parameters_free, self.with_gears, self.with_varying, self.with_curves,
+            self.with_parts, self.windows.longer, self.windows.longest, self.windows.slow,
         ):  # fmt: skip
             with contextlib.suppress(TooShort):
                 known = step(known)
@@ -96,24 +73,6 @@ class OnceMore:
             return known.and_says(rest.says(left_out=False))
         says = few_stretches(known.answer) or off_stretch(known.answer)
         return known.and_says(says) if says else known
-
-    def without_lone_stretch(self, known: Confirmed) -> Confirmed:
-        """The same, or what is found without a stretch of the log that nothing explains.
-
-        It counts only if something is named elsewhere.
-        """
-        stretch = lone_stretch(known.answer)
-        if stretch is None:
-            return known
-        if self._late() or stretch.indispensable:
-            return known.and_says(stretch.says(left_out=False))
-        self.inquiry.tell("once more without a stretch that nothing explains")
-        simulator = known.answer.found.search.simulator
-        runs = stretch.cut_from(self.log.runs)
-        ready, answer = self.inquiry.asked_of(simulator, runs, self.log.horizon, self.tolerance)
-        if not explains_the_rest(answer):
-            return known.and_says(stretch.says(left_out=False))
-        return Confirmed(ready, answer, (stretch.says(left_out=True),))
 
     def with_parameters_free(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with parameters free if they may hide something."""
@@ -129,6 +88,17 @@ class OnceMore:
         self.inquiry.tell("once more with parameters free within their tolerance")
         second = self.inquiry.asked_again(known, self.tolerance, beside)
         return dataclasses.replace(known, answer=second) if better(second, answer) else known
+
+    def with_gears(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found with friction in proportion to the load, if that takes most
+        of what is left."""
+        answer, what = known.answer, "friction in proportion to the load"
+        gears = worth_a_gear(answer, self.inquiry.offered.gears)
+        found, second = self._asked_with(known, gears, what, what)
+        if second is None or found.answer is second:
+            return found
+        beside = beside_gears(answer, second, gears, self._late)
+        return dataclasses.replace(found, answer=beside)
 
     def with_varying(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with parameters that follow what was measured, if they take
@@ -180,7 +150,7 @@ class OnceMore:
         if not isinstance(fitter, SmoothFitter) or fitter.samples.stride == 1:
             return known
         horizon, what = self.log.horizon / fitter.samples.stride, f"short forecasts, with {part}"
-        ready, answer = self._over(known, horizon, what, [*_curves(known), *parts])
+        ready, answer = self.windows.over(known, horizon, what, [*_curves(known), *parts])
         if not (takes_most_by_itself(answer, parts) and still_names(answer, known.answer)):
             return known
         says = (
@@ -188,73 +158,6 @@ class OnceMore:
             f"{fitter.seconds:.3g} s rows are too far apart for what swings so fast"
         )
         return Confirmed(ready, answer, (*known.says, says))
-
-    def over_longer_forecasts(self, known: Confirmed) -> Confirmed:
-        """The same, or what is found over longer forecasts, of which the records hold fewer.
-
-        They are tried where nothing could be named.
-        """
-        search = known.answer.found.search
-        if self.log.by_user or known.answer.key or search.beside:
-            return known
-        horizon = longer_horizon(search.simulator, self.log, known.answer)
-        if horizon is None or self._late():
-            return known
-        what = "longer forecasts, of which the records hold fewer"
-        ready, answer = self._over(known, horizon, what)
-        if not explains_the_rest(answer):
-            return known
-        says = (
-            f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s, "
-            "of which these records hold more, nothing can be named"
-        )
-        return Confirmed(ready, answer, (says,))
-
-    def over_the_longest_forecasts(self, known: Confirmed) -> Confirmed:
-        """The same, or what is found over forecasts as long as the records where these alone show
-        that something is missing, even if nothing can be named from so few."""
-        search = known.answer.found.search
-        if self.log.by_user or known.answer.key or search.beside or self._late():
-            return known
-        slow = None if search.simulator.has_contacts else slow_error(self.log, known.answer)
-        if slow is None:
-            return known
-        horizon, says = slow
-        what = "the longest forecasts, where a slow error shows"
-        ready, answer = self._over(known, horizon, what)
-        return Confirmed(ready, answer, (*known.says, says))
-
-    def with_what_is_slow(self, known: Confirmed) -> Confirmed:
-        """The same, or what is found beside it over longer forecasts, of which the records hold as
-        many as are needed, if those as long as the records show a slow error."""
-        answer, search = known.answer, known.answer.found.search
-        if self.log.by_user or not answer.key or search.beside or self._late():
-            return known
-        horizon = longest_horizon(self.log.recorded)
-        if search.simulator.has_contacts or horizon < LONGER * self.log.horizon:
-            return known
-        slow = slow_remainder(self.log, answer)
-        if slow is None:
-            return known
-        ready, longer = self._over(known, horizon, "longer forecasts, for a slow error")
-        left = over(slow.horizon, self.log, longer).errors[slow.place]
-        if left >= LESS * slow.error:
-            return known.and_says(slow.says)
-        if not names_more(longer, answer):
-            return known  # the same names, of which longer forecasts tell the sizes better
-        says = (
-            f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s "
-            "what is slow hardly shows"
-        )
-        return Confirmed(ready, longer, (*known.says, says))
-
-    def _over(
-        self, known: Confirmed, horizon: float, what: str, more: Sequence[Effect] = ()
-    ) -> tuple[Prepared, Answer]:
-        """What is found over forecasts of another length, and these windows."""
-        log, simulator = self.log.at(horizon), known.answer.found.search.simulator
-        self.inquiry.tell(f"once more over {what}")
-        return self.inquiry.asked_of(simulator, log.runs, log.horizon, self.tolerance, more)
 
     def _with_more(
         self, known: Confirmed, more: Sequence[Effect], what: str, lacking: str
@@ -282,7 +185,7 @@ class OnceMore:
         return dataclasses.replace(known, answer=second), second
 
     def _late(self) -> bool:
-        return time.process_time() > self.inquiry.clock.search_until
+        return self.inquiry.clock.searched
 
 
 def _curves(known: Confirmed) -> list[Effect]:

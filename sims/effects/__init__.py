@@ -29,6 +29,7 @@ from sims.effects.flexible import FlexiblePart as FlexiblePart
 from sims.effects.friction import CoulombFriction as CoulombFriction
 from sims.effects.friction import DirectionalFriction as DirectionalFriction
 from sims.effects.friction import DryFriction as DryFriction
+from sims.effects.friction import LoadDependentFriction as LoadDependentFriction
 from sims.effects.friction import StribeckFriction as StribeckFriction
 from sims.effects.inertia import AddedInertia as AddedInertia
 from sims.effects.joint import Cogging as Cogging

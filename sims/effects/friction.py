@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from sims.effects.base import number
 from sims.effects.joint import ConstantLoad, JointEffect, Value
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
+
+#: Drive force, in any unit, for which a drive counts that is about to push.
+AT_LEAST = 1e-100
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,15 +25,23 @@ class DryFriction(JointEffect):
 
     Hosts apply it as it is defined: at rest it is whatever force holds the joint, up to
     ``limit(0)``; no smoothing of the sign, hence no creep.
+
+    Attributes:
+        follows_drive: True if its size depends on the force of the actuators, see ``under``.
     """
 
     family: ClassVar[str] = "dissipation"
     subfamily: ClassVar[str] = "dry friction"
     holds_still: ClassVar[bool] = True
+    follows_drive: ClassVar[bool] = False
 
     @abc.abstractmethod
     def limit(self, v: Value) -> Value:
         """Size of the friction at rate ``v``, not negative; at 0, the most it can hold."""
+
+    def under(self, drive: Value) -> DryFriction:
+        """The friction while the actuators push with a force, by row; most are the same."""
+        return self
 
     def force(self, q: Value, v: Value) -> Value:
         """Friction while sliding (zero at rest, where it is not a function of the state)."""
@@ -105,3 +120,39 @@ class DirectionalFriction(DryFriction):
         """The level of the direction; at rest the larger one."""
         most = np.maximum(self.forward, self.backward)
         return np.where(v > 0, self.forward, np.where(v < 0, self.backward, most))
+
+
+@dataclasses.dataclass(frozen=True)
+class LoadDependentFriction(DryFriction):
+    """Dry friction in proportion to what the drive pushes: ``share |drive force|``.
+
+    Gears, lead screws and belts lose a share of what they carry, so that they lift with less than
+    the motor gives and hold more. The force of the drive is the simulator's ``drive_force`` where
+    that is known, else that of the inputs. See Bittencourt and Gunnarsson, "Static friction in a
+    robot joint: modeling and identification of load and temperature effects", Journal of Dynamic
+    Systems, Measurement, and Control 134(5), 2012.
+    """
+
+    share: Value = number(low=0.0, high=1.0, share=0.3, force=0)
+
+    name: ClassVar[str] = "load_dependent_friction"
+    sentence: ClassVar[str] = "Dry friction in proportion to the load: a gear or screw that wastes."
+    needs: ClassVar[str] = "reversals of the motion under small and large inputs"
+    follows_drive: ClassVar[bool] = True
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """See ``JointEffect.measures``; the joint has to be driven."""
+        joints = {joint.name: joint for joint in simulator.joints}
+        if not simulator.written_out:
+            raise ValueError(f"{self.name} needs a system that is written as equations")
+        if self.joint in joints and not joints[self.joint].driven:
+            raise ValueError(f"{self.name} needs a driven joint; nothing drives {self.joint!r}")
+        return super().measures(simulator)
+
+    def under(self, drive: Value) -> DryFriction:
+        """Coulomb friction of that share."""
+        return CoulombFriction(self.joint, self.share * np.maximum(np.abs(drive), AT_LEAST))
+
+    def limit(self, v: Value) -> Value:
+        """That without a drive, which is none."""
+        return 0.0 * v

@@ -26,6 +26,7 @@ from sims.effects.flexible import FlexibleJoint, FlexiblePart
 from sims.effects.friction import (
     CoulombFriction,
     DirectionalFriction,
+    LoadDependentFriction,
     StribeckFriction,
 )
 from sims.effects.inertia import AddedInertia
@@ -45,6 +46,7 @@ from sims.effects.parameter import ParameterChange
 from sims.effects.pull import pulled_by_position, pulled_by_turn
 from sims.effects.sensor import EncoderScale, SensorOffset, SensorScale
 from sims.effects.store import SecondStore
+from sims.simulator import random_values
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
@@ -75,6 +77,8 @@ ACTUATOR_EFFECTS: tuple[type[Effect], ...] = (
 )
 #: What inputs of one kind have in common: amplifiers, motors and links of one make.
 SHARED_EFFECTS = (ActuatorGain, QuadraticActuator, DeadZone, Saturation, Delay, ActuatorLag)
+#: Places where it is tried whether inputs move a joint.
+PLACES = 8
 #: Most inputs that have something in common.
 ROTORS = 4
 SENSOR_EFFECTS = (SensorOffset, SensorScale, EncoderScale)
@@ -145,6 +149,23 @@ def parts_in(simulator: HostSimulator) -> tuple[FlexiblePart, ...]:
             found.append(part)
             if pulled_by_position(simulator, joint.name):
                 found.append(FlexibleJoint(joint.name))
+    return tuple(found)
+
+
+def gears_in(simulator: HostSimulator) -> tuple[LoadDependentFriction, ...]:
+    """Friction by load, at zero strength, of every joint that the inputs move by themselves."""
+    plain, rng, found = simulator.with_effects(()), np.random.default_rng(0), []
+    if not plain.action_channels:
+        return ()
+    states = plain.smooth_states(PLACES, rng)
+    inputs = np.stack([random_values(c, PLACES, rng) for c in plain.action_channels], axis=1)
+    for joint in simulator.joints:
+        gear = LoadDependentFriction(joint.name)
+        with contextlib.suppress(ValueError):
+            there = plain.with_effects([typical(gear, simulator)])
+            after = there.step(states, inputs)
+            if not np.allclose(after, plain.step(states, inputs), rtol=1e-9):
+                found.append(gear)
     return tuple(found)
 
 

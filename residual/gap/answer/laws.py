@@ -103,6 +103,32 @@ def beside_others(
     )
 
 
+def beside_gears(
+    first: Answer, second: Answer, gears: Sequence[Effect], late: Callable[[], bool]
+) -> Answer:
+    """The first answer, with every friction by load that does nearly as well in place of what is
+    certain among its rivals, as any effect of the library is.
+
+    Args:
+        first: Without them.
+        second: What was found with them on offer, too.
+        gears: Those.
+        late: Whether there is no time to fit more.
+    """
+    search, again = first.found.search, second.found.search
+    numbers, most = _numbers(again), CLEARLY * search.error(first.key)
+    claims: Sequence[Claim] = first.claims
+    for gear in gears:
+        for claim in first.claims:
+            own = numbers.get(search.candidates[claim.number].effect, -1)
+            if not claim.sure or gear not in numbers or late():
+                continue
+            for key in _in_place(search, first.key, again, numbers[gear], {own}):
+                if search.currency.error(again.validated[key].squares) <= most:
+                    claims = open_to(gear, claims, [claim.number], search)
+    return dataclasses.replace(first, claims=tuple(claims))
+
+
 def _most(curve: Curve, claim: Claim, search: Search) -> float:
     """Forecast error with a curve in place of what is claimed, over that with it, up to which the
     curve is a rival; 0 if it is none."""
@@ -183,18 +209,18 @@ def _in_place(
 
 
 def open_to(
-    curve: Curve, claims: Sequence[Claim], numbers: Collection[int], search: Search
+    other: Effect, claims: Sequence[Claim], numbers: Collection[int], search: Search
 ) -> list[Claim]:
-    """Claims of which those of some candidates may stand for a curve: where it is of the family of
-    one, and at its place, the form of that is open."""
+    """Claims of which those of some candidates may stand for another effect: where it is of the
+    family of one, and at its place, the form of that is open."""
     found = []
     for claim in claims:
         effect = search.candidates[claim.number].effect
-        alike = (curve.family, curve.where) == (effect.family, effect.where) and curve.family
+        alike = (other.family, other.where) == (effect.family, effect.where) and other.family
         if claim.number in numbers and alike:
-            claim = dataclasses.replace(claim, form=_with(claim.form, curve))
+            claim = dataclasses.replace(claim, form=_with(claim.form, other))
         elif claim.number in numbers:
-            claim = dataclasses.replace(claim, rivals=_with(claim.rivals, curve))
+            claim = dataclasses.replace(claim, rivals=_with(claim.rivals, other))
         found.append(claim)
     return found
 

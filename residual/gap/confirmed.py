@@ -1,0 +1,30 @@
+"""What is known in the end, and the windows that it is of."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from residual.gap.answer.confirmed import Answer
+from residual.gap.preparation.prepare import Prepared
+from sims.effects.parameter_curve import ParameterCurve
+
+
+@dataclasses.dataclass(frozen=True)
+class Confirmed:
+    """What is known in the end.
+
+    Attributes:
+        prepared: The windows that the answer is of.
+        answer: What stays after confirmation.
+        says: What is to be said of how it was found.
+        in_vain: Parameters that follow a channel, asked for and not named.
+    """
+
+    prepared: Prepared
+    answer: Answer
+    says: tuple[str, ...]
+    in_vain: tuple[ParameterCurve, ...] = ()
+
+    def and_says(self, text: str) -> Confirmed:
+        """The same with one more thing to say."""
+        return dataclasses.replace(self, says=(*self.says, text))

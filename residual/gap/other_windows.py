@@ -1,0 +1,120 @@
+"""Search and confirmation in other windows of the log: without a stretch, or longer ones."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from residual.gap.answer.confirmed import Answer
+from residual.gap.answer.left import names_more
+from residual.gap.answer.lone import explains_the_rest, lone_stretch
+from residual.gap.confirmed import Confirmed
+from residual.gap.log import Log
+from residual.gap.longer import LESS, LONGER, longer_horizon, over, slow_error, slow_remainder
+from residual.gap.preparation.horizon import longest_horizon
+from residual.gap.preparation.prepare import Prepared
+from sims.effects.base import Effect
+
+if TYPE_CHECKING:
+    from residual.gap.inquiry import Inquiry
+
+
+@dataclasses.dataclass(frozen=True)
+class OtherWindows:
+    """What asks once more of other windows, and only in time.
+
+    Attributes:
+        inquiry: Searches and confirms.
+        log: What was recorded.
+        tolerance: How well the simulator's parameters are known, as a share of each.
+    """
+
+    inquiry: Inquiry
+    log: Log
+    tolerance: float
+
+    def without_lone_stretch(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found without a stretch of the log that nothing explains.
+
+        It counts only if something is named elsewhere.
+        """
+        stretch = lone_stretch(known.answer)
+        if stretch is None:
+            return known
+        if self.inquiry.clock.searched or stretch.indispensable:
+            return known.and_says(stretch.says(left_out=False))
+        self.inquiry.tell("once more without a stretch that nothing explains")
+        simulator = known.answer.found.search.simulator
+        runs = stretch.cut_from(self.log.runs)
+        ready, answer = self.inquiry.asked_of(simulator, runs, self.log.horizon, self.tolerance)
+        if not explains_the_rest(answer):
+            return known.and_says(stretch.says(left_out=False))
+        return Confirmed(ready, answer, (stretch.says(left_out=True),))
+
+    def longer(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found over longer forecasts, of which the records hold fewer.
+
+        They are tried where nothing could be named.
+        """
+        search = known.answer.found.search
+        if self.log.by_user or known.answer.key or search.beside:
+            return known
+        horizon = longer_horizon(search.simulator, self.log, known.answer)
+        if horizon is None or self.inquiry.clock.searched:
+            return known
+        what = "longer forecasts, of which the records hold fewer"
+        ready, answer = self.over(known, horizon, what)
+        if not explains_the_rest(answer):
+            return known
+        says = (
+            f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s, "
+            "of which these records hold more, nothing can be named"
+        )
+        return Confirmed(ready, answer, (says,))
+
+    def longest(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found over forecasts as long as the records where these alone show
+        that something is missing, even if nothing can be named from so few."""
+        search = known.answer.found.search
+        if self.log.by_user or known.answer.key or search.beside or self.inquiry.clock.searched:
+            return known
+        slow = None if search.simulator.has_contacts else slow_error(self.log, known.answer)
+        if slow is None:
+            return known
+        horizon, says = slow
+        what = "the longest forecasts, where a slow error shows"
+        ready, answer = self.over(known, horizon, what)
+        return Confirmed(ready, answer, (*known.says, says))
+
+    def slow(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found beside it over longer forecasts, of which the records hold as
+        many as are needed, if those as long as the records show a slow error."""
+        answer, search = known.answer, known.answer.found.search
+        if self.log.by_user or not answer.key or search.beside or self.inquiry.clock.searched:
+            return known
+        horizon = longest_horizon(self.log.recorded)
+        if search.simulator.has_contacts or horizon < LONGER * self.log.horizon:
+            return known
+        slow = slow_remainder(self.log, answer)
+        if slow is None:
+            return known
+        ready, longer = self.over(known, horizon, "longer forecasts, for a slow error")
+        left = over(slow.horizon, self.log, longer).errors[slow.place]
+        if left >= LESS * slow.error:
+            return known.and_says(slow.says)
+        if not names_more(longer, answer):
+            return known  # the same names, of which longer forecasts tell the sizes better
+        says = (
+            f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s "
+            "what is slow hardly shows"
+        )
+        return Confirmed(ready, longer, (*known.says, says))
+
+    def over(
+        self, known: Confirmed, horizon: float, what: str, more: Sequence[Effect] = ()
+    ) -> tuple[Prepared, Answer]:
+        """What is found over forecasts of another length, and these windows."""
+        log, simulator = self.log.at(horizon), known.answer.found.search.simulator
+        self.inquiry.tell(f"once more over {what}")
+        return self.inquiry.asked_of(simulator, log.runs, log.horizon, self.tolerance, more)
