@@ -37,6 +37,8 @@ RAISED = str.maketrans(
 DIVIDED = re.compile(r"(rad|[mVKNA])(?![\w^])")
 #: Names of people, in the names of effects.
 PEOPLE = ("Coulomb", "Stribeck")
+#: Pairs of words with a hyphen, in the names of effects.
+PAIRS = ("load-dependent",)
 #: Effects that act between two places.
 BETWEEN = ("exchange",)
 
@@ -52,6 +54,8 @@ def effect_name(label: str) -> str:
     words = name.replace("_", " ")
     for person in PEOPLE:
         words = words.replace(person.lower(), person)
+    for pair in PAIRS:
+        words = words.replace(pair.replace("-", " "), pair)
     at = "between" if name in BETWEEN else "at"
     return words + (f" {at} {where.replace('_', ' ')}" if where else "")
 

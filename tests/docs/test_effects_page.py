@@ -67,6 +67,7 @@ OTHERS = [
     effects.StateCurve("level"), effects.RateLimit("pivot"),
     effects.FlexiblePart("pivot"), effects.FlexibleJoint("pivot"), effects.AddedInertia("pivot"),
     effects.ParameterCurve("mass", "voltage"), effects.Unbalance("pivot"),
+    effects.LoadDependentFriction("pivot"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}

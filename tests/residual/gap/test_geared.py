@@ -1,0 +1,69 @@
+"""Friction in proportion to the load is named, and asked for only where it may be."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from held import path
+
+from residual.gap import find_gap
+from residual.trajectories import Trajectory
+from sims.equations import EquationOfMotion
+from sims.simulator import Channel, Parameter
+
+MASS, DRAG, STOPS = 2.0, 3.0, 1e-3
+
+
+class Slide(EquationOfMotion):
+    """A slide on a screw."""
+
+    dt = 0.02
+    substeps = 4
+    state_channels = (
+        Channel("place", "m", "position", scale=1.0),
+        Channel("speed", "m/s", "rate", rate_of="place", scale=2.0),
+    )
+    action_channels = (Channel("force", "N", "input", scale=20.0, low=-40.0, high=40.0),)
+    parameters: ClassVar = {
+        "mass": Parameter(MASS, "kg", "of the slide", low=0.01),
+        "drag": Parameter(DRAG, "N s/m", "of its grease", low=0.0),
+    }
+
+    def acceleration(self, q, v, u, force, p):
+        return ((u[:, 0] - p.drag * v[:, 0] + force[:, 0]) / p.mass)[:, None]
+
+
+def slides(share, level, rows=240, count=3):
+    """Runs of a slide with friction of a share of the force and of a level, softened at rest."""
+    rng = np.random.default_rng(0)
+
+    def rates(_, x, u):
+        brake = (share * abs(u) + level) * np.tanh(x[1] / STOPS)
+        return [x[1], (u - DRAG * x[1] - brake) / MASS]
+
+    for number in range(count):
+        size = np.repeat(rng.uniform(1, 10 * (1 + number), rows // 15), 15)
+        force = size * np.repeat(rng.choice([-1, 1], rows // 15), 15)
+        true = path(rates, [0.0, 0.0], force[:-1], 0.02, method="LSODA")
+        states = true + rng.normal(0, [5e-4, 5e-3], true.shape)
+        yield Trajectory(f"run {number}", 0.02 * np.arange(rows), states, force[:-1, None])
+
+
+def test_a_screw_that_wastes_a_share_of_what_it_carries_is_named():
+    told: list[str] = []
+    result = find_gap(Slide(), list(slides(0.25, 0.0)), progress=told.append)
+    (sure,) = (v for v in result.verdicts if v.kind == "confirmed")
+    assert (sure.effect, sure.where) == ("load_dependent_friction", "place")
+    share = sure.parameters["share"]
+    assert share.low <= 0.25 <= share.high and share.value == pytest.approx(0.25, abs=0.03)
+    assert any("friction in proportion to the load" in line for line in told)
+
+
+def test_friction_of_constant_size_is_not_taken_for_it():
+    told: list[str] = []
+    result = find_gap(Slide(), list(slides(0.0, 2.0)), progress=told.append)
+    (sure,) = (v for v in result.verdicts if v.kind == "confirmed")
+    assert (sure.effect, sure.where) == ("coulomb_friction", "place")
+    assert not any("in proportion to the load" in line for line in told)
