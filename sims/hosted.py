@@ -17,6 +17,7 @@ from sims.effects.inertia import AddedInertia
 from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
 from sims.effects.parameter_curve import ParameterCurve
+from sims.effects.response import AsymmetricResponse
 from sims.effects.store import SecondStore, stores
 from sims.host import HostSimulator
 from sims.motion import Acceleration, DriveForce, Motion, carrying
@@ -53,6 +54,7 @@ def motion_of(
     states = len(names) + len(stores(host))
     parts = [(names.index(e.joint), states + i, e) for i, e in enumerate(flexible_parts(host))]
     added = {f"{e} {i}": e for i, e in enumerate(there) if isinstance(e, AddedInertia)}
+    speeds = {joint.name: joint.rate is not None for joint in host.joints}
     inertia = {name: e.inertia for name, e in added.items()}
     inputs = {channel.name: (2, k) for k, channel in enumerate(host.action_channels)}
     curves = [e for e in there if isinstance(e, ParameterCurve)]
@@ -67,6 +69,11 @@ def motion_of(
         dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
         plays=tuple((names.index(e.joint), e) for e in host.plays()),
         capped=tuple((names.index(e.joint), e) for e in there if isinstance(e, RateLimit)),
+        returns=tuple(
+            (names.index(e.joint), e, speeds[e.joint])
+            for e in there
+            if isinstance(e, AsymmetricResponse)
+        ),
         flows=tuple(flows),
         parts=tuple(parts),
         span=span,

@@ -18,7 +18,7 @@ import yaml
 
 from simgap_files import safe_yaml
 from sims.effects.base import Effect
-from sims.effects.library import curves_in, gears_in, library, parts_in
+from sims.effects.library import curves_in, further_in, library, parts_in
 from sims.effects.parameter import ParameterChange
 from sims.effects.parameter_curve import ParameterCurve
 from sims.host import HostSimulator
@@ -139,7 +139,7 @@ def chosen_effects(
         ValueError: Something is not known, or cannot act in this simulator.
     """
     known = {str(effect): effect for effect in library(simulator)}
-    reserve = (*curves_in(simulator), *parts_in(simulator), *gears_in(simulator))
+    reserve = (*curves_in(simulator), *parts_in(simulator), *further_in(simulator))
     found: dict[str, Effect] = {}
     for entry in wanted:
         if isinstance(entry, Effect):

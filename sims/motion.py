@@ -17,6 +17,7 @@ from sims.effects.flexible import FlexiblePart
 from sims.effects.friction import CoulombFriction, DryFriction
 from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
+from sims.effects.response import AsymmetricResponse
 from sims.effects.store import SecondStore
 from sims.rows import Mask, Rows, State
 from sims.simulator import Array
@@ -35,6 +36,7 @@ class Motion:
         drive_force: (q, v, u, parameters) -> (n_joints, n), for plays and friction of the drive.
         parameters: Each a scalar or (n,).
         smooth, dry, plays, capped: Effects with the number of the joint they act on.
+        returns: The same, and whether the state is a speed.
         flows: The same with the numbers of both states that something flows between.
         parts: The same with the number of the joint and the part's own, after all joints.
         span: Time in s, by row, in which a rate comes back to its limit; None of a first-order
@@ -48,6 +50,7 @@ class Motion:
     dry: tuple[tuple[int, DryFriction], ...] = ()
     plays: tuple[tuple[int, Backlash], ...] = ()
     capped: tuple[tuple[int, RateLimit], ...] = ()
+    returns: tuple[tuple[int, AsymmetricResponse, bool], ...] = ()
     flows: tuple[tuple[int, int, Exchange | SecondStore], ...] = ()
     parts: tuple[tuple[int, int, FlexiblePart], ...] = ()
     span: Array | None = None
@@ -62,6 +65,7 @@ class Motion:
             tuple((j, effect.take(rows)) for j, effect in self.dry),
             tuple((j, effect.take(rows)) for j, effect in self.plays),
             tuple((j, effect.take(rows)) for j, effect in self.capped),
+            tuple((j, effect.take(rows), speed) for j, effect, speed in self.returns),
             tuple((i, j, effect.take(rows)) for i, j, effect in self.flows),
             tuple((j, i, effect.take(rows)) for j, i, effect in self.parts),
             None if self.span is None else self.span[rows],
@@ -116,7 +120,10 @@ class Motion:
         return found
 
     def cap(self, v: Array, acceleration: Array) -> Array:
-        """The accelerations, which are changed, with rates kept within their limits."""
+        """The accelerations, which are changed, with states that go back at a pace of their own and
+        rates kept within their limits."""
+        for j, response, speed in self.returns:
+            acceleration[j] = response.changed(v[j], acceleration[j], speed)
         for j, effect in self.capped:
             if self.span is None:
                 acceleration[j] = effect.cut_change(acceleration[j])

@@ -13,8 +13,7 @@ from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.flexible import FlexiblePart
-from sims.effects.friction import LoadDependentFriction
-from sims.effects.library import curves_in, gears_in, library, parts_in
+from sims.effects.library import curves_in, further_in, library, parts_in
 from sims.effects.parameter_curve import ParameterCurve
 from sims.host import HostSimulator
 from sims.loading import LIBRARY, chosen_effects
@@ -33,7 +32,7 @@ class Offered:
         sets: Sets of which one is exactly made of the others.
         curves: Curves by points, for where laws of the library only come near.
         parts: Flexible parts, for where nothing of the library swings as the log does.
-        gears: Friction by load, for where what is left goes by what the inputs push.
+        further: Rarer effects, for where one of them takes much of what is left.
         asked: Curves by points that a user asks for.
     """
 
@@ -44,7 +43,7 @@ class Offered:
     sets: Sequence[tuple[str, ...]]
     curves: Sequence[Curve]
     parts: Sequence[FlexiblePart]
-    gears: Sequence[LoadDependentFriction]
+    further: Sequence[Effect]
     asked: Sequence[Curve] = ()
 
     @classmethod
@@ -89,16 +88,16 @@ class Offered:
         offered = tuple(effect for effect in offered if effect not in asked)
         there = {str(effect) for effect in offered}
         curves = curves_for(log.simulator, there)
-        # Whoever asks for some effects does not ask for a part on a spring, or a gear.
+        # Whoever asks for some effects does not ask for a part on a spring, or what is rarer.
         whole = {str(e) for e in library(log.simulator) if not e.upstream_of_sensor} <= there
         parts = [one for one in parts_in(log.simulator) if whole and str(one) not in there]
-        gears = [one for one in gears_in(log.simulator) if whole and str(one) not in there]
+        further = [one for one in further_in(log.simulator) if whole and str(one) not in there]
         curves = tuple(curve for curve in curves if curve not in asked)
         offered = beyond_parameters(log.simulator, offered)
         groups, sets = aliases(log.simulator, offered, log.runs)
         kept, less = representatives(log.simulator, offered, groups)
         by_label = {str(effect): effect for effect in offered}
-        return cls(by_label, kept, less, groups, sets, curves, parts, gears, asked)
+        return cls(by_label, kept, less, groups, sets, curves, parts, further, asked)
 
 
 def _inputs(effect: Effect) -> tuple[str, ...]:

@@ -12,13 +12,13 @@ from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import worth_a_curve
 from residual.gap.answer.form import of_open_form
 from residual.gap.answer.free_parameters import better, worth_freeing
-from residual.gap.answer.laws import beside_curves, beside_gears, beside_others
+from residual.gap.answer.laws import beside_curves, beside_further, beside_others
 from residual.gap.answer.left import (
     still_names,
     takes_most_by_itself,
     takes_what_is_left,
-    worth_a_gear,
     worth_a_part,
+    worth_asking_for,
 )
 from residual.gap.answer.lone import few_stretches, left_stretch, off_stretch
 from residual.gap.answer.varying import no_surer, over_unused, worth_varying
@@ -61,7 +61,7 @@ class OnceMore:
             known = self.windows.without_lone_stretch(known)
         lone = bool(known.says)
         for step in (
-            self.with_parameters_free, self.with_gears, self.with_varying, self.with_curves,
+            self.with_parameters_free, self.with_further, self.with_varying, self.with_curves,
             self.with_parts, self.windows.longer, self.windows.longest, self.windows.slow,
         ):  # fmt: skip
             with contextlib.suppress(TooShort):
@@ -89,15 +89,15 @@ class OnceMore:
         second = self.inquiry.asked_again(known, self.tolerance, beside)
         return dataclasses.replace(known, answer=second) if better(second, answer) else known
 
-    def with_gears(self, known: Confirmed) -> Confirmed:
-        """The same, or what is found with friction in proportion to the load, if that takes most
-        of what is left."""
-        answer, what = known.answer, "friction in proportion to the load"
-        gears = worth_a_gear(answer, self.inquiry.offered.gears)
-        found, second = self._asked_with(known, gears, what, what)
+    def with_further(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found with rarer effects, if they take most of what is left."""
+        answer = known.answer
+        further = worth_asking_for(answer, self.inquiry.offered.further)
+        what = " or ".join(map(str, further))
+        found, second = self._asked_with(known, further, what, what)
         if second is None or found.answer is second:
             return found
-        beside = beside_gears(answer, second, gears, self._late)
+        beside = beside_further(answer, second, further, self._late)
         return dataclasses.replace(found, answer=beside)
 
     def with_varying(self, known: Confirmed) -> Confirmed:
@@ -119,7 +119,8 @@ class OnceMore:
         return found if late else dataclasses.replace(found, in_vain=tuple(varying.values()))
 
     def with_curves(self, known: Confirmed) -> Confirmed:
-        """The same, or what is found with curves by points if they take most of what is left."""
+        """The same, or what is found with curves by points if they take most of what is left; then
+        a rarer effect may take most of what they leave."""
         offered = self.inquiry.offered.curves
         answer = of_open_form(known.answer, offered, self.tolerance)
         known, curves = dataclasses.replace(known, answer=answer), worth_a_curve(answer, offered)
@@ -127,7 +128,7 @@ class OnceMore:
         what = "curves by points in place of laws"
         found, second = self._asked_with(known, curves, what, lacking)
         if second is None or found.answer is second:
-            return found
+            return found if second is None else self.with_further(found)
         beside, says = beside_curves(found.answer, second, curves)
         beside = beside_others(beside, second, curves, self._late)
         return dataclasses.replace(found, answer=beside, says=(*found.says, *says))

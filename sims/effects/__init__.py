@@ -46,6 +46,7 @@ from sims.effects.library import typical as typical
 from sims.effects.limit import RateLimit as RateLimit
 from sims.effects.parameter import ParameterChange as ParameterChange
 from sims.effects.parameter_curve import ParameterCurve as ParameterCurve
+from sims.effects.response import AsymmetricResponse as AsymmetricResponse
 from sims.effects.sensor import EncoderScale as EncoderScale
 from sims.effects.sensor import SensorEffect as SensorEffect
 from sims.effects.sensor import SensorOffset as SensorOffset

@@ -44,6 +44,7 @@ from sims.effects.joint import (
 from sims.effects.limit import RateLimit, follows_command
 from sims.effects.parameter import ParameterChange
 from sims.effects.pull import pulled_by_position, pulled_by_turn
+from sims.effects.response import AsymmetricResponse
 from sims.effects.sensor import EncoderScale, SensorOffset, SensorScale
 from sims.effects.store import SecondStore
 from sims.simulator import random_values
@@ -152,11 +153,22 @@ def parts_in(simulator: HostSimulator) -> tuple[FlexiblePart, ...]:
     return tuple(found)
 
 
-def gears_in(simulator: HostSimulator) -> tuple[LoadDependentFriction, ...]:
-    """Friction by load, at zero strength, of every joint that the inputs move by themselves."""
+def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
+    """What is rarer than the library, at zero strength: friction by load of every joint that the
+    inputs move by themselves, and states that fall at another pace than they rise."""
+    found: list[Effect] = list(_geared(simulator))
+    for joint in simulator.joints:
+        with contextlib.suppress(ValueError):
+            response = AsymmetricResponse(joint.name)
+            response.quantities(simulator)
+            found.append(response)
+    return tuple(found)
+
+
+def _geared(simulator: HostSimulator) -> list[LoadDependentFriction]:
     plain, rng, found = simulator.with_effects(()), np.random.default_rng(0), []
     if not plain.action_channels:
-        return ()
+        return []
     states = plain.smooth_states(PLACES, rng)
     inputs = np.stack([random_values(c, PLACES, rng) for c in plain.action_channels], axis=1)
     for joint in simulator.joints:
@@ -166,7 +178,7 @@ def gears_in(simulator: HostSimulator) -> tuple[LoadDependentFriction, ...]:
             after = there.step(states, inputs)
             if not np.allclose(after, plain.step(states, inputs), rtol=1e-9):
                 found.append(gear)
-    return tuple(found)
+    return found
 
 
 def like_inputs(simulator: HostSimulator) -> list[tuple[str, ...]]:

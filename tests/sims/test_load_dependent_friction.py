@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from sims.checks import check_simulator
 from sims.effects import CoulombFriction, LoadDependentFriction
-from sims.effects.library import gears_in
+from sims.effects.library import further_in
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
@@ -139,9 +139,9 @@ class Towed(Arm):
 
 
 def test_it_is_for_joints_that_inputs_move_by_themselves():
-    assert [one.joint for one in gears_in(Arm())] == ["one", "two"]
-    assert [one.joint for one in gears_in(Towed())] == ["one"]
-    assert gears_in(Pendulum()) == ()
+    assert [one.joint for one in further_in(Arm())] == ["one", "two"]
+    assert [one.joint for one in further_in(Towed())] == ["one"]
+    assert further_in(Pendulum()) == ()
     with pytest.raises(ValueError, match="written as equations"):
         Pendulum(effects=[LoadDependentFriction("pivot", 0.1)])
 

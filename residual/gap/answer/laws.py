@@ -103,29 +103,29 @@ def beside_others(
     )
 
 
-def beside_gears(
-    first: Answer, second: Answer, gears: Sequence[Effect], late: Callable[[], bool]
+def beside_further(
+    first: Answer, second: Answer, further: Sequence[Effect], late: Callable[[], bool]
 ) -> Answer:
-    """The first answer, with every friction by load that does nearly as well in place of what is
+    """The first answer, with every rarer effect that does nearly as well in place of what is
     certain among its rivals, as any effect of the library is.
 
     Args:
         first: Without them.
         second: What was found with them on offer, too.
-        gears: Those.
+        further: Those.
         late: Whether there is no time to fit more.
     """
     search, again = first.found.search, second.found.search
     numbers, most = _numbers(again), CLEARLY * search.error(first.key)
     claims: Sequence[Claim] = first.claims
-    for gear in gears:
+    for effect in further:
         for claim in first.claims:
             own = numbers.get(search.candidates[claim.number].effect, -1)
-            if not claim.sure or gear not in numbers or late():
+            if not claim.sure or effect not in numbers or late():
                 continue
-            for key in _in_place(search, first.key, again, numbers[gear], {own}):
+            for key in _in_place(search, first.key, again, numbers[effect], {own}):
                 if search.currency.error(again.validated[key].squares) <= most:
-                    claims = open_to(gear, claims, [claim.number], search)
+                    claims = open_to(effect, claims, [claim.number], search)
     return dataclasses.replace(first, claims=tuple(claims))
 
 

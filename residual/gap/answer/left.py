@@ -13,12 +13,11 @@ from residual.gap.model.candidates import candidates
 from residual.gap.search.sets import Key
 from sims.effects.base import Effect
 from sims.effects.flexible import FlexiblePart
-from sims.effects.friction import LoadDependentFriction
 
 #: Part of the squared forecast error of the library's laws, less what noise makes, that further
 #: effects may leave.
 QUARTER = 0.25
-#: Part of what is left beyond noise that friction by load has to take off in the linear picture.
+#: Part of what is left beyond noise that a rarer effect has to take off in the linear picture.
 HALF = 0.5
 #: Effects fewer with which an answer that forecasts as well is the simpler one, whatever numbers
 #: these have.
@@ -41,11 +40,9 @@ def worth_a_part(answer: Answer, parts: Sequence[FlexiblePart]) -> Sequence[Flex
     return parts if left - least > MUCH * (nominal - least) else ()
 
 
-def worth_a_gear(
-    answer: Answer, gears: Sequence[LoadDependentFriction]
-) -> list[LoadDependentFriction]:
-    """The frictions by load to ask for, where clearly more than noise is left: those that take
-    half of it in the linear picture, so that a search is not made in vain."""
+def worth_asking_for(answer: Answer, further: Sequence[Effect]) -> list[Effect]:
+    """The rarer effects to ask for, where clearly more than noise is left: those that take half of
+    it in the linear picture, so that a search is not made in vain."""
     search = answer.found.search
     fitter, fit = search.fitter, search.tried[answer.key]
     if not isinstance(fitter, SmoothFitter) or not much_is_left(answer):
@@ -53,11 +50,11 @@ def worth_a_gear(
     noise = fitter.noise_alone(answer.found.floor.sigma)
     most = noise + HALF * (fit.merit - noise)
     found = []
-    for gear in gears:
-        pool = candidates(fit.model.simulator, [gear], fitter.samples)
+    for effect in further:
+        pool = candidates(fit.model.simulator, [effect], fitter.samples)
         columns = [beside_starts(fit, fitter.columns(fit, [one])) for one in pool]
         if any(beside(fit, [column], fitter.cap).loss < most for column in columns):
-            found.append(gear)
+            found.append(effect)
     return found
 
 

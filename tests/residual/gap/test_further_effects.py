@@ -1,4 +1,4 @@
-"""Friction in proportion to the load is named, and asked for only where it may be."""
+"""Friction load_dependent_friction is named, and asked for only where it may be."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from held import path
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
-from sims.equations import EquationOfMotion
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.simulator import Channel, Parameter
 
 MASS, DRAG, STOPS = 2.0, 3.0, 1e-3
@@ -58,7 +58,7 @@ def test_a_screw_that_wastes_a_share_of_what_it_carries_is_named():
     assert (sure.effect, sure.where) == ("load_dependent_friction", "place")
     share = sure.parameters["share"]
     assert share.low <= 0.25 <= share.high and share.value == pytest.approx(0.25, abs=0.03)
-    assert any("friction in proportion to the load" in line for line in told)
+    assert any("load_dependent_friction" in line for line in told)
 
 
 def test_friction_of_constant_size_is_not_taken_for_it():
@@ -66,4 +66,38 @@ def test_friction_of_constant_size_is_not_taken_for_it():
     result = find_gap(Slide(), list(slides(0.0, 2.0)), progress=told.append)
     (sure,) = (v for v in result.verdicts if v.kind == "confirmed")
     assert (sure.effect, sure.where) == ("coulomb_friction", "place")
-    assert not any("in proportion to the load" in line for line in told)
+    assert not any("load_dependent_friction" in line for line in told)
+
+
+class Coasting(FirstOrderSystem):
+    """The speed of a motor; the driver lets it coast, which the simulator does not know."""
+
+    dt = 0.05
+    state_channels = (Channel("speed", "rad/s", "rate", scale=50.0),)
+    action_channels = (Channel("duty", "1", "input", scale=1.0, low=-1.0, high=1.0),)
+    parameters: ClassVar = {
+        "gain": Parameter(100.0, "rad/s", "speed at full duty", low=1.0),
+        "tau": Parameter(0.3, "s", "time constant", low=0.01),
+    }
+
+    def derivative(self, x, u, p):
+        return (np.reshape(p.gain, (-1, 1)) * u - x) / np.reshape(p.tau, (-1, 1))
+
+
+def test_a_motor_that_coasts_is_named_by_how_much_slower_it_does_so():
+    rng, runs = np.random.default_rng(0), []
+    for number in range(2):
+        duty = np.repeat(rng.uniform(0, 1, 30), 12)
+        speed = [0.0]
+        for u in duty[:-1]:  # exact: within a held input it goes one way
+            tau = 0.3 if 100 * u > speed[-1] else 0.6
+            speed.append(100 * u + (speed[-1] - 100 * u) * np.exp(-0.05 / tau))
+        states = np.round(speed, 0)[:, None] + rng.normal(0, 0.2, (len(speed), 1))
+        runs.append(
+            Trajectory(f"run {number}", 0.05 * np.arange(len(duty)), states, duty[:-1, None])
+        )
+    result = find_gap(Coasting(), runs)
+    sure = [v for v in result.verdicts if v.kind == "confirmed"]
+    assert [(v.effect, v.where) for v in sure] == [("asymmetric_response", "speed")]
+    back = sure[0].parameters["back"]
+    assert back.low <= -0.5 <= back.high and back.value == pytest.approx(-0.5, abs=0.05)
