@@ -45,7 +45,7 @@ class Coupled(EquationOfMotion):
 
 def row(effect: Effect) -> str:
     """The effect's row of the table; units are those of a joint that turns, driven by a voltage."""
-    first_order = effect.name in ("proportional_loss", "state_curve", "exchange", "second_store")
+    first_order = effect.where.startswith("level")
     host = Coupled() if effect.name == "added_inertia" else PendulumEquation()
     known = effect.quantities(Tank() if first_order else host)
     numbers = ", ".join(f"`{name}` {quantity.unit}" for name, quantity in known.items())
@@ -67,7 +67,7 @@ OTHERS = [
     effects.StateCurve("level"), effects.RateLimit("pivot"),
     effects.FlexiblePart("pivot"), effects.FlexibleJoint("pivot"), effects.AddedInertia("pivot"),
     effects.ParameterCurve("mass", "voltage"), effects.Unbalance("pivot"),
-    effects.LoadDependentFriction("pivot"),
+    effects.LoadDependentFriction("pivot"), effects.AsymmetricResponse("level"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}
