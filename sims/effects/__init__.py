@@ -4,6 +4,7 @@ from sims.effects.actuator import ActuatorBias as ActuatorBias
 from sims.effects.actuator import ActuatorEffect as ActuatorEffect
 from sims.effects.actuator import ActuatorGain as ActuatorGain
 from sims.effects.actuator import ActuatorLag as ActuatorLag
+from sims.effects.actuator import AsymmetricActuator as AsymmetricActuator
 from sims.effects.actuator import DeadZone as DeadZone
 from sims.effects.actuator import Delay as Delay
 from sims.effects.actuator import QuadraticActuator as QuadraticActuator

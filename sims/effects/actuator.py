@@ -28,7 +28,7 @@ class ActuatorEffect(Effect):
     """A change of one input on its way to the actuator.
 
     Whatever their order in a list, effects act in the order of the classes below: bias, dead zone
-    and square, in units of the command, gain, saturation of what comes out, then delay, then lag.
+    and square, in units of the command, gains, saturation of what comes out, then delay, then lag.
 
     Attributes:
         actuator: The input, or several of one unit on which it acts alike, ``"left and right"``.
@@ -177,6 +177,34 @@ class ActuatorGain(StaticActuatorEffect):
         if all(channel.low < 0 < channel.high for channel in channels):
             known["gain"] = dataclasses.replace(known["gain"], low=-math.inf)
         return known
+
+
+@dataclasses.dataclass(frozen=True)
+class AsymmetricActuator(StaticActuatorEffect):
+    """The actuator receives ``(1 + backward) u`` of commands below zero, others as they are.
+
+    A propeller that is made for one direction, a cylinder with a rod on one side, a car that is
+    driven and braked by one pedal signal.
+    """
+
+    backward: Value = number(low=-0.99, share=0.5, input=0)
+
+    name: ClassVar[str] = "asymmetric_actuator"
+    sentence: ClassVar[str] = "Commands below zero act more, or less, than those above."
+    needs: ClassVar[str] = "inputs of both signs, of one size"
+    stage: ClassVar[int] = 3
+
+    def shape(self, u: Value) -> Value:
+        """What comes out for the command."""
+        return np.where(u < 0, (1.0 + self.backward) * u, u)
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """See ``ActuatorEffect.measures``; the input has to take both signs."""
+        found = super().measures(simulator)
+        inputs = (c for c in simulator.action_channels if c.name in self.actuators)
+        if not all(channel.low < 0 < channel.high for channel in inputs):
+            raise ValueError(f"{self.name} needs an input of both signs; {self.actuator!r} is not")
+        return found
 
 
 @dataclasses.dataclass(frozen=True)

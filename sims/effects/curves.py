@@ -165,7 +165,9 @@ class InputCurve(StaticActuatorEffect, CurveBetween):
     name: ClassVar[str] = "input_curve"
     sentence: ClassVar[str] = "The actuator answers along a curve of its own, not in proportion."
     needs: ClassVar[str] = "small, middling and large inputs"
-    special_cases: ClassVar[tuple[str, ...]] = (*STATIC, "actuator_bias", "symmetric_input_curve")
+    special_cases: ClassVar[tuple[str, ...]] = (
+        *STATIC, "actuator_bias", "symmetric_input_curve", "asymmetric_actuator",
+    )  # fmt: skip
     upstream_of_sensor: ClassVar[bool] = True
     stage: ClassVar[int] = 2
     along: ClassVar[Along] = "input"

@@ -12,6 +12,7 @@ from sims.effects.actuator import (
     ActuatorBias,
     ActuatorGain,
     ActuatorLag,
+    AsymmetricActuator,
     DeadZone,
     Delay,
     QuadraticActuator,
@@ -155,13 +156,16 @@ def parts_in(simulator: HostSimulator) -> tuple[FlexiblePart, ...]:
 
 def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     """What is rarer than the library, at zero strength: friction by load of every joint that the
-    inputs move by themselves, and states that fall at another pace than they rise."""
+    inputs move by themselves, states that fall at another pace than they rise, and inputs that act
+    otherwise below zero."""
     found: list[Effect] = list(_geared(simulator))
-    for joint in simulator.joints:
+    inputs = [channel.name for channel in simulator.action_channels]
+    inputs += [AND.join(names) for names in like_inputs(simulator)]
+    both: list[Effect] = [AsymmetricResponse(joint.name) for joint in simulator.joints]
+    for effect in (*both, *map(AsymmetricActuator, inputs)):
         with contextlib.suppress(ValueError):
-            response = AsymmetricResponse(joint.name)
-            response.quantities(simulator)
-            found.append(response)
+            effect.quantities(simulator)
+            found.append(effect)
     return tuple(found)
 
 

@@ -101,3 +101,36 @@ def test_a_motor_that_coasts_is_named_by_how_much_slower_it_does_so():
     assert [(v.effect, v.where) for v in sure] == [("asymmetric_response", "speed")]
     back = sure[0].parameters["back"]
     assert back.low <= -0.5 <= back.high and back.value == pytest.approx(-0.5, abs=0.05)
+
+
+class Boat(FirstOrderSystem):
+    """The speed of a boat whose screw is made for one direction, which the simulator does not know."""
+
+    dt = 0.1
+    state_channels = (Channel("speed", "m/s", "rate", scale=1.0),)
+    action_channels = (Channel("thrust", "N", "input", scale=20.0, low=-50.0, high=50.0),)
+    parameters: ClassVar = {
+        "mass": Parameter(15.0, "kg", "of the boat and some water", low=1.0),
+        "drag": Parameter(6.0, "N s/m", "of the hull", low=0.0),
+    }
+
+    def derivative(self, x, u, p):
+        return (u - np.reshape(p.drag, (-1, 1)) * x) / np.reshape(p.mass, (-1, 1))
+
+
+def test_a_screw_that_is_weaker_in_reverse_is_named():
+    rng, runs = np.random.default_rng(0), []
+    for number in range(2):
+        thrust = np.repeat(rng.uniform(-40, 40, 30), 12)
+        speed = [0.0]
+        for u in np.where(thrust < 0, 0.7 * thrust, thrust)[:-1]:
+            speed.append(u / 6 + (speed[-1] - u / 6) * np.exp(-0.1 * 6 / 15))
+        states = np.array(speed)[:, None] + rng.normal(0, 0.02, (len(speed), 1))
+        runs.append(
+            Trajectory(f"run {number}", 0.1 * np.arange(len(thrust)), states, thrust[:-1, None])
+        )
+    sure = [v for v in find_gap(Boat(), runs).verdicts if v.kind == "confirmed"]
+    assert [(v.effect, v.where) for v in sure] == [("asymmetric_actuator", "thrust")]
+    backward = sure[0].parameters["backward"]
+    assert backward.low <= -0.3 <= backward.high
+    assert backward.value == pytest.approx(-0.3, abs=0.05)
