@@ -118,6 +118,7 @@ class Boat(FirstOrderSystem):
         return (u - np.reshape(p.drag, (-1, 1)) * x) / np.reshape(p.mass, (-1, 1))
 
 
+@pytest.mark.long
 def test_a_screw_that_is_weaker_in_reverse_is_named():
     rng, runs = np.random.default_rng(0), []
     for number in range(2):
