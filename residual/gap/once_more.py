@@ -14,6 +14,7 @@ from residual.gap.answer.form import of_open_form
 from residual.gap.answer.free_parameters import better, worth_freeing
 from residual.gap.answer.laws import beside_curves, beside_further, beside_others
 from residual.gap.answer.left import (
+    much_is_left,
     still_names,
     takes_most_by_itself,
     takes_what_is_left,
@@ -91,9 +92,12 @@ class OnceMore:
 
     def with_further(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with rarer effects, if they take most of what is left."""
-        answer = known.answer
-        further = worth_asking_for(answer, self.inquiry.offered.further)
-        what = " or ".join(map(str, further))
+        answer, further = known.answer, self.inquiry.offered.further
+        if self._late():
+            further = further if much_is_left(answer) else ()
+        else:
+            further = worth_asking_for(answer, further)
+        what = " or ".join(dict.fromkeys(one.name.replace("_", " ") for one in further))
         found, second = self._asked_with(known, further, what, what)
         if second is None or found.answer is second:
             return found
