@@ -19,7 +19,7 @@ from residual.gap.preparation.convention import (
 )
 from residual.logs.units import Unit, other_units
 from sims.host import HostSimulator
-from sims.simulator import Channel
+from sims.simulator import UNDECLARED, Channel
 
 Array = NDArray[np.float64]
 
@@ -30,6 +30,9 @@ SLIPS, SLIPPED = (10.0, 60.0, 100.0, 1000.0), 0.15
 #: Units of time, one in the other, and control periods in a sample from which on one is far; the
 #: largest command likewise, over a share of it.
 TIMES, FAR = (60.0, 1000.0, 3600.0), 8.0
+#: Ratios of a gear that inputs may lack, and part of their declared sizes that all are below
+#: then.
+RATIOS, SMALL = np.geomspace(5.0, 320.0, 13), 0.1
 
 
 def conventions(
@@ -55,6 +58,7 @@ def conventions(
             found.append(of_input(simulator, says, place, unit.factor, unit.offset))
         found += _thousandfold(simulator, place)
         found += _as_a_share(simulator, place, samples.actions[:, place])
+    found += _before_a_gear(simulator, samples)
     joints = _measured_joints(simulator, samples)
     for seen in joints:
         found += _turned(simulator, seen) + _in_other_units(simulator, seen)
@@ -232,6 +236,24 @@ def _as_a_share(simulator: HostSimulator, place: int, values: Array) -> list[Con
     if not (np.isfinite(full) and full >= FAR and np.abs(values).max(initial=0.0) <= 1.0):
         return []
     return [of_input(simulator, f"`scale: {full:g}` for {action.name}", place, full)]
+
+
+def _before_a_gear(simulator: HostSimulator, samples: Samples) -> list[Convention]:
+    """All inputs times the ratio of a gear, where each is far smaller than declared: torques of
+    motors in place of those of joints."""
+    channels = simulator.action_channels
+    largest = np.abs(samples.actions).max(axis=0, initial=0.0)
+    declared = [channel.scale for channel in channels if channel.scale != UNDECLARED]
+    small = len(declared) == len(channels) > 0 and (largest <= SMALL * np.array(declared)).all()
+    if not small or not largest.any():
+        return []
+    names, found = " and ".join(channel.name for channel in channels), []
+    for ratio in RATIOS:
+        says = f"about `scale: {ratio:.2g}` for {names} (before a gear?)"
+        plain = as_said(simulator)
+        plain.inputs[0] = ratio
+        found.append(dataclasses.replace(plain, says=says))
+    return found
 
 
 def _may_be_reversed(channel: Channel, values: Array) -> bool:
