@@ -14,7 +14,7 @@ from sims.authored import by_joint, force_is_added, joint_of, mobility, push_of_
 from sims.effects.base import Effect
 from sims.effects.pull import ELSEWHERE
 from sims.host import HostSimulator, Joint
-from sims.hosted import motion_of
+from sims.hosted import kept_motion, motion_of
 from sims.motion import Motion, substep_ends
 from sims.rows import State
 from sims.simulator import Array, Parameter
@@ -177,7 +177,7 @@ class EquationOfMotion(_Equations):
         """See ``HostSimulator.integrate``."""
         states, inputs = np.asarray(states, float), np.asarray(inputs, float)
         h = np.asarray(durations, float) / inputs.shape[1]
-        motion = self._motion(h)
+        motion = dataclasses.replace(kept_motion(self, self._motion), span=h)
         begun = 2 * len(self.joints) + len(motion.plays)
         plays, width = slice(2 * len(self.joints), begun), states.shape[1]
         positions = [*self._positions, *range(begun, width, 2)]
@@ -195,7 +195,7 @@ class EquationOfMotion(_Equations):
         after[:, positions], after[:, rates], after[:, plays] = state.q.T, state.v.T, state.x.T
         return after
 
-    def _motion(self, span: Array) -> Motion:
+    def _motion(self) -> Motion:
         # The system's author sees rows first.
         def acceleration(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
             found = self.acceleration(q.T, v.T, u.T, f.T, p)
@@ -209,7 +209,7 @@ class EquationOfMotion(_Equations):
         places = {str(joint.position): (0, j) for j, joint in enumerate(self.joints)}
         places |= {str(joint.rate): (1, j) for j, joint in enumerate(self.joints)}
         drive = drive_force if self.has_drive_force else push_of_inputs(acceleration)
-        return motion_of(self, names, places, acceleration, drive, span)
+        return motion_of(self, names, places, acceleration, drive)
 
 
 class FirstOrderSystem(_Equations):
@@ -248,6 +248,22 @@ class FirstOrderSystem(_Equations):
 
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
         """See ``HostSimulator.integrate``: the states are rates of positions that are not used."""
+        motion = kept_motion(self, self._motion)
+        x = np.asarray(states, float).T
+        own, inputs = len(x) - 2 * len(motion.parts), np.asarray(inputs, float)
+        state = State(
+            np.concatenate([np.zeros_like(x[:own]), x[own::2]]),
+            np.concatenate([x[:own], x[own + 1 :: 2]]),
+            np.empty((0, x.shape[1])),
+        )
+        h = np.asarray(durations, float) / inputs.shape[1]
+        state = move(motion, state, substep_ends(inputs), h)
+        after = np.empty((x.shape[1], len(x)))
+        after[:, :own], after[:, own::2] = state.v[:own].T, state.q[own:].T
+        after[:, own + 1 :: 2] = state.v[own:].T
+        return after
+
+    def _motion(self) -> Motion:
         names = [channel.name for channel in self.physical_channels]
 
         def rates(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
@@ -262,17 +278,4 @@ class FirstOrderSystem(_Equations):
             return rates(q, v, u, none, p) - rates(q, v, 0.0 * u, none, p)
 
         places = {name: (1, i) for i, name in enumerate(names)}
-        motion = motion_of(self, names, places, rates, drive)
-        x = np.asarray(states, float).T
-        own, inputs = len(x) - 2 * len(motion.parts), np.asarray(inputs, float)
-        state = State(
-            np.concatenate([np.zeros_like(x[:own]), x[own::2]]),
-            np.concatenate([x[:own], x[own + 1 :: 2]]),
-            np.empty((0, x.shape[1])),
-        )
-        h = np.asarray(durations, float) / inputs.shape[1]
-        state = move(motion, state, substep_ends(inputs), h)
-        after = np.empty((x.shape[1], len(x)))
-        after[:, :own], after[:, own::2] = state.v[:own].T, state.q[own:].T
-        after[:, own + 1 :: 2] = state.v[own:].T
-        return after
+        return motion_of(self, names, places, rates, drive)

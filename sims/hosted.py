@@ -6,6 +6,8 @@ States are joints first and rows last, as in ``sims.rows``.
 from __future__ import annotations
 
 import math
+import operator
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -23,8 +25,26 @@ from sims.host import HostSimulator
 from sims.motion import Acceleration, DriveForce, Motion, carrying
 from sims.simulator import Array
 
+#: What was asked for last, in whichever thread: a path asks for the same motion at every step.
+_last = threading.local()
+
 #: Where a channel stands: among positions (0), rates (1) or inputs (2), and its row there.
 Places = Mapping[str, tuple[int, int]]
+
+
+def kept_motion(host: HostSimulator, make: Callable[[], Motion]) -> Motion:
+    """How a system moves: what it was made of last, if that is what it is made of now.
+
+    Args:
+        host: The system.
+        make: Makes the motion anew.
+    """
+    own = (host, host.effects, host.joints, *host.parameters, *host.parameters.values())
+    known: tuple[object, ...] = getattr(_last, "of", ())
+    if len(known) != len(own) or not all(map(operator.is_, known, own)):
+        _last.of, _last.motion = own, make()
+    motion: Motion = _last.motion
+    return motion
 
 
 def motion_of(
@@ -33,15 +53,14 @@ def motion_of(
     places: Places,
     acceleration: Acceleration,
     drive_force: DriveForce,
-    span: Array | None = None,
 ) -> Motion:
-    """How a system moves with its effects.
+    """How a system moves with its effects, in no span of time yet.
 
     Args:
         host: The system.
         names: Its joints, in the order of rows.
         places: Where its state channels stand.
-        acceleration, drive_force, span: See ``Motion``.
+        acceleration, drive_force: See ``Motion``.
     """
     there = [effect for effect in host.effects if not effect.absent]
     forces = [(names.index(e.joint), e.where_turn_is(_turn(host, e))) for e in host.joint_effects()]
@@ -76,7 +95,6 @@ def motion_of(
         ),
         flows=tuple(flows),
         parts=tuple(parts),
-        span=span,
     )
 
 
