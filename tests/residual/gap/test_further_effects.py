@@ -84,6 +84,7 @@ class Coasting(FirstOrderSystem):
         return (np.reshape(p.gain, (-1, 1)) * u - x) / np.reshape(p.tau, (-1, 1))
 
 
+@pytest.mark.long
 def test_a_motor_that_coasts_is_named_by_how_much_slower_it_does_so():
     rng, runs = np.random.default_rng(0), []
     for number in range(2):

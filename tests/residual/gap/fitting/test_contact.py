@@ -61,6 +61,7 @@ def test_two_effects_are_named_with_their_values():
     assert friction.parameters["change"].low < 0.03 < friction.parameters["change"].high * 1.05
 
 
+@pytest.mark.long
 def test_a_short_struggle_names_the_heavier_torso():
     logs = struggle(reference.TRUE, rows=3, steps=12, seed=2, rates=True)
     # With half of the sub-steps the mass is 3 % off; with a third of them it is not found.

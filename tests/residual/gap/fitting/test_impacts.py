@@ -79,6 +79,7 @@ def test_forecasts_that_err_more_than_noise_and_have_no_name_are_a_gap(tmp_path,
     assert [v.kind for v in found.verdicts if v.kind != "needs_data"] == [kind]
 
 
+@pytest.mark.long
 def test_sets_that_few_windows_leave_open_meet_on_more(tmp_path, monkeypatch):
     simulator, runs = ball(tmp_path, 1.5)
     effects = ["gravity z", "gain of actuator push"]
