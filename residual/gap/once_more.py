@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import worth_a_curve
@@ -26,44 +25,24 @@ from residual.gap.answer.varying import no_surer, over_unused, worth_varying
 from residual.gap.confirmed import Confirmed
 from residual.gap.data.windows import TooShort
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.log import Log
 from residual.gap.other_windows import OtherWindows
 from residual.gap.preparation.prepare import finely
 from residual.gap.search.redundant import by_points
 from sims.effects.base import Effect
 
-if TYPE_CHECKING:
-    from residual.gap.inquiry import Inquiry
 
-
-@dataclasses.dataclass(frozen=True)
-class OnceMore:
-    """What asks once more, each only in time, and only if it then explains more.
-
-    Attributes:
-        inquiry: Searches and confirms.
-        log: What was recorded.
-        tolerance: How well the simulator's parameters are known, as a share of each.
-    """
-
-    inquiry: Inquiry
-    log: Log
-    tolerance: float
-
-    @property
-    def windows(self) -> OtherWindows:
-        """What asks of other windows."""
-        return OtherWindows(self.inquiry, self.log, self.tolerance)
+class OnceMore(OtherWindows):
+    """What asks once more, each only in time, and only if it then explains more."""
 
     def of(self, known: Confirmed) -> Confirmed:
         """The same, or what is found without a stretch that nothing explains, with parameters
         free, with more than the library on offer, or over longer forecasts."""
         with contextlib.suppress(TooShort):  # here and below, what was found holds without it
-            known = self.windows.without_lone_stretch(known)
+            known = self.without_lone_stretch(known)
         lone = bool(known.says)
         for step in (
             self.with_parameters_free, self.with_further, self.with_varying, self.with_curves,
-            self.with_parts, self.windows.longer, self.windows.longest, self.windows.slow,
+            self.with_parts, self.longer, self.longest, self.slow,
         ):  # fmt: skip
             with contextlib.suppress(TooShort):
                 known = step(known)
@@ -155,7 +134,7 @@ class OnceMore:
         if not isinstance(fitter, SmoothFitter) or fitter.samples.stride == 1:
             return known
         horizon, what = self.log.horizon / fitter.samples.stride, f"short forecasts, with {part}"
-        ready, answer = self.windows.over(known, horizon, what, [*_curves(known), *parts])
+        ready, answer = self.over(known, horizon, what, [*_curves(known), *parts])
         if not (takes_most_by_itself(answer, parts) and still_names(answer, known.answer)):
             return known
         says = (

@@ -30,22 +30,14 @@ def follower(kind, unit):
 
 
 @pytest.mark.parametrize(
-    ("start", "end", "slow"), [(0, 8, 0), (20, 5, 1), (-20, -5, 0), (-5, -20, 1)]
+    ("start", "end", "falls", "slows_down"),
+    [(0, 8, 0, 0), (20, 5, 1, 1), (-20, -5, 0, 1), (-5, -20, 1, 0)],
 )
-def test_a_level_falls_slower_than_it_rises(start, end, slow):
-    simulator = follower("other", "m").with_effects([AsymmetricResponse("x", BACK)])
-    path = simulator.rollout([float(start)], np.full((30, 1), end / GAIN))[:, 0]
-    tau = TAU / (1 + BACK) if slow else TAU
-    assert path == pytest.approx(
-        end + (start - end) * np.exp(-0.02 * np.arange(31) / tau), abs=1e-6
-    )
-
-
-@pytest.mark.parametrize(
-    ("start", "end", "slow"), [(0, 8, 0), (20, 5, 1), (-20, -5, 1), (-5, -20, 0)]
-)
-def test_a_speed_slows_down_slower_whichever_way_it_turns(start, end, slow):
-    simulator = follower("rate", "rad/s").with_effects([AsymmetricResponse("x", BACK)])
+@pytest.mark.parametrize("speed", [False, True])
+def test_a_level_falls_slower_and_a_speed_slows_down_slower(start, end, falls, slows_down, speed):
+    slow = slows_down if speed else falls
+    simulator = follower(*(("rate", "rad/s") if speed else ("other", "m")))
+    simulator = simulator.with_effects([AsymmetricResponse("x", BACK)])
     path = simulator.rollout([float(start)], np.full((30, 1), end / GAIN))[:, 0]
     tau = TAU / (1 + BACK) if slow else TAU
     assert path == pytest.approx(
