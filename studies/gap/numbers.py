@@ -21,6 +21,10 @@ FARTHEST = 1e3
 NARROW = 1.3
 #: Of what a share is one more: actuators receive, and sensors read.
 SHARES = {"gain": "the command", "scale": "what is there"}
+#: The same of every number that is a share more.
+TIMES = {
+    **SHARES, "back": "as fast on the way back", "backward": "the command below zero",
+}  # fmt: skip
 
 
 def numbers_of(verdict: Verdict, effect: Effect, simulator: HostSimulator) -> list[str]:
@@ -42,8 +46,8 @@ def _points(verdict: Verdict, curve: Curve, simulator: HostSimulator) -> list[st
 
 def times_of(verdict: Verdict) -> str:
     """``, so 1.62 times the command`` of a gain, which is a share more."""
-    found = [(f, n) for f, n in verdict.parameters.items() if f in SHARES and n.unit == "1"]
-    return minus("".join(f", so {1 + n.value:.3g} times {SHARES[f]}" for f, n in found))
+    found = [(f, n) for f, n in verdict.parameters.items() if f in TIMES and n.unit == "1"]
+    return minus("".join(f", so {1 + n.value:.3g} times {TIMES[f]}" for f, n in found))
 
 
 def spelt(field: str) -> str:

@@ -20,6 +20,7 @@ from sims import Channel
 from sims.effects import ParameterChange
 from studies.gap.answer import headline, notes
 from studies.gap.lead import lead
+from studies.gap.numbers import times_of
 from studies.gap.summary import summary
 from studies.gap.verdicts import banners
 from studies.reporting.sections import Prose
@@ -34,6 +35,8 @@ def test_a_gain_is_told_as_a_share_more_and_as_times():
     assert headline(gain, result(gain)).endswith(
         "gain 0.62 (0.50 to 0.70), so 1.62 times the command."
     )
+    back = dataclasses.replace(gain, parameters={"back": Number(-0.4, -0.5, -0.3, "1")})
+    assert times_of(back) == ", so 0.6 times as fast on the way back"
 
 
 def test_other_channels_have_their_errors_below_the_table():
