@@ -79,6 +79,10 @@ ACTUATOR_EFFECTS: tuple[type[Effect], ...] = (
 )
 #: What inputs of one kind have in common: amplifiers, motors and links of one make.
 SHARED_EFFECTS = (ActuatorGain, QuadraticActuator, DeadZone, Saturation, Delay, ActuatorLag)
+#: Units of inputs that push by themselves: forces, accelerations and motor currents.
+PUSHES = {
+    "N", "mN", "kN", "N m", "mN m", "kN m", "N cm", "N mm", "kgf", "A", "mA", "m/s^2", "rad/s^2",
+}  # fmt: skip
 #: Places where it is tried whether inputs move a joint.
 PLACES = 8
 #: Most inputs that have something in common.
@@ -171,8 +175,9 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
 
 def _geared(simulator: HostSimulator) -> list[LoadDependentFriction]:
     plain, rng, found = simulator.with_effects(()), np.random.default_rng(0), []
-    if not plain.action_channels:
-        return []
+    forces = all(channel.unit in PUSHES for channel in plain.action_channels)
+    if not plain.action_channels or not (plain.has_drive_force or forces):
+        return []  # what a voltage or a goal pushes depends on the motion, too
     states = plain.smooth_states(PLACES, rng)
     inputs = np.stack([random_values(c, PLACES, rng) for c in plain.action_channels], axis=1)
     for joint in simulator.joints:

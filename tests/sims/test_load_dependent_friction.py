@@ -143,6 +143,8 @@ def test_it_is_for_joints_that_inputs_move_by_themselves():
         return [e.joint for e in further_in(simulator) if isinstance(e, LoadDependentFriction)]
 
     assert (geared(Arm()), geared(Towed()), geared(Pendulum())) == (["one", "two"], ["one"], [])
+    # What a voltage pushes hangs on the speed, which the equation has to say.
+    assert (geared(PendulumEquation()), geared(Motor())) == (["pivot"], [])
     with pytest.raises(ValueError, match="written as equations"):
         Pendulum(effects=[LoadDependentFriction("pivot", 0.1)])
 
