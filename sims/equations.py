@@ -242,9 +242,21 @@ class FirstOrderSystem(_Equations):
             for c in self.physical_channels
         )
 
+    def _arrange(self) -> None:
+        self.has_drive_force = type(self).drive_force is not FirstOrderSystem.drive_force
+
     @abc.abstractmethod
     def derivative(self, x: Array, u: Array, p: Any) -> Array:
         """Rates of change, by row: (n, n_s), (n, n_a) and parameters -> (n, n_s)."""
+
+    def drive_force(self, x: Array, u: Array, p: Any) -> Array:
+        """What the actuators make of each rate of change, part of ``derivative``; for friction by
+        load, which goes by the inputs alone where it is not told."""
+        raise NotImplementedError(f"{type(self).__name__} does not tell its drive force")
+
+    def drive_forces(self, states: Array, inputs: Array) -> Array:
+        """See ``HostSimulator.drive_forces``."""
+        return self.drive_force(states, inputs, SimpleNamespace(**self.parameter_values()))
 
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
         """See ``HostSimulator.integrate``: the states are rates of positions that are not used."""
@@ -274,6 +286,10 @@ class FirstOrderSystem(_Equations):
             return np.concatenate([change + f[: len(names)], f[len(names) :]])
 
         def drive(q: Array, v: Array, u: Array, p: SimpleNamespace) -> Array:
+            if self.has_drive_force:
+                own = v[: len(names)]
+                found = by_joint(self.drive_force(own.T, u.T, p), own.shape, "drive_force", "x")
+                return np.concatenate([found, np.zeros_like(v[len(names) :])])
             none = np.zeros_like(v)
             return rates(q, v, u, none, p) - rates(q, v, 0.0 * u, none, p)
 

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 
 #: Part of the time budget after which nothing new is tried.
 SEARCHING = 0.5
+#: Part of it that a question which is worth more time leaves.
+KEPT = 0.2
 #: Seconds in which not more than one line tells how a search goes.
 OFTEN = 2.0
 
@@ -34,6 +36,16 @@ class Clock:
         begin = time.process_time()
         yield
         self.confirm_until += time.process_time() - begin
+
+    @contextlib.contextmanager
+    def longer(self) -> Iterator[None]:
+        """What is searched within this context has time beyond that for searching, too."""
+        before = self.search_until
+        self.search_until = max(before, self.over - 60 * self._minutes * KEPT)
+        try:
+            yield
+        finally:
+            self.search_until = before
 
     @property
     def searched(self) -> bool:

@@ -71,6 +71,10 @@ class OnceMore(OtherWindows):
 
     def with_further(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with rarer effects, if they take most of what is left."""
+        with self.inquiry.clock.longer():
+            return self._with_further(known)
+
+    def _with_further(self, known: Confirmed) -> Confirmed:
         answer, further = known.answer, self.inquiry.offered.further
         if self._late():
             further = further if much_is_left(answer) else ()

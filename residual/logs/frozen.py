@@ -96,7 +96,7 @@ def _owed(values: Array, a: int, b: int) -> bool:
     """Whether what a channel leaps after equal samples a to b is what it would have gone meanwhile,
     at the pace of as many samples before, with noise or without.
 
-    What stuck begins again at the pace of one sample.
+    What stuck begins again at the pace of one sample, and what is wild comes back.
     """
     if a < _STILL or b + 1 >= len(values):
         return False
@@ -106,6 +106,8 @@ def _owed(values: Array, a: int, b: int) -> bool:
     pace, usual = float(before.mean()), float(np.median(np.abs(before)))
     gone, leap = pace * (b - a + 1), float(values[b + 1] - values[b])
     clear = min(abs(gone), abs(leap)) > _CLEAR * usual
+    if abs(float(values[min(b + 2, len(values) - 1)] - values[b])) < 0.5 * abs(leap):
+        return False  # a single wild reading, after which it rests on
     return bool(clear and 0.5 < leap / gone < 2.0)
 
 

@@ -40,6 +40,8 @@ class Backlash(Effect):
             raise ValueError(
                 f"{simulator.name} cannot host backlash: it does not tell its drive_force"
             )
+        if any(joint.name == self.joint and joint.first_order for joint in simulator.joints):
+            raise ValueError(f"backlash needs a joint with a position; {self.joint!r} has none")
         if any(joint.name == self.joint and not joint.driven for joint in simulator.joints):
             raise ValueError(f"backlash needs a driven joint; nothing drives {self.joint!r}")
         return JointEffect.measures(_Somewhere(self.joint), simulator)

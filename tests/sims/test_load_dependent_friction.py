@@ -113,7 +113,24 @@ def test_it_counts_back_emf_where_the_simulator_tells_its_drive_force():
     assert changes[0] == pytest.approx(changes[1], rel=1e-4)
 
 
-@pytest.mark.parametrize("system", [Hoist, Motor])
+class Winch(Motor):
+    """A motor that tells what its winding pushes, back EMF included."""
+
+    def drive_force(self, x, u, p):
+        return (8.0 * u - x) / 0.25
+
+
+def test_it_counts_back_emf_of_a_speed_that_tells_its_drive_force():
+    for speed, volts in ((40.0, 12.0), (90.0, 2.0), (-30.0, 6.0)):
+        push = (8.0 * volts - speed) / 0.25
+        brake, h = SHARE * abs(push) * np.sign(speed), 1e-4
+        winch = Winch(dt=h, effects=[LoadDependentFriction("speed", SHARE)])
+        after = winch.step([[speed]], [[volts]])[0, 0]
+        assert after == pytest.approx(speed + h * (push - brake), abs=0.02 * h * abs(push))
+    assert [str(one) for one in further_in(Winch())][:1] == ["load_dependent_friction@speed"]
+
+
+@pytest.mark.parametrize("system", [Hoist, Motor, Winch])
 def test_rows_have_shares_of_their_own_and_none_changes_no_bit(system):
     plain, rng = system(), np.random.default_rng(0)
     joint = plain.joints[0].name

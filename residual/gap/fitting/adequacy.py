@@ -24,6 +24,9 @@ ERRORS = 3.0
 #: Probability below which a generic force is there. The same logs gave probabilities that are
 #: uniform or a little larger, down to 0.03.
 CHANCE = 1e-4
+#: Probability by noise, as large as the residual, below which a force is told; and part of the
+#: squared residual that it takes off from which on no probability is needed.
+RARE, LARGE = 1e-3, 0.25
 #: Part of the best gain of a single force from which on the plainer one is told.
 NEARLY = 0.95
 
@@ -142,8 +145,9 @@ def remainder(
     channel = model.simulator.physical_channels[driven[best // len(names)]].name
     where = f"{names[best % len(names)]}, acting on {channel}"
     alone = float(chi2.sf(single[best] / variance, 1)) * len(single)
+    tells = alone < RARE or single[best] > LARGE * float(residual @ residual)
     return Remainder(
-        ratio, spread, limit, gain, rank, chance, where if alone < 1e-3 else "",
+        ratio, spread, limit, gain, rank, chance, where if tells else "",
         bool((ratio < limit).all() and chance > CHANCE),
     )  # fmt: skip
 

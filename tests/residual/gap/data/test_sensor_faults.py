@@ -254,3 +254,13 @@ def test_two_accidents_in_a_short_log_are_no_heavy_tails():
     assert np.flatnonzero(wild).tolist() == [40, 111]
     values[[20, 60, 90, 130]] += 200.0
     assert not wild_samples([values])[0].any()
+
+
+def test_a_single_wild_reading_makes_no_frozen_sensor_of_a_rest():
+    """A servo that has come to its end and stays there; one of its readings is lost."""
+    going = np.linspace(1.2, 0.0, 60)
+    angle = np.concatenate([going, np.full(80, going[-1])])
+    angle[100] = angle[99] - 1.6
+    assert not frozen_samples([angle])[0].any()
+    angle[100:] = angle[100]  # what it would have gone meanwhile: it did stick
+    assert frozen_samples([angle])[0][61:100].all()

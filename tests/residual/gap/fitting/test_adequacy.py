@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from residual.gap import find_gap
 from residual.gap.data.samples import Samples
 from residual.gap.fitting.adequacy import generic_forces
 from residual.trajectories import Trajectory
+from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel
 
 
 @pytest.mark.parametrize("reach", [0.3, 3.0])
@@ -34,3 +37,26 @@ def test_the_sign_of_an_input_that_never_changes_it_has_no_name():
         assert forces.shape == (len(samples), len(offered[low]))
     assert [name if name != "sign of voltage" else "" for name in offered[-1.5]] == offered[0.0]
     assert "sign of voltage" in offered[-1.5]
+
+
+class Head(FirstOrderSystem):
+    """The rates of a camera's two axes, which do not move each other, or so one thinks."""
+
+    dt = 0.02
+    state_channels = tuple(Channel(name, "rad/s", "rate", scale=2.0) for name in ("pan", "tilt"))
+    action_channels = tuple(Channel(f"to {name}", "N m", "input") for name in ("pan", "tilt"))
+    spin = 0.0
+
+    def derivative(self, x, u, p):
+        return 8.0 * u - x + self.spin * x[:, ::-1] * np.array([1.0, -1.0])
+
+
+def test_a_wheel_that_spins_inside_is_hinted_at_however_far_beyond_noise_it_is():
+    true, rng = Head(), np.random.default_rng(0)
+    true.spin = 5.0
+    torque = np.repeat(rng.uniform(-1, 1, (1, 30, 2)), 10, axis=1)
+    path = true.rollout(np.zeros((1, 2)), torque)[0] + rng.normal(0, 1e-4, (301, 2))
+    runs = [Trajectory("run", 0.02 * np.arange(301), path, torque[0])]
+    result = find_gap(Head(), runs, effects=["delay@to pan", "coulomb_friction@pan"])
+    (left,) = (v for v in result.verdicts if v.kind == "unexplained")
+    assert left.follows in ("tilt, acting on pan", "pan, acting on tilt")
