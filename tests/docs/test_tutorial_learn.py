@@ -79,6 +79,7 @@ def test_the_file_is_short_and_the_command_learns(folder):
         np.testing.assert_array_equal(acted, episode["actions"])
 
 
+@pytest.mark.long
 def test_the_python_call_runs(here, capsys):
     from cart_pole import CartPole
 

@@ -88,6 +88,7 @@ def test_it_can_be_asked_for_over_what_the_log_holds():
     assert curve.reach == pytest.approx((seen.min(), seen.max()), rel=0.01)
 
 
+@pytest.mark.long
 def test_beside_what_has_no_name_it_is_not_certain():
     record = motor(3, 0.0039, ripple=3e-3)
     result = find_gap(Motor(), record, effects=("resistance", "coulomb_friction"))
