@@ -91,7 +91,11 @@ class Offered:
         # Whoever asks for some effects does not ask for a part on a spring, or what is rarer.
         whole = {str(e) for e in library(log.simulator) if not e.upstream_of_sensor} <= there
         parts = [one for one in parts_in(log.simulator) if whole and str(one) not in there]
-        further = [one for one in further_in(log.simulator) if whole and str(one) not in there]
+        further = [
+            one
+            for one in further_in(log.simulator)
+            if whole and str(one) not in there and not recorded.intersection(_inputs(one))
+        ]
         curves = tuple(curve for curve in curves if curve not in asked)
         offered = beyond_parameters(log.simulator, offered)
         groups, sets = aliases(log.simulator, offered, log.runs)

@@ -136,3 +136,6 @@ def test_a_screw_that_is_weaker_in_reverse_is_named():
     backward = sure[0].parameters["backward"]
     assert backward.low <= -0.3 <= backward.high
     assert backward.value == pytest.approx(-0.3, abs=0.05)
+    told: list[str] = []
+    find_gap(Boat(), runs, measured_input=True, progress=told.append)
+    assert not any("asymmetric actuator" in line for line in told)  # what was measured is there
