@@ -25,7 +25,7 @@ from sims.host import HostSimulator
 from sims.motion import Acceleration, DriveForce, Motion, carrying
 from sims.simulator import Array
 
-#: What was asked for last, in whichever thread: a path asks for the same motion at every step.
+#: What a thread asked for last: a path asks for the same motion at every step.
 _last = threading.local()
 
 #: Where a channel stands: among positions (0), rates (1) or inputs (2), and its row there.

@@ -100,7 +100,7 @@ def _limits(motion: Motion, state: State, u: Array) -> Limits:
     for i, (_, play) in enumerate(motion.plays):
         edges[i] = 0.5 * play.width
     joints = np.array([j for j, _ in motion.plays], np.intp)
-    return Limits(motion.limits(state.q, 0.0 * state.v, u), edges, joints)
+    return Limits(motion.limits(state.q, np.zeros(state.v.shape), u), edges, joints)
 
 
 def _attempt(motion: Motion, limits: Limits, state: State, u: Array, h: Array) -> Attempt:

@@ -49,13 +49,10 @@ def worth_asking_for(answer: Answer, further: Sequence[Effect]) -> list[Effect]:
         return []
     noise = fitter.noise_alone(answer.found.floor.sigma)
     most = noise + HALF * (fit.merit - noise)
-    found = []
-    for effect in further:
-        pool = candidates(fit.model.simulator, [effect], fitter.samples)
-        columns = [beside_starts(fit, fitter.columns(fit, [one])) for one in pool]
-        if any(beside(fit, [column], fitter.cap).loss < most for column in columns):
-            found.append(effect)
-    return found
+    pool = candidates(fit.model.simulator, further, fitter.samples)
+    moved = [beside_starts(fit, fitter.columns(fit, [one])) for one in pool]
+    losses = [beside(fit, [columns], fitter.cap).loss for columns in moved]
+    return [one.effect for one, loss in zip(pool, losses, strict=True) if loss < most]
 
 
 def much_is_left(answer: Answer) -> bool:
