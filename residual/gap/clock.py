@@ -6,10 +6,13 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 
-#: Part of the time budget after which nothing new is tried.
+#: Part of the time budget that the first search may take.
 SEARCHING = 0.5
-#: Part of it that a question which is worth more time leaves.
-KEPT = 0.2
+#: Part of it that is kept for confirming what later searches find, and times what that took first.
+KEPT, AGAIN = 0.2, 1.5
+#: Part of the time from now to then that a later search may take, and part of the budget below
+#: which none is begun.
+EACH, LEAST = 0.65, 0.02
 #: Seconds in which not more than one line tells how a search goes.
 OFTEN = 2.0
 
@@ -26,9 +29,10 @@ class Clock:
     def begin(self) -> None:
         """Count from now on: a log of a million rows is read in what time that takes."""
         begin = time.process_time()
-        self.search_until = begin + 60 * self._minutes * SEARCHING
+        self.search_until = self._first_until = begin + 60 * self._minutes * SEARCHING
         self.over = begin + 60 * self._minutes
         self.confirm_until = begin + 120 * self._minutes
+        self._kept = 60 * self._minutes * KEPT
 
     @contextlib.contextmanager
     def besides(self) -> Iterator[None]:
@@ -38,10 +42,18 @@ class Clock:
         self.confirm_until += time.process_time() - begin
 
     @contextlib.contextmanager
-    def longer(self) -> Iterator[None]:
-        """What is searched within this context has time beyond that for searching, too."""
+    def confirming(self) -> Iterator[None]:
+        """What is found by later searches takes as long to confirm as this, about."""
+        begin = time.process_time()
+        yield
+        took = time.process_time() - begin
+        self._kept = max(self._kept, AGAIN * took)
+
+    @contextlib.contextmanager
+    def once_more(self) -> Iterator[None]:
+        """What is searched within this context has a share of the time that is left."""
         before = self.search_until
-        self.search_until = max(before, self.over - 60 * self._minutes * KEPT)
+        self.search_until = max(before, time.process_time() + EACH * self._left)
         try:
             yield
         finally:
@@ -49,8 +61,13 @@ class Clock:
 
     @property
     def searched(self) -> bool:
-        """Whether the time for searching is over."""
-        return time.process_time() > self.search_until
+        """Whether there is no time for another search."""
+        late = self._left < 60 * self._minutes * LEAST
+        return late and time.process_time() > self._first_until
+
+    @property
+    def _left(self) -> float:
+        return self.over - self._kept - time.process_time()
 
     @property
     def late(self) -> bool:

@@ -18,12 +18,18 @@ class Confirmed:
         answer: What stays after confirmation.
         says: What is to be said of how it was found.
         in_vain: Parameters that follow a channel, asked for and not named.
+        unasked: What may be left, in words, and was not asked for lack of time.
     """
 
     prepared: Prepared
     answer: Answer
     says: tuple[str, ...]
     in_vain: tuple[ParameterCurve, ...] = ()
+    unasked: tuple[str, ...] = ()
+
+    def lacks_time(self, *what: str) -> Confirmed:
+        """The same with more that was not asked for lack of time."""
+        return dataclasses.replace(self, unasked=tuple(dict.fromkeys((*self.unasked, *what))))
 
     def and_says(self, text: str) -> Confirmed:
         """The same with one more thing to say."""

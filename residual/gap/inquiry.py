@@ -143,7 +143,9 @@ class Inquiry:
             matters: False if the gap does not, so that nothing is named.
             tolerance: How well the simulator's parameters are known, as a share of each.
         """
-        answer = confirm(found, self.offered.groups, matters, tolerance, self.clock.confirm_until)
+        until = self.clock.confirm_until
+        with self.clock.confirming():
+            answer = confirm(found, self.offered.groups, matters, tolerance, until)
         known = Confirmed(prepared, answer, ())
         if matters:
             known = OnceMore(self, log, tolerance).of(known)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import worth_a_curve
 from residual.gap.answer.form import of_open_form
 from residual.gap.answer.free_parameters import better, worth_freeing
-from residual.gap.answer.laws import beside_curves, beside_further, beside_others
+from residual.gap.answer.laws import beside_curves, beside_further, beside_others, beside_their_kind
 from residual.gap.answer.left import (
-    much_is_left,
     still_names,
     takes_most_by_itself,
     takes_what_is_left,
@@ -37,15 +35,15 @@ class OnceMore(OtherWindows):
     def of(self, known: Confirmed) -> Confirmed:
         """The same, or what is found without a stretch that nothing explains, with parameters
         free, with more than the library on offer, or over longer forecasts."""
-        with contextlib.suppress(TooShort):  # here and below, what was found holds without it
-            known = self.without_lone_stretch(known)
+        known = self._step(self.without_lone_stretch, known)
         lone = bool(known.says)
         for step in (
             self.with_parameters_free, self.with_further, self.with_varying, self.with_curves,
             self.with_parts, self.longer, self.longest, self.slow,
         ):  # fmt: skip
-            with contextlib.suppress(TooShort):
-                known = step(known)
+            known = self._step(step, known)
+        if known.unasked:
+            known = known.and_says(_no_time(known.unasked))
         if lone:
             return known
         rest = left_stretch(known.answer)
@@ -54,37 +52,45 @@ class OnceMore(OtherWindows):
         says = few_stretches(known.answer) or off_stretch(known.answer)
         return known.and_says(says) if says else known
 
+    def _step(self, step: Callable[[Confirmed], Confirmed], known: Confirmed) -> Confirmed:
+        """What is known after a step, which has a share of the time that is left."""
+        with self.inquiry.clock.once_more(), contextlib.suppress(TooShort):
+            return step(known)
+        return known  # windows are too short for it: what was found holds without
+
     def with_parameters_free(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with parameters free if they may hide something."""
         answer = known.answer
         beside = worth_freeing(answer, self.tolerance)
         if not beside:
             return known
-        if time.process_time() > self.inquiry.clock.over:
-            return known.and_says(
-                "parameters within their tolerance may hide what is missing, or explain some of "
-                "what is left: there was no time to look, give more --minutes"
+        if self._late():
+            return known.lacks_time(
+                "parameters that are off within their tolerance, which may hide more than is left"
             )
         self.inquiry.tell("once more with parameters free within their tolerance")
         second = self.inquiry.asked_again(known, self.tolerance, beside)
         return dataclasses.replace(known, answer=second) if better(second, answer) else known
 
     def with_further(self, known: Confirmed) -> Confirmed:
-        """The same, or what is found with rarer effects, if they take most of what is left."""
-        with self.inquiry.clock.longer():
-            return self._with_further(known)
+        """The same, or what is found with rarer effects, if they take most of what is left.
 
-    def _with_further(self, known: Confirmed) -> Confirmed:
-        answer, further = known.answer, self.inquiry.offered.further
-        if self._late():
-            further = further if much_is_left(answer) else ()
-        else:
-            further = worth_asking_for(answer, further)
+        Whatever of their kind is certain is of open form where there is no time to ask for them, or
+        where they take clearly something, and not most.
+        """
+        answer = known.answer
+        further = worth_asking_for(answer, self.inquiry.offered.further)
         what = " or ".join(dict.fromkeys(one.name.replace("_", " ") for one in further))
         found, second = self._asked_with(known, further, what, what)
-        if second is None or found.answer is second:
+        if found.answer is second:
             return found
+        if second is None:
+            return dataclasses.replace(found, answer=beside_their_kind(answer, further))
         beside = beside_further(answer, second, further, self._late)
+        named = set(second.found.search.labels(second.key))
+        if better(second, answer):
+            of_these = [effect for effect in further if str(effect) in named]
+            beside = beside_their_kind(beside, of_these)
         return dataclasses.replace(found, answer=beside)
 
     def with_varying(self, known: Confirmed) -> Confirmed:
@@ -102,7 +108,7 @@ class OnceMore(OtherWindows):
         if second is not None:
             beside = beside_others(answer, second, list(varying.values()), self._late)
             found = dataclasses.replace(found, answer=beside)
-        late = found.says != known.says
+        late = found.unasked != known.unasked
         return found if late else dataclasses.replace(found, in_vain=tuple(varying.values()))
 
     def with_curves(self, known: Confirmed) -> Confirmed:
@@ -111,7 +117,7 @@ class OnceMore(OtherWindows):
         offered = self.inquiry.offered.curves
         answer = of_open_form(known.answer, offered, self.tolerance)
         known, curves = dataclasses.replace(known, answer=answer), worth_a_curve(answer, offered)
-        lacking = "a law that the library does not have, a curve by speed, position or command"
+        lacking = "a law that the library does not have (a curve by speed, position or command)"
         what = "curves by points in place of laws"
         found, second = self._asked_with(known, curves, what, lacking)
         if second is None or found.answer is second:
@@ -145,7 +151,7 @@ class OnceMore(OtherWindows):
             f"forecasts go over {ready.fitter.seconds:.3g} s, in which every sample shows: over "
             f"{fitter.seconds:.3g} s rows are too far apart for what swings so fast"
         )
-        return Confirmed(ready, answer, (*known.says, says))
+        return dataclasses.replace(known, prepared=ready, answer=answer, says=(*known.says, says))
 
     def _with_more(
         self, known: Confirmed, more: Sequence[Effect], what: str, lacking: str
@@ -160,11 +166,7 @@ class OnceMore(OtherWindows):
         if not more:
             return known, None
         if self._late():
-            late = known.and_says(
-                f"what is left may be {lacking}: there was no time to look, give more --minutes "
-                "(half of them are for searching, the rest is for confirming)"
-            )
-            return late, None
+            return known.lacks_time(lacking), None
         self.inquiry.tell(f"once more with {what}")
         beside, offered = known.answer.found.search.beside, [*_curves(known), *more]
         second = self.inquiry.asked_again(known, self.tolerance, beside, offered)
@@ -174,6 +176,13 @@ class OnceMore(OtherWindows):
 
     def _late(self) -> bool:
         return self.inquiry.clock.searched
+
+
+def _no_time(unasked: Sequence[str]) -> str:
+    """What is to be said of what was not asked for."""
+    *most, last = unasked
+    what = f"{', '.join(most)} or {last}" if most else last
+    return f"what is left may be {what}: there was no time to look, give more --minutes"
 
 
 def _curves(known: Confirmed) -> list[Effect]:

@@ -10,7 +10,7 @@ from residual.gap.answer.curves import of_its_kind
 from residual.gap.answer.left import beside_noise
 from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.claim import Claim
-from residual.gap.search.explain import brought
+from residual.gap.search.earlier import brought
 from residual.gap.search.sets import Key, Search
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
@@ -127,6 +127,19 @@ def beside_further(
                 if search.currency.error(again.validated[key].squares) <= most:
                     claims = open_to(effect, claims, [claim.number], search)
     return dataclasses.replace(first, claims=tuple(claims))
+
+
+def beside_their_kind(answer: Answer, further: Sequence[Effect]) -> Answer:
+    """The answer, with the form open of what is certain and of the kind, and at the place, of rarer
+    effects that may be there beside it or in its place."""
+    search = answer.found.search
+    claims: Sequence[Claim] = answer.claims
+    sure = {one.number: search.candidates[one.number].effect for one in claims if one.sure}
+    for effect in further:
+        kind = effect.family, effect.where
+        alike = [number for number, one in sure.items() if (one.family, one.where) == kind]
+        claims = open_to(effect, claims, alike, search)
+    return dataclasses.replace(answer, claims=tuple(claims))
 
 
 def _most(curve: Curve, claim: Claim, search: Search) -> float:

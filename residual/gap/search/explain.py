@@ -18,6 +18,7 @@ from residual.gap.preparation.effort import Effort
 from residual.gap.search.beam import extend, improves, run
 from residual.gap.search.choice import Choice, choose
 from residual.gap.search.continuation import add_handed_over
+from residual.gap.search.earlier import add_what_it_lacked, carried, near_best
 from residual.gap.search.exchange import add_exchanged, add_pairs_exchanged
 from residual.gap.search.pairs import every_two
 from residual.gap.search.reasons import reasons
@@ -42,9 +43,6 @@ RIVALS, EXCHANGES = 10, 3
 LEAST = 2
 #: Sets that are weighed anew where there is no time to search again.
 LAST = 4
-#: Sets that a new search begins with, and their error over that of the best.
-SEEDS, HOPEFUL = 12, 3.0
-
 
 #: From the fitter that made a fit, and the fit: the fitter whose channels are weighed by what that
 #: leaves of them, and the noise around it.
@@ -118,8 +116,8 @@ def explain(
         tell: Progress.
         until: When to stop searching, on the clock of ``time.process_time``.
         beside: Free beside every set, see ``Search``.
-        earlier: A search without these; its best sets are tried, too, so that none of them loses
-            for not being asked.
+        earlier: A search without these, or without some of the pool; its best sets are tried, too,
+            so that none of them loses for not being asked, and what it lacked beside them.
         twins: Exact twins of what may be missing, by label.
         every_pair: Whether every two effects are tried where there are few.
     """
@@ -140,6 +138,7 @@ def explain(
         if not seeds:
             if earlier is not None:
                 search.add(carried(earlier, search))
+                add_what_it_lacked(earlier, search)
             search.add(curves_in_place(search, near_best(search)))
         run(search, seeds, functools.partial(_quiet, search, floor))
         in_pairs = every_pair and not (seeds or simulator.has_contacts)
@@ -161,38 +160,6 @@ def explain(
     return settle(search, floor)
 
 
-def near_best(search: Search) -> list[Key]:
-    """The sets worth trying again: what is chosen, those that forecast best, and that fit best."""
-    best = sorted(search.usable(), key=search.error)[:SEEDS]
-    good = [key for key in best if search.error(key) <= HOPEFUL * search.error(best[0])]
-    fit = sorted(search.usable(), key=lambda key: search.tried[key].merit)[: search.effort.beam]
-    return list(dict.fromkeys([choose(search).key, *good, *fit]))
-
-
-def carried(earlier: Search, search: Search) -> Proposals:
-    """The best sets of an earlier search, as sets of another one's candidates."""
-    found: Proposals = {}
-    for key in near_best(earlier):
-        found |= brought(earlier, key, search) if key else {}
-    return found
-
-
-def brought(earlier: Search, key: Key, search: Search) -> Proposals:
-    """A set of an earlier search with what was fitted, as one of another search's candidates.
-
-    Nothing if these lack one of its effects.
-    """
-    places = {candidate.effect: i for i, candidate in enumerate(search.candidates)}
-    effects = [earlier.candidates[i].effect for i in key]
-    if not all(effect in places for effect in effects):
-        return {}
-    model, theta = earlier.tried[key].model, earlier.own(key)
-    owner = model.owner[: len(theta)]
-    own = {places[effect]: theta[owner == at] for at, effect in enumerate(effects)}
-    fresh = tuple(sorted(own))
-    return {fresh: np.concatenate([own[n] for n in fresh]) if fresh else np.zeros(0)}
-
-
 def settle(search: Search, floor: Noise) -> Explanation:
     """The final choice, after everything chosen has met its rivals."""
     fitter = search.fitter
@@ -205,7 +172,7 @@ def settle(search: Search, floor: Noise) -> Explanation:
         )
 
     choice = choose(search, enough)
-    for _ in range(EXCHANGES):
+    for turn in range(EXCHANGES):
         likeliest = min(search.usable(), key=lambda k: score(search, k))
         best = {(), choice.key, search.best(), likeliest}
         quiet = [k for k in best if _quiet(search, floor, k)]
@@ -227,7 +194,7 @@ def settle(search: Search, floor: Noise) -> Explanation:
             add_handed_over(search, key)
             if not quiet:
                 add_pairs_exchanged(search, key)
-        if len(search.tried) == before or search.late:
+        if len(search.tried) == before or (search.late and turn):
             break
         if not quiet and choose(search, enough).key == key:
             break

@@ -1,0 +1,63 @@
+"""What an earlier search found, in a search with other effects on offer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from residual.gap.fitting.screening import gains
+from residual.gap.search.choice import choose
+from residual.gap.search.sets import Key, Proposals, Search
+
+#: Sets that a new search begins with, and their error over that of the best.
+SEEDS, HOPEFUL = 12, 3.0
+
+
+def near_best(search: Search) -> list[Key]:
+    """The sets worth trying again: what is chosen, those that forecast best, and that fit best."""
+    best = sorted(search.usable(), key=search.error)[:SEEDS]
+    good = [key for key in best if search.error(key) <= HOPEFUL * search.error(best[0])]
+    fit = sorted(search.usable(), key=lambda key: search.tried[key].merit)[: search.effort.beam]
+    return list(dict.fromkeys([choose(search).key, *good, *fit]))
+
+
+def carried(earlier: Search, search: Search) -> Proposals:
+    """The best sets of an earlier search, as sets of another one's candidates."""
+    found: Proposals = {}
+    for key in near_best(earlier):
+        found |= brought(earlier, key, search) if key else {}
+    return found
+
+
+def brought(earlier: Search, key: Key, search: Search) -> Proposals:
+    """A set of an earlier search with what was fitted, as one of another search's candidates.
+
+    Nothing if these lack one of its effects.
+    """
+    places = {candidate.effect: i for i, candidate in enumerate(search.candidates)}
+    effects = [earlier.candidates[i].effect for i in key]
+    if not all(effect in places for effect in effects):
+        return {}
+    model, theta = earlier.tried[key].model, earlier.own(key)
+    owner = model.owner[: len(theta)]
+    own = {places[effect]: theta[owner == at] for at, effect in enumerate(effects)}
+    fresh = tuple(sorted(own))
+    return {fresh: np.concatenate([own[n] for n in fresh]) if fresh else np.zeros(0)}
+
+
+def add_what_it_lacked(earlier: Search, search: Search) -> None:
+    """Fit what an earlier search chose, and what forecast best in it, with each effect that it
+    lacked beside: a search is made again for these, and may not end before it comes to them."""
+    known = {candidate.effect for candidate in earlier.candidates}
+    screened = range(search.screened)
+    fresh = {number for number in screened if search.candidates[number].effect not in known}
+    chosen = dict.fromkeys((choose(earlier).key, earlier.best()))
+    own = [key for before in chosen for key in brought(earlier, before, search)]
+    for key in own if fresh else ():
+        if key not in search.tried:
+            continue
+        around = search.signatures(key)
+        for gain in gains(around):
+            number = around.variants[gain.variants[0]].candidate
+            if number in fresh:
+                more, theta = search.merged(key, [(number, gain.values[0])])
+                search.add({more: theta})
