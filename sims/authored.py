@@ -110,3 +110,20 @@ def push_of_inputs(acceleration: Acceleration) -> DriveForce:
         return found[:, :, 0].T
 
     return push
+
+
+def beyond_rest(rates: Acceleration, pushes: bool) -> DriveForce:
+    """What drives a first-order system, (q, v, u, p) -> (states, n): the change that its inputs
+    make, or, where these do not push by themselves, all change beyond that at rest without input,
+    since what a voltage makes of a speed falls as that rises (back EMF).
+
+    Args:
+        rates: What the author wrote, joints first and rows last.
+        pushes: Whether inputs push by themselves.
+    """
+
+    def drive(q: Array, v: Array, u: Array, p: SimpleNamespace) -> Array:
+        none = np.zeros_like(v)
+        return rates(q, v, u, none, p) - rates(q, v if pushes else none, 0.0 * u, none, p)
+
+    return drive

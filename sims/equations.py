@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sims.authored import by_joint, force_is_added, joint_of, mobility, push_of_inputs
+from sims.authored import beyond_rest, by_joint, force_is_added, joint_of, mobility, push_of_inputs
 from sims.effects.base import Effect
 from sims.effects.pull import ELSEWHERE
 from sims.host import HostSimulator, Joint
@@ -251,7 +251,7 @@ class FirstOrderSystem(_Equations):
 
     def drive_force(self, x: Array, u: Array, p: Any) -> Array:
         """What the actuators make of each rate of change, part of ``derivative``; for friction by
-        load, which goes by the inputs alone where it is not told."""
+        load, which goes by ``sims.authored.beyond_rest`` where it is not told."""
         raise NotImplementedError(f"{type(self).__name__} does not tell its drive force")
 
     def drive_forces(self, states: Array, inputs: Array) -> Array:
@@ -277,6 +277,7 @@ class FirstOrderSystem(_Equations):
 
     def _motion(self) -> Motion:
         names = [channel.name for channel in self.physical_channels]
+        pushes = all(channel.pushes for channel in self.action_channels)
 
         def rates(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
             own = v[: len(names)]
@@ -290,8 +291,7 @@ class FirstOrderSystem(_Equations):
                 own = v[: len(names)]
                 found = by_joint(self.drive_force(own.T, u.T, p), own.shape, "drive_force", "x")
                 return np.concatenate([found, np.zeros_like(v[len(names) :])])
-            none = np.zeros_like(v)
-            return rates(q, v, u, none, p) - rates(q, v, 0.0 * u, none, p)
+            return beyond_rest(rates, pushes)(q, v, u, p)
 
         places = {name: (1, i) for i, name in enumerate(names)}
         return motion_of(self, names, places, rates, drive)

@@ -16,6 +16,10 @@ Hold = Literal["zero", "linear"]
 
 #: Units of angles, and what a whole turn is in each.
 TURNS: Mapping[str, float] = {"rad": math.tau, "deg": 360.0, "rev": 1.0}
+#: Units of inputs that push by themselves: forces, accelerations and motor currents.
+PUSHES = {
+    "N", "mN", "kN", "N m", "mN m", "kN m", "N cm", "N mm", "kgf", "A", "mA", "m/s^2", "rad/s^2",
+}  # fmt: skip
 #: Scale of a channel that declares none.
 UNDECLARED = 1.0
 
@@ -71,6 +75,12 @@ class Channel:
     def turn(self) -> float | None:
         """A whole turn in the channel's unit; None of what does not turn."""
         return TURNS.get(self.unit)
+
+    @property
+    def pushes(self) -> bool:
+        """Whether an input pushes by itself, as a force or a motor's current does: what a voltage
+        or a goal pushes depends on the motion, too."""
+        return self.unit in PUSHES
 
 
 @dataclasses.dataclass(frozen=True)

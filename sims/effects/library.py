@@ -79,10 +79,6 @@ ACTUATOR_EFFECTS: tuple[type[Effect], ...] = (
 )
 #: What inputs of one kind have in common: amplifiers, motors and links of one make.
 SHARED_EFFECTS = (ActuatorGain, QuadraticActuator, DeadZone, Saturation, Delay, ActuatorLag)
-#: Units of inputs that push by themselves: forces, accelerations and motor currents.
-PUSHES = {
-    "N", "mN", "kN", "N m", "mN m", "kN m", "N cm", "N mm", "kgf", "A", "mA", "m/s^2", "rad/s^2",
-}  # fmt: skip
 #: Places where it is tried whether inputs move a joint.
 PLACES = 8
 #: Most inputs that have something in common.
@@ -175,12 +171,13 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
 
 def _geared(simulator: HostSimulator) -> list[LoadDependentFriction]:
     plain, rng, found = simulator.with_effects(()), np.random.default_rng(0), []
-    forces = all(channel.unit in PUSHES for channel in plain.action_channels)
-    if not plain.action_channels or not (plain.has_drive_force or forces):
-        return []  # what a voltage or a goal pushes depends on the motion, too
+    known = plain.has_drive_force or all(channel.pushes for channel in plain.action_channels)
+    if not plain.action_channels:
+        return []
     states = plain.smooth_states(PLACES, rng)
     inputs = np.stack([random_values(c, PLACES, rng) for c in plain.action_channels], axis=1)
-    for joint in simulator.joints:
+    # Of a motor's speed all is known that it makes, of other joints what is said to push them.
+    for joint in (one for one in simulator.joints if known or one.first_order):
         gear = LoadDependentFriction(joint.name)
         with contextlib.suppress(ValueError):
             there = plain.with_effects([typical(gear, simulator)])

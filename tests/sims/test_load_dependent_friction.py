@@ -130,6 +130,36 @@ def test_it_counts_back_emf_of_a_speed_that_tells_its_drive_force():
     assert [str(one) for one in further_in(Winch())][:1] == ["load_dependent_friction@speed"]
 
 
+class Laden(Motor):
+    """The same motor, which holds a weight: a rate of change that no drive makes."""
+
+    def derivative(self, x, u, p):
+        return super().derivative(x, u, p) - 30.0
+
+
+class DrivenByForce(Motor):
+    """A speed whose input pushes by itself."""
+
+    action_channels = (Channel("torque", "N m", "input", scale=12.0),)
+
+
+@pytest.mark.parametrize("system", [Motor, Laden])
+def test_of_a_speed_under_voltage_all_is_drive_that_it_makes_beyond_rest(system):
+    speeds, volts = np.array([[40.0], [90.0], [-30.0], [5.0]]), np.array([[12.0], [2], [6], [-9]])
+    gear = [LoadDependentFriction("speed", SHARE)]
+    plain, told = system(dt=1e-3).step(speeds, volts), Winch(dt=1e-3).step(speeds, volts)
+    rubs = system(dt=1e-3, effects=gear).step(speeds, volts) - plain
+    assert rubs == pytest.approx(Winch(dt=1e-3, effects=gear).step(speeds, volts) - told, rel=0.01)
+    assert "load_dependent_friction@speed" in map(str, further_in(system()))
+
+
+def test_of_a_speed_under_a_force_that_alone_is_drive():
+    speed, force, h = np.array([[40.0]]), np.array([[2.0]]), 1e-4
+    there = DrivenByForce(dt=h, effects=[LoadDependentFriction("speed", SHARE)])
+    brake = there.step(speed, force) - DrivenByForce(dt=h).step(speed, force)
+    assert brake[0, 0] == pytest.approx(-SHARE * 8.0 * 2.0 / 0.25 * h, rel=1e-3)
+
+
 @pytest.mark.parametrize("system", [Hoist, Motor, Winch])
 def test_rows_have_shares_of_their_own_and_none_changes_no_bit(system):
     plain, rng = system(), np.random.default_rng(0)
@@ -160,8 +190,12 @@ def test_it_is_for_joints_that_inputs_move_by_themselves():
         return [e.joint for e in further_in(simulator) if isinstance(e, LoadDependentFriction)]
 
     assert (geared(Arm()), geared(Towed()), geared(Pendulum())) == (["one", "two"], ["one"], [])
-    # What a voltage pushes hangs on the speed, which the equation has to say.
-    assert (geared(PendulumEquation()), geared(Motor())) == (["pivot"], [])
+
+    class UnderVoltage(Hoist):
+        action_channels = Motor.action_channels
+
+    # What a voltage pushes hangs on the speed, which the equation of motion has to say.
+    assert (geared(PendulumEquation()), geared(UnderVoltage())) == (["pivot"], [])
     with pytest.raises(ValueError, match="written as equations"):
         Pendulum(effects=[LoadDependentFriction("pivot", 0.1)])
 
