@@ -1,10 +1,8 @@
-"""Simulators and effects by name: from import paths and YAML files, and back."""
+"""Simulators by name: from import paths and YAML files, and back."""
 
 from __future__ import annotations
 
 import copy
-import difflib
-import importlib
 import importlib.util
 import inspect
 import pydoc
@@ -18,16 +16,10 @@ import yaml
 
 from simgap_files import safe_yaml
 from sims.effects.base import Effect
-from sims.effects.library import curves_in, further_in, library, parts_in
-from sims.effects.parameter import ParameterChange
-from sims.effects.parameter_curve import ParameterCurve
 from sims.host import HostSimulator
 from sims.model_files import model_settings, names_model
 from sims.simulator import Hold, Simulator
 from sims.trust import check_file, trusting
-
-#: In a list of effects: all that the simulator can host.
-LIBRARY = "library"
 
 
 def load_simulator(
@@ -121,100 +113,6 @@ def effect_settings(effect: Effect) -> dict[str, Any]:
     return {"class_path": f"{module}.{kind.__qualname__}", "init_args": values | numbers}
 
 
-def chosen_effects(
-    simulator: HostSimulator, wanted: Sequence[Effect | str | Mapping[str, Any]]
-) -> tuple[Effect, ...]:
-    """The effects that a list names.
-
-    Args:
-        simulator: What hosts them.
-        wanted: ``"library"``; effects of the library by name, ``"viscous_friction"`` or, at one
-            place, ``"viscous_friction@pivot"``, parameters as ``"mass"``; a curve by points, as
-            ``"friction_curve"`` or ``"parameter_curve@resistance over temp"``, or a
-            ``"flexible_part"``; a class of your own by import path, ``"my_file.FanTorque"``, at
-            every place that can host it or at one; or ``class_path`` and ``init_args``; or an
-            effect itself.
-
-    Raises:
-        ValueError: Something is not known, or cannot act in this simulator.
-    """
-    known = {str(effect): effect for effect in library(simulator)}
-    reserve = (*curves_in(simulator), *parts_in(simulator), *further_in(simulator))
-    found: dict[str, Effect] = {}
-    for entry in wanted:
-        if isinstance(entry, Effect):
-            own = [entry]
-        elif isinstance(entry, Mapping):
-            own = [_effect(entry)]
-            own[0].measures(simulator)
-        elif entry == LIBRARY:
-            own = list(known.values())
-        else:
-            name, _, where = entry.partition("@")
-            own = [e for e in (*known.values(), *reserve) if entry in (e.name, str(e))]
-            if not own and entry in simulator.parameters:
-                own = [ParameterChange(entry)]
-            if name == ParameterCurve.name:
-                own = [ParameterCurve.named(where)]
-                own[0].measures(simulator)
-            if not own and "." in name:
-                own = _placed(simulator, name, where)
-        if not own:
-            there = [*known, *map(str, reserve)]
-            near = difflib.get_close_matches(str(entry), there, 1)
-            hint = f"did you mean {near[0]!r}? Else " if near else ""
-            raise ValueError(
-                f"no effect {entry!r} for {simulator.name}: {hint}give one of {', '.join(there)}, "
-                "or the import path of a class of your own"
-            )
-        found.update({str(effect): effect for effect in own})
-    return tuple(found.values())
-
-
-def _placed(simulator: HostSimulator, path: str, where: str) -> list[Effect]:
-    """An effect class at one place, or at every place that can host it."""
-    if where:
-        places = [where]
-    else:
-        places = [joint.name for joint in simulator.joints]
-        places += [channel.name for channel in simulator.action_channels]
-        places += [channel.name for channel in simulator.physical_channels]
-    kind = _class(path)
-    found, refused = [], ""
-    for place in dict.fromkeys(places):
-        try:
-            effect = kind(place)  # type: ignore[call-arg]
-            effect.quantities(simulator)
-        except (ValueError, TypeError) as error:  # no such place, or it wants more than that
-            refused = str(error)
-            continue
-        found.append(effect)
-    if not found:
-        raise ValueError(f"effect {path!r} cannot act in {simulator.name}: {refused}")
-    return found
-
-
-def _class(path: str) -> type[Effect]:
-    module, _, name = path.rpartition(".")
-    try:
-        kind = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError) as error:
-        raise ValueError(f"no effect {path!r}: {error}") from None
-    if not (isinstance(kind, type) and issubclass(kind, Effect)):
-        raise ValueError(f"{path!r} is no effect; derive it from a class of sims.effects")
-    return kind
-
-
-def _effect(settings: Mapping[str, Any]) -> Effect:
-    parser = jsonargparse.ArgumentParser(exit_on_error=False)
-    parser.add_argument("--effect", type=Effect)
-    try:
-        chosen = parser.parse_object({"effect": copy.deepcopy(dict(settings))})
-        return parser.instantiate(chosen).effect
-    except jsonargparse.ArgumentError as error:
-        raise ValueError(f"effect {settings}: {_one_line(error)}") from None
-
-
 def _parser() -> jsonargparse.ArgumentParser:
     parser = jsonargparse.ArgumentParser(exit_on_error=False)
     parser.add_argument("--simulator", type=Simulator, sub_configs=True, required=True)
@@ -233,7 +131,7 @@ def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
         return _parser().parse_object({"simulator": value})
     except (jsonargparse.ArgumentError, TypeError) as error:
         lacking = not_found(value)
-        raise ValueError(f"simulator {source}: {lacking or _one_line(error)}") from None
+        raise ValueError(f"simulator {source}: {lacking or one_line(error)}") from None
 
 
 def in_file(source: str) -> str:
@@ -292,5 +190,6 @@ def _class_paths(settings: Any) -> list[str]:
     return found + [path for entry in nested for path in _class_paths(entry)]
 
 
-def _one_line(error: Exception) -> str:
+def one_line(error: Exception) -> str:
+    """What an error says, in one line."""
     return " ".join(str(error).split())

@@ -30,8 +30,8 @@ from residual.logs import LogData, LogFormat, read_logs
 from residual.logs.checks import Finding
 from residual.logs.sources import matching
 from residual.step_check import advice
+from sims.chosen import LIBRARY, chosen_effects
 from sims.host import HostSimulator
-from sims.loading import LIBRARY, chosen_effects
 from sims.simulator import Hold, Simulator
 from sims.trust import needs_trust
 from studies.gap.files import CORRECTED, REPORT, write_gap

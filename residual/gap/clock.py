@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 
 #: Part of the time budget that the first search may take.
 SEARCHING = 0.5
-#: Part of it that is kept for confirming what later searches find, and times what that took first.
+#: Part of it that is kept for weighing and confirming what later searches find, and times what that
+#: took first.
 KEPT, AGAIN = 0.2, 1.5
 #: Part of the time from now to then that a later search may take, and part of the budget below
 #: which none is begun.
@@ -21,7 +22,9 @@ class Clock:
     """Processor time that is left, and seconds by step."""
 
     def __init__(self, minutes: float) -> None:
-        self._minutes = minutes
+        self._budget = 60 * minutes
+        self._weighing = self._confirming = 0.0
+        self._worth_it = False
         self.begin()
         self.laps: dict[str, float] = {}
         self._last = time.perf_counter()
@@ -29,10 +32,9 @@ class Clock:
     def begin(self) -> None:
         """Count from now on: a log of a million rows is read in what time that takes."""
         begin = time.process_time()
-        self.search_until = self._first_until = begin + 60 * self._minutes * SEARCHING
-        self.over = begin + 60 * self._minutes
-        self.confirm_until = begin + 120 * self._minutes
-        self._kept = 60 * self._minutes * KEPT
+        self.search_until = self._first_until = begin + self._budget * SEARCHING
+        self.over = begin + self._budget
+        self.confirm_until = begin + 2 * self._budget
 
     @contextlib.contextmanager
     def besides(self) -> Iterator[None]:
@@ -42,32 +44,45 @@ class Clock:
         self.confirm_until += time.process_time() - begin
 
     @contextlib.contextmanager
-    def confirming(self) -> Iterator[None]:
-        """What is found by later searches takes as long to confirm as this, about."""
-        begin = time.process_time()
+    def searching(self) -> Iterator[None]:
+        """A search, which weighs rivals however late it is; later ones take as long for that."""
         yield
-        took = time.process_time() - begin
-        self._kept = max(self._kept, AGAIN * took)
+        self._weighing = max(self._weighing, time.process_time() - self.search_until)
 
     @contextlib.contextmanager
-    def once_more(self) -> Iterator[None]:
-        """What is searched within this context has a share of the time that is left."""
-        before = self.search_until
-        self.search_until = max(before, time.process_time() + EACH * self._left)
+    def confirming(self) -> Iterator[None]:
+        """What is found by later searches takes about as long to confirm as this."""
+        begin = time.process_time()
+        yield
+        self._confirming = max(self._confirming, time.process_time() - begin)
+
+    @contextlib.contextmanager
+    def once_more(self, worth_it: bool = False) -> Iterator[None]:
+        """What is searched within this context has a share of the time that is left.
+
+        Args:
+            worth_it: Whether it may take longer than the budget to weigh and confirm it.
+        """
+        before = self.search_until, self._worth_it
+        self._worth_it = worth_it
+        self.search_until = max(self._first_until, time.process_time() + EACH * self._left)
         try:
             yield
         finally:
-            self.search_until = before
+            self.search_until, self._worth_it = before
 
     @property
     def searched(self) -> bool:
         """Whether there is no time for another search."""
-        late = self._left < 60 * self._minutes * LEAST
+        late = self._left < self._budget * LEAST
         return late and time.process_time() > self._first_until
 
     @property
     def _left(self) -> float:
-        return self.over - self._kept - time.process_time()
+        kept = KEPT * self._budget
+        if not self._worth_it:
+            kept = max(kept, AGAIN * (self._weighing + self._confirming))
+        return self.over - kept - time.process_time()
 
     @property
     def late(self) -> bool:

@@ -76,7 +76,7 @@ def find_gap(
             worse on them, nothing is certain.
         tolerance: Forecast error that does not matter, in the unit of the first measured
             position; below it the verdict is "nothing that matters".
-        effects: Effects that may be missing, as objects or by name (``sims.loading.
+        effects: Effects that may be missing, as objects or by name (``sims.chosen.
             chosen_effects``); by default all that the simulator can host.
         hold: How inputs run between samples, ``"zero"`` (held, as commands are) or ``"linear"``
             (straight to the next, as most measured inputs are), for all or by input; by default

@@ -68,11 +68,12 @@ class Inquiry:
         blocks = len(ready.fitter.blocks)
         self.tell(f"{blocks} blocks of data, {ahead}, {len(pool)} candidate effects")
         self.tell("screening them")
-        return explain(
-            simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort,
-            seldom(self.tell), self.clock.search_until, beside, earlier, twins,
-            every_pair=earlier is None and not more,
-        )  # fmt: skip
+        with self.clock.searching():
+            return explain(
+                simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort,
+                seldom(self.tell), self.clock.search_until, beside, earlier, twins,
+                every_pair=earlier is None and not more,
+            )  # fmt: skip
 
     def other_hold(
         self, log: Log, prepared: Prepared, found: Explanation

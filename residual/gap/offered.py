@@ -9,6 +9,7 @@ from typing import Any
 from residual.gap.answer.curves import curves_for
 from residual.gap.confirmation.aliases import aliases, beyond_parameters, representatives
 from residual.gap.log import Log
+from sims.chosen import LIBRARY, chosen_effects
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
@@ -16,7 +17,6 @@ from sims.effects.flexible import FlexiblePart
 from sims.effects.library import curves_in, further_in, library, parts_in
 from sims.effects.parameter_curve import ParameterCurve
 from sims.host import HostSimulator
-from sims.loading import LIBRARY, chosen_effects
 
 
 @dataclasses.dataclass(frozen=True)

@@ -80,8 +80,11 @@ class OnceMore(OtherWindows):
         """
         answer = known.answer
         further = worth_asking_for(answer, self.inquiry.offered.further)
+        if not further:
+            return known
         what = " or ".join(dict.fromkeys(one.name.replace("_", " ") for one in further))
-        found, second = self._asked_with(known, further, what, what)
+        with self.inquiry.clock.once_more(worth_it=True):
+            found, second = self._asked_with(known, further, what, what)
         if found.answer is second:
             return found
         if second is None:

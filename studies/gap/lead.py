@@ -20,6 +20,8 @@ from studies.gap.words import (
 
 #: Rivals that are listed.
 FEW_RIVALS = 2
+#: Names that are listed of those that are not certain.
+FEW_NAMES = 3
 #: Part of the gap that calibrated parameters take off alone, below which, or below that of what is
 #: not certain, they only serve the rest.
 TRIFLE = 0.05
@@ -235,7 +237,10 @@ def _what(result: GapResult) -> str:
     if len(others) == 1:
         doubtful = _with_rivals(others[0], result)
     else:
-        doubtful = "perhaps " + listed(by_place([_briefly(v, result) for v in others]))
+        names = by_place([_briefly(v, result) for v in others])
+        if len(names) > FEW_NAMES:
+            names = [*names[: FEW_NAMES - 1], f"{len(names) - FEW_NAMES + 1} more"]
+        doubtful = f"perhaps {listed(names)}"
     if certain and sum(v.share.value for v in certain) < LITTLE * max(
         v.share.value for v in others
     ):

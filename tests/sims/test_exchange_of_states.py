@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from sims.chosen import chosen_effects
 from sims.effects import Exchange, library
 from sims.equations import FirstOrderSystem
-from sims.loading import chosen_effects
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel
 

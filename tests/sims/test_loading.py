@@ -6,6 +6,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sims.chosen import chosen_effects
 from sims.effects import (
     ActuatorLag,
     Backlash,
@@ -19,13 +20,7 @@ from sims.effects import (
     library,
     typical,
 )
-from sims.loading import (
-    chosen_effects,
-    corrected_settings,
-    load_simulator,
-    not_found,
-    simulator_settings,
-)
+from sims.loading import corrected_settings, load_simulator, not_found, simulator_settings
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 

@@ -5,8 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sims import Channel, EquationOfMotion, FirstOrderSystem, Parameter
+from sims.chosen import chosen_effects
 from sims.effects import ParameterChange, ParameterCurve, SecondStore
-from sims.loading import chosen_effects, effect_settings
+from sims.loading import effect_settings
 from sims.pendulum import Pendulum
 
 

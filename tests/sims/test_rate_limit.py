@@ -6,9 +6,9 @@ from scipy.integrate import solve_ivp
 from servos import DAMPING, DT, FREQUENCY, SLOW, Servo, SlowServo
 
 from sims.checks import check_simulator
+from sims.chosen import chosen_effects
 from sims.effects import CoulombFriction, RateLimit, library
 from sims.equations import FirstOrderSystem
-from sims.loading import chosen_effects
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel

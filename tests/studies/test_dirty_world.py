@@ -9,9 +9,9 @@ from scipy.integrate import solve_ivp
 
 from residual.gap.result import Number, Span, Verdict
 from sims.checks import check_simulator
+from sims.chosen import chosen_effects
 from sims.effects.library import library
 from sims.effects.store import SecondStore
-from sims.loading import chosen_effects
 from studies.hidden.dirty import sets
 from studies.hidden.dirty.measure import Sensors, records
 from studies.hidden.dirty.report import headlines, judged, misses

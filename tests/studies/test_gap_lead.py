@@ -191,6 +191,18 @@ def test_the_first_sentence_is_the_share_that_has_a_name(verdicts, first):
     assert summary(result(*verdicts)).startswith(first)
 
 
+def test_of_many_names_that_are_not_certain_two_are_told():
+    doubtful = [
+        dataclasses.replace(MASS, kind="ambiguous", effect=name, where="voltage", family="")
+        for name in ("delay", "dead_zone", "saturation", "actuator_gain")
+    ]
+    told = "98 % of the gap is perhaps {}."
+    three = lead(result(*doubtful[:3]))
+    assert three == told.format("delay at voltage, dead zone at voltage and saturation at voltage")
+    four = lead(result(*doubtful))
+    assert four == told.format("delay at voltage, dead zone at voltage and 2 more")
+
+
 def test_what_is_certain_and_next_to_nothing_is_told_last():
     mass = dataclasses.replace(MASS, kind="ambiguous", alternatives=(), same_motion=())
     late = dataclasses.replace(DELAY, kind="confirmed", alternatives=(), doubts=())

@@ -10,12 +10,12 @@ from residual.gap import GapResult, find_gap
 from residual.gap.answer.curves import curves_for
 from residual.gap.result import Verdict
 from residual.trajectories import Trajectory
+from sims.chosen import chosen_effects
 from sims.effects.aliases import exact_aliases, exact_twins
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.effects.store import SecondStore
 from sims.host import HostSimulator
-from sims.loading import chosen_effects
 from studies.hidden.dirty.sets import LEAD, Dirty, make_set
 from studies.hidden.dirty.truth import STORE_TIME
 from studies.judging.forecasts import Forecasts, plan, relative_error, root_mean_squares

@@ -10,7 +10,7 @@ from residual.gap.log import look
 from residual.gap.offered import Offered
 from residual.logs import LogData, read_logs
 from residual.trajectories import Trajectory, trajectories_of
-from sims.loading import chosen_effects
+from sims.chosen import chosen_effects
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Simulator
 

@@ -13,8 +13,8 @@ from residual.gap.preparation.prepare import prepare
 from residual.gap.search import beam
 from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
+from sims.chosen import chosen_effects
 from sims.equations import EquationOfMotion
-from sims.loading import chosen_effects
 from sims.simulator import Channel, Parameter
 
 DT = 0.02

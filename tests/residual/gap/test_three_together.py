@@ -13,8 +13,8 @@ from residual.gap.search.beam import grow, three_at_once
 from residual.gap.search.exchange import add_pairs_exchanged
 from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
+from sims.chosen import chosen_effects
 from sims.equations import FirstOrderSystem
-from sims.loading import chosen_effects
 from sims.simulator import Channel, Parameter
 
 DT, UPPER, LOWER, INFLOW = 5.0, 0.046, 0.045, 0.022

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from sims.chosen import chosen_effects
 from sims.effects import CoulombFriction
-from sims.loading import chosen_effects, load_simulator
+from sims.loading import load_simulator
 from sims.mujoco import MujocoSimulator
 from studies.find_gap import build_parser, main
 from tests.sims.mujoco.robots import MODELS, robot

@@ -15,7 +15,7 @@ from residual.gap.preparation import prepare
 from residual.gap.preparation.horizon import usual_horizon
 from residual.gap.search import finals
 from residual.trajectories import Trajectory
-from sims.loading import chosen_effects
+from sims.chosen import chosen_effects
 from sims.mujoco import AttributeChange, MujocoSimulator
 from studies.robots.cases import NOISE, nominal
 from studies.robots.drives import measure
