@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Callable, Iterator
 
@@ -14,8 +15,14 @@ KEPT, AGAIN = 0.2, 1.5
 #: Part of the time from now to then that a later search may take, and part of the budget below
 #: which none is begun.
 EACH, LEAST = 0.65, 0.02
+#: Part of the budget that is over when a later search is given up.
+ENOUGH = 0.9
 #: Seconds in which not more than one line tells how a search goes.
 OFTEN = 2.0
+
+
+class OutOfTime(Exception):
+    """A later search was not weighed and confirmed in time."""
 
 
 class Clock:
@@ -24,7 +31,7 @@ class Clock:
     def __init__(self, minutes: float) -> None:
         self._budget = 60 * minutes
         self._weighing = self._confirming = 0.0
-        self._worth_it = False
+        self._worth_it, self._given_up = False, math.inf
         self.begin()
         self.laps: dict[str, float] = {}
         self._last = time.perf_counter()
@@ -58,18 +65,34 @@ class Clock:
 
     @contextlib.contextmanager
     def once_more(self, worth_it: bool = False) -> Iterator[None]:
-        """What is searched within this context has a share of the time that is left.
+        """What is searched within this context has a share of the time that is left, and is given
+        up where it cannot be weighed and confirmed within the budget.
 
         Args:
-            worth_it: Whether it may take longer than the budget to weigh and confirm it.
+            worth_it: Whether it may take the time for confirming, too.
         """
-        before = self.search_until, self._worth_it
+        before = self.search_until, self._worth_it, self._given_up
         self._worth_it = worth_it
+        self._given_up = self.confirm_until if worth_it else self.over - (1 - ENOUGH) * self._budget
         self.search_until = max(self._first_until, time.process_time() + EACH * self._left)
         try:
             yield
         finally:
-            self.search_until, self._worth_it = before
+            self.search_until, self._worth_it, self._given_up = before
+
+    def checked(self, tell: Callable[[str], None]) -> Callable[[str], None]:
+        """Progress of a search, which ends it when it is to be given up.
+
+        Raises:
+            OutOfTime: From what is returned.
+        """
+
+        def in_time(text: str) -> None:
+            if time.process_time() > self._given_up:
+                raise OutOfTime
+            tell(text)
+
+        return in_time
 
     @property
     def searched(self) -> bool:

@@ -71,8 +71,8 @@ class Inquiry:
         with self.clock.searching():
             return explain(
                 simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort,
-                seldom(self.tell), self.clock.search_until, beside, earlier, twins,
-                every_pair=earlier is None and not more,
+                self.clock.checked(seldom(self.tell)), self.clock.search_until, beside, earlier,
+                twins, every_pair=earlier is None and not more,
             )  # fmt: skip
 
     def other_hold(

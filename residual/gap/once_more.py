@@ -20,6 +20,7 @@ from residual.gap.answer.left import (
 )
 from residual.gap.answer.lone import few_stretches, left_stretch, off_stretch
 from residual.gap.answer.varying import no_surer, over_unused, worth_varying
+from residual.gap.clock import OutOfTime
 from residual.gap.confirmed import Confirmed
 from residual.gap.data.windows import TooShort
 from residual.gap.fitting.smooth import SmoothFitter
@@ -54,9 +55,9 @@ class OnceMore(OtherWindows):
 
     def _step(self, step: Callable[[Confirmed], Confirmed], known: Confirmed) -> Confirmed:
         """What is known after a step, which has a share of the time that is left."""
-        with self.inquiry.clock.once_more(), contextlib.suppress(TooShort):
+        with self.inquiry.clock.once_more(), contextlib.suppress(TooShort, OutOfTime):
             return step(known)
-        return known  # windows are too short for it: what was found holds without
+        return known  # windows are too short, or time is: what was found holds without
 
     def with_parameters_free(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with parameters free if they may hide something."""
@@ -172,7 +173,10 @@ class OnceMore(OtherWindows):
             return known.lacks_time(lacking), None
         self.inquiry.tell(f"once more with {what}")
         beside, offered = known.answer.found.search.beside, [*_curves(known), *more]
-        second = self.inquiry.asked_again(known, self.tolerance, beside, offered)
+        try:
+            second = self.inquiry.asked_again(known, self.tolerance, beside, offered)
+        except OutOfTime:
+            return known.lacks_time(lacking), None
         if not takes_what_is_left(second, known.answer, more):
             return known, second
         return dataclasses.replace(known, answer=second), second

@@ -28,8 +28,8 @@ def kinematics(
     """Compare the change of each position with the integral of its measured rate.
 
     A rate on another scale than its position is a fault of the log, not of the simulator; left
-    alone it would be taken for missing physics. It is put on the position's scale. A sensor that
-    is late beside the other is told.
+    alone it would be taken for missing physics. It is put on the position's scale, and a sensor
+    that is late beside the other on the other's time: no sensor is early.
 
     Args:
         simulator: Gives the channels.
@@ -65,6 +65,8 @@ def kinematics(
         least = max(5 * error, LATE * seen.step)
         if abs(late) > least and abs(late - other) < 0.25 * abs(late):
             findings.append(_late(channel.rate_of, channel.name, late))
+            behind = position if late > 0 else column
+            runs = [_earlier(run, behind, abs(late)) for run in runs]
     return runs, findings
 
 
@@ -72,9 +74,9 @@ def _late(position: str, rate: str, late: float) -> Finding:
     """That one of two sensors of one motion is late."""
     behind, ahead = (position, f"the integral of {rate}") if late > 0 else (rate, position)
     says = (
-        f"comes {abs(late):.2g} s after {ahead}: one of the two sensors is late or "
-        "filtered, which no effect of the library is; shift its column by that, or leave one of "
-        "the two out"
+        f"comes {abs(late):.2g} s after {ahead}: its sensor is late or filtered, which no effect "
+        "of the library is; it was taken to be so much earlier. If the other one is wrong, leave "
+        "that out"
     )
     return Finding("late", behind, says, {"seconds": abs(late)}, "warning")
 
@@ -191,4 +193,18 @@ def _simpson(values: Array, times: Array) -> float:
 def _multiplied(run: Trajectory, column: int, factor: float) -> Trajectory:
     states = np.array(run.states, float)
     states[:, column] *= factor
+    return dataclasses.replace(run, states=states)
+
+
+def _earlier(run: Trajectory, column: int, seconds: float) -> Trajectory:
+    """The same with a channel as it is read so much later, straight from reading to reading; what
+    lies beyond the last one, or in a gap of readings, is missing."""
+    states = np.array(run.states, float)
+    there = np.isfinite(states[:, column])
+    at, read = run.times + seconds, run.times[there]
+    moved = np.interp(at, read, states[there, column], right=np.nan) if there.any() else np.nan
+    if there.any():
+        gap = np.diff(read, append=np.inf)[np.searchsorted(read, at, side="right") - 1]
+        moved = np.where(gap > 2.5 * np.median(run.durations), np.nan, moved)
+    states[:, column] = moved
     return dataclasses.replace(run, states=states)
