@@ -35,7 +35,8 @@ class Named:
     Attributes:
         right: For each thing that is wanted: ``"confirmed"``, ``"one of ..."`` families, or
             ``"missing"``.
-        wrong: Confirmed labels that the key does not support.
+        wrong: Confirmed labels that the key does not support; an exact twin of what it supports,
+            which no motion tells from that, is none.
     """
 
     right: tuple[str, ...]
@@ -59,8 +60,9 @@ def named(rig: Rig, simulator: HostSimulator, verdicts: Sequence[Verdict]) -> Na
             right.append("confirmed")
         else:
             right.append(f"one of {len(families[0])}" if families else "missing")
-    sure = [v.label for v in verdicts if v.kind == "confirmed" and v.effect]
-    return Named(tuple(right), tuple(label for label in sure if label not in rig.allowed))
+    sure = [v for v in verdicts if v.kind == "confirmed" and v.effect]
+    wrong = [v.label for v in sure if rig.allowed.isdisjoint((v.label, *v.same_motion))]
+    return Named(tuple(right), tuple(wrong))
 
 
 def _family(effect: Effect, simulator: HostSimulator) -> str:

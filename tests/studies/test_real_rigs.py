@@ -110,6 +110,8 @@ def test_names_are_held_against_the_key():
     load = verdict("confirmed", "constant_load", "speed")
     assert named(rig, Car(), [load]).wrong == ("constant_load@speed",)
     assert named(rig, Car(), [load]).right == ("missing", "missing")
+    twin = dataclasses.replace(load, same_motion=("actuator_lag@steering",))
+    assert not named(rig, Car(), [twin]).wrong
 
 
 def test_a_folder_that_is_not_there_is_one_line(tmp_path, capsys):
