@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sims import drive as path
-from sims.effects.actuator import ActuatorEffect
+from sims.effects.actuator import ActuatorEffect, ActuatorLag
 from sims.effects.dimensions import product
 from sims.effects.flexible import flexible_parts
+from sims.effects.slew import SlewLimit
 from sims.effects.store import stores
 from sims.simulator import Array, Channel, Hold
 
@@ -50,7 +51,7 @@ def memory_channels(simulator: HostSimulator) -> Iterator[Channel]:
         for k in range(history(simulator, channel.name), 0, -1):
             past = f"{channel.name} {k} ago"
             yield Channel(past, channel.unit, "memory", scale=channel.scale)
-        for i, _ in enumerate(path.lags(simulator.actuator_effects(channel.name))):
+        for i, _ in enumerate(path.followers(simulator.actuator_effects(channel.name))):
             name = f"{channel.name} lagged" + (f" {i + 1}" if i else "")
             yield Channel(name, channel.unit, "memory", scale=channel.scale)
 
@@ -122,7 +123,7 @@ def with_memory(simulator: HostSimulator, states: Array, actions: Array) -> Arra
         kept = history(simulator, channel.name)
         full[:, at : at + kept] = actions[:, j : j + 1]
         at += kept
-        count = len(path.lags(effects))
+        count = len(path.followers(effects))
         full[:, at : at + count] = received[:, j : j + 1]
         at += count
     if simulator.plays():
@@ -159,17 +160,32 @@ def recorded_inputs(
         if np.ndim(late):
             samples = np.broadcast_to(samples, (len(np.asarray(late)), samples.shape[1]))
         means, rises = path.substep_inputs(samples, durations, substeps, late, holds[j], bounds)
-        for lag in path.lags(effects):
-            shape = (lag.rows or len(means), *means.shape[1:])
+        for one in path.followers(effects):
+            shape = (one.rows or len(means), *means.shape[1:])
             means, rises = np.broadcast_to(means, shape), np.broadcast_to(rises, shape)
             start = np.broadcast_to(samples[:, bounds[:-1]], (len(means), len(bounds) - 1))
-            means, rises, _ = simulator.lagged(
-                means, rises, durations, lag.time_constant, start, bounds
-            )
+            means, rises, _ = followed(simulator, one, means, rises, durations, start, bounds)
         columns.append(np.stack([means, rises], axis=-1))
     if not columns:
         return np.empty((1, len(commands), substeps, 0, 2))
     return np.stack(np.broadcast_arrays(*columns), axis=3)
+
+
+def followed(
+    simulator: HostSimulator,
+    effect: ActuatorLag | SlewLimit,
+    means: Array,
+    rises: Array,
+    durations: Array,
+    start: Array,
+    bounds: Sequence[int],
+) -> tuple[Array, Array, Array]:
+    """What comes out of a lag, as the simulator filters, or of a limit of pace; see
+    ``sims.drive.lagged``."""
+    if isinstance(effect, SlewLimit):
+        slow = effect.seconds_per_unit
+        return path.limited(means, rises, durations, slow, start, bounds)
+    return simulator.lagged(means, rises, durations, effect.time_constant, start, bounds)
 
 
 def next_inputs(
@@ -213,11 +229,10 @@ def next_inputs(
             (0, commands.shape[1]),
         )
         means, rises = means[:, kept : kept + 1], rises[:, kept : kept + 1]
-        for lag in path.lags(effects):
-            means, rises, after[:, at] = simulator.lagged(
-                means, rises, np.array([simulator.dt]), lag.time_constant, memory[:, at, None],
-                (0, 1),
-            )  # fmt: skip
+        for one in path.followers(effects):
+            means, rises, after[:, at] = followed(
+                simulator, one, means, rises, np.array([simulator.dt]), memory[:, at, None], (0, 1)
+            )
             at += 1
         inputs[:, :, j] = np.stack([means[:, 0], rises[:, 0]], axis=-1)
     return inputs, after

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sims.compiled import compiled, inlined
 from sims.effects.actuator import ActuatorEffect, ActuatorLag, Delay, StaticActuatorEffect
+from sims.effects.slew import SlewLimit
 from sims.simulator import Array, Hold
 
 Integers = NDArray[np.int64]
@@ -42,9 +43,10 @@ def total_delay(effects: Iterable[ActuatorEffect]) -> float | Array:
     return sum((effect.time for effect in effects if isinstance(effect, Delay)), 0.0)
 
 
-def lags(effects: Iterable[ActuatorEffect]) -> list[ActuatorLag]:
-    """The lags among the effects."""
-    return [effect for effect in effects if isinstance(effect, ActuatorLag)]
+def followers(effects: Iterable[ActuatorEffect]) -> list[ActuatorLag | SlewLimit]:
+    """The effects whose output follows the command, lags before limits of pace."""
+    found = [effect for effect in effects if isinstance(effect, ActuatorLag | SlewLimit)]
+    return sorted(found, key=lambda effect: effect.stage)
 
 
 def substep_inputs(
@@ -182,6 +184,75 @@ def _filtered(
                 filtered[v, t, s] = means[v, t, s] - behind + lack * share
                 tilted[v, t, s] = rises[v, t, s] + lack * tilt
                 y[v] = stays * y[v] + last - first * stays
+    return y
+
+
+def limited(
+    means: Array,
+    rises: Array,
+    durations: Array,
+    seconds_per_unit: float | Array,
+    start: Array,
+    bounds: Sequence[int],
+) -> tuple[Array, Array, Array]:
+    """An input that runs straight in each sub-step, followed at a limited pace, exactly.
+
+    Args:
+        means, rises: (rows, T, substeps).
+        durations: (T,) seconds.
+        seconds_per_unit: What a change by one unit takes, scalar or (rows,); zero leaves the
+            input as it is.
+        start: Output before the first sub-step of each record, (rows, records).
+        bounds: Where each record begins, and T.
+
+    Returns:
+        As ``lagged``.
+    """
+    slow = np.broadcast_to(np.asarray(seconds_per_unit, float), len(means))
+    followed, tilted = np.array(means, float), np.array(rises, float)
+    last = _limited(
+        np.ascontiguousarray(durations, float), np.ascontiguousarray(slow),
+        np.ascontiguousarray(start, float), np.asarray(bounds, np.int64), followed, tilted,
+    )  # fmt: skip
+    return followed, tilted, last
+
+
+@compiled
+def _limited(
+    durations: Array, slow: Array, start: Array, bounds: Integers, means: Array, rises: Array
+) -> Array:
+    """Replaces means and rises by those of the output of ``limited``; returns where it ends."""
+    rows, length, substeps = means.shape
+    y = np.empty(rows)
+    for v in range(rows):
+        record = 0
+        for t in range(length):
+            if t == bounds[record]:
+                y[v] = start[v, record]
+                record += 1
+            h = durations[t] / substeps
+            for s in range(substeps):
+                first = means[v, t, s] - 0.5 * rises[v, t, s]
+                if not slow[v] > 0:
+                    y[v] = first + rises[v, t, s]
+                    continue
+                pace, steep = 1.0 / slow[v], rises[v, t, s] / h
+                towards = np.sign(first - y[v])
+                # It is reached, and then followed, or outrun if that is too steep.
+                nearing = pace - towards * steep
+                reach = abs(first - y[v]) / nearing if nearing > 0 else np.inf
+                if towards == 0:
+                    reach = 0.0
+                reach = min(reach, h)
+                then = min(max(steep, -pace), pace)
+                met, rest = y[v] + towards * pace * reach, h - reach
+                whole = (y[v] + met) / 2 * reach + (met + then * rest / 2) * rest
+                moment = y[v] * reach**2 / 2 + towards * pace * reach**3 / 3
+                moment += reach * (met + then * rest / 2) * rest
+                moment += met * rest**2 / 2 + then * rest**3 / 3
+                means[v, t, s] = whole / h
+                rises[v, t, s] = 12 * (moment - h * whole / 2) / (h * h)
+                y[v] = met + then * rest
     return y
 
 

@@ -52,4 +52,5 @@ from sims.effects.sensor import EncoderScale as EncoderScale
 from sims.effects.sensor import SensorEffect as SensorEffect
 from sims.effects.sensor import SensorOffset as SensorOffset
 from sims.effects.sensor import SensorScale as SensorScale
+from sims.effects.slew import SlewLimit as SlewLimit
 from sims.effects.store import SecondStore as SecondStore

@@ -42,11 +42,12 @@ from sims.effects.joint import (
     Unbalance,
     ViscousFriction,
 )
-from sims.effects.limit import RateLimit, follows_command
+from sims.effects.limit import RateLimit, follows_command, goals
 from sims.effects.parameter import ParameterChange
 from sims.effects.pull import pulled_by_position, pulled_by_turn
 from sims.effects.response import AsymmetricResponse
 from sims.effects.sensor import EncoderScale, SensorOffset, SensorScale
+from sims.effects.slew import SlewLimit
 from sims.effects.store import SecondStore
 from sims.simulator import random_values
 
@@ -99,6 +100,7 @@ def library(simulator: HostSimulator) -> tuple[Effect, ...]:
     places += [(Exchange, AND.join(names)) for names in like_states(simulator)]
     for channel in simulator.action_channels:
         places += [(effect, channel.name) for effect in ACTUATOR_EFFECTS]
+    places += [(SlewLimit, name) for name in goals(simulator)]
     for names in like_inputs(simulator):
         places += [(effect, AND.join(names)) for effect in SHARED_EFFECTS]
     for channel in simulator.physical_channels:
@@ -156,13 +158,14 @@ def parts_in(simulator: HostSimulator) -> tuple[FlexiblePart, ...]:
 
 def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     """What is rarer than the library, at zero strength: friction by load of every joint that the
-    inputs move by themselves, states that fall at another pace than they rise, and inputs that act
-    otherwise below zero."""
+    inputs move by themselves, states that fall at another pace than they rise, inputs that act
+    otherwise below zero, and inputs, but goals, that are followed at a limited pace."""
     found: list[Effect] = list(_geared(simulator))
     inputs = [channel.name for channel in simulator.action_channels]
     inputs += [AND.join(names) for names in like_inputs(simulator)]
     both: list[Effect] = [AsymmetricResponse(joint.name) for joint in simulator.joints]
-    for effect in (*both, *map(AsymmetricActuator, inputs)):
+    slow = [name for name in inputs if name not in goals(simulator)]
+    for effect in (*both, *map(AsymmetricActuator, inputs), *map(SlewLimit, slow)):
         with contextlib.suppress(ValueError):
             effect.quantities(simulator)
             found.append(effect)

@@ -82,6 +82,13 @@ def follows_command(simulator: HostSimulator, joint: str) -> bool:
     return followed and any(_kind(channel.unit) == kind for channel in simulator.action_channels)
 
 
+def goals(simulator: HostSimulator) -> list[str]:
+    """Inputs that a joint's state follows, see ``follows_command``."""
+    where = {j.position for j in simulator.joints if follows_command(simulator, j.name)}
+    followed = {_kind(c.unit) for c in simulator.state_channels if c.name in where}
+    return [c.name for c in simulator.action_channels if _kind(c.unit) in followed]
+
+
 def _kind(unit: str) -> str:
     """A unit, or one for all that measure angles."""
     return "rad" if unit in TURNS else unit

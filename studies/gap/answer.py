@@ -16,6 +16,7 @@ from studies.gap.numbers import (
     as_in_a_unit,
     much_surer,
     numbers_of,
+    pace_of,
     shape,
     span,
     spelt,
@@ -96,7 +97,8 @@ def headline(verdict: Verdict, result: GapResult) -> str:
         own = effect_name(verdict.label)
         return f"{capitalized(verdict.family)}, form undecided: as {own}, {numbers}."
     given = "" if isinstance(effect, Curve) else shape(verdict)
-    return f"{name}{given}: {numbers}{times_of(verdict)}."
+    so = times_of(verdict) + pace_of(verdict, result.corrected)
+    return f"{name}{given}: {numbers}{so}."
 
 
 def notes(verdict: Verdict, result: GapResult) -> list[str]:

@@ -7,8 +7,8 @@ from scipy.optimize import brentq
 from residual.gap import GapResult
 from residual.gap.result import Meant, Number, Verdict
 from residual.logs.units import other_units
-from sims.effects import Curve
-from sims.effects.actuator import Saturation, StaticActuatorEffect
+from sims.effects import Curve, SlewLimit
+from sims.effects.actuator import AND, Saturation, StaticActuatorEffect
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 from studies.gap.words import minus, number_text, quantity_text, rounded, unit_text
@@ -48,6 +48,16 @@ def times_of(verdict: Verdict) -> str:
     """``, so 1.62 times the command`` of a gain, which is a share more."""
     found = [(f, n) for f, n in verdict.parameters.items() if f in TIMES and n.unit == "1"]
     return minus("".join(f", so {1 + n.value:.3g} times {TIMES[f]}" for f, n in found))
+
+
+def pace_of(verdict: Verdict, simulator: HostSimulator) -> str:
+    """``, so at most 4.6 rad/s`` of a limited pace, which is counted as a time."""
+    full, time = verdict.shape.get("full"), verdict.parameters.get("time")
+    if verdict.effect != SlewLimit.name or not full or time is None or not time.value > 0:
+        return ""
+    units = {channel.name: channel.unit for channel in simulator.action_channels}
+    unit = units[verdict.where.split(AND)[0]]
+    return f", so at most {full / time.value:.3g}{unit_text('' if unit == '1' else unit)}/s"
 
 
 def spelt(field: str) -> str:

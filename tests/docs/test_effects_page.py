@@ -68,7 +68,7 @@ OTHERS = [
     effects.FlexiblePart("pivot"), effects.FlexibleJoint("pivot"), effects.AddedInertia("pivot"),
     effects.ParameterCurve("mass", "voltage"), effects.Unbalance("pivot"),
     effects.LoadDependentFriction("pivot"), effects.AsymmetricResponse("level"),
-    effects.AsymmetricActuator("voltage"),
+    effects.AsymmetricActuator("voltage"), effects.SlewLimit("voltage"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}

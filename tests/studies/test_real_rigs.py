@@ -1,5 +1,6 @@
 """Rigs and their keys: how simulators are judged, and the command."""
 
+import dataclasses
 import os
 from pathlib import Path
 

@@ -21,6 +21,7 @@ from residual.gap.search.sets import Key, Search
 from residual.trajectories import Trajectory
 from sims.effects.actuator import ActuatorGain, ActuatorLag, Delay
 from sims.effects.parameter import ParameterChange
+from sims.effects.slew import SlewLimit
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -106,7 +107,7 @@ def _with_lags(search: Search, key: Key) -> Iterator[tuple[Key, Array]]:
     round; none if there are neither. Then lags beside one gain or parameter, whatever was found:
     taken to have gone on before, a step from rest leads to other names."""
     chosen = {number: search.candidates[number].effect for number in key}
-    remember = {n: e for n, e in chosen.items() if isinstance(e, ActuatorLag | Delay)}
+    remember = {n: e for n, e in chosen.items() if isinstance(e, ActuatorLag | Delay | SlewLimit)}
     screened = list(enumerate(search.candidates[: search.screened]))
     for dropped in [(), tuple(remember)] if remember else [()]:
         gone = {(type(chosen[n]), chosen[n].where) for n in dropped}

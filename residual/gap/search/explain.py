@@ -157,11 +157,18 @@ def explain(
             search.add(dict(itertools.islice(seeds.items(), LAST)))
             break
         fitter, before = fresh, search
-    return settle(search, floor)
+    return settle(search, floor, earlier is not None)
 
 
-def settle(search: Search, floor: Noise) -> Explanation:
-    """The final choice, after everything chosen has met its rivals."""
+def settle(search: Search, floor: Noise, again: bool = False) -> Explanation:
+    """The final choice, after everything chosen has met its rivals.
+
+    Args:
+        search: With all that was tried.
+        floor: Noise around the best of it.
+        again: Whether, though time is over, what is chosen in place of a first choice meets its
+            rivals, too: a later search may come to what it is made for at the end.
+    """
     fitter = search.fitter
     nominal_left = fitter.left(search.nominal, floor)
     needed = np.inf
@@ -194,7 +201,7 @@ def settle(search: Search, floor: Noise) -> Explanation:
             add_handed_over(search, key)
             if not quiet:
                 add_pairs_exchanged(search, key)
-        if len(search.tried) == before or (search.late and turn):
+        if len(search.tried) == before or (search.late and (turn or not again)):
             break
         if not quiet and choose(search, enough).key == key:
             break
