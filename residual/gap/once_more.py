@@ -124,8 +124,11 @@ class OnceMore(OtherWindows):
         lacking = "a law that the library does not have (a curve by speed, position or command)"
         what = "curves by points in place of laws"
         found, second = self._asked_with(known, curves, what, lacking)
-        if second is None or found.answer is second:
-            return found if second is None else self.with_further(found)
+        if second is None:
+            untested = of_open_form(found.answer, (), self.tolerance) if curves else found.answer
+            return dataclasses.replace(found, answer=untested)
+        if found.answer is second:
+            return self.with_further(found)
         beside, says = beside_curves(found.answer, second, curves)
         beside = beside_others(beside, second, curves, self._late)
         return dataclasses.replace(found, answer=beside, says=(*found.says, *says))

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.free_parameters import better
 from residual.gap.confirmation.drift import beside
+from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.model.candidates import candidates
+from residual.gap.model.candidates import Candidate, candidates
+from residual.gap.model.model import Model
 from residual.gap.search.sets import Key
 from sims.effects.base import Effect
 from sims.effects.flexible import FlexiblePart
@@ -19,6 +23,8 @@ from sims.effects.flexible import FlexiblePart
 QUARTER = 0.25
 #: Part of what is left beyond noise that a rarer effect has to take off in the linear picture.
 HALF = 0.5
+#: Loss over that of one of its family, up to which an effect fits about as well.
+NEARLY = 1.25
 #: Effects fewer with which an answer that forecasts as well is the simpler one, whatever numbers
 #: these have.
 FEWER = 2
@@ -42,9 +48,10 @@ def worth_a_part(answer: Answer, parts: Sequence[FlexiblePart]) -> Sequence[Flex
 
 def worth_asking_for(answer: Answer, further: Sequence[Effect]) -> list[Effect]:
     """The rarer effects to ask for, where clearly more than noise is left: those that take half of
-    it in the linear picture, so that a search is not made in vain."""
-    search = answer.found.search
-    fitter, fit = search.fitter, search.tried[answer.key]
+    it in the linear picture, or that fit about as well in place of what is of their family, and at
+    their place, so that a search is not made in vain."""
+    search, key = answer.found.search, answer.key
+    fitter, fit = search.fitter, search.tried[key]
     if not isinstance(fitter, SmoothFitter) or not much_is_left(answer):
         return []
     noise = fitter.noise_alone(answer.found.floor.sigma)
@@ -52,7 +59,25 @@ def worth_asking_for(answer: Answer, further: Sequence[Effect]) -> list[Effect]:
     pool = candidates(fit.model.simulator, further, fitter.samples)
     moved = [beside_starts(fit, fitter.columns(fit, [one])) for one in pool]
     losses = [beside(fit, [columns], fitter.cap).loss for columns in moved]
-    return [one.effect for one, loss in zip(pool, losses, strict=True) if loss < most]
+    return [
+        one.effect
+        for one, loss in zip(pool, losses, strict=True)
+        if loss < most or _fits_in_place(one, fitter, fit)
+    ]
+
+
+def _fits_in_place(one: Candidate, fitter: SmoothFitter, fit: Fit) -> bool:
+    """Whether an effect fits about as well in place of what is of its family, and at its place."""
+    kind = one.effect.family, one.effect.where
+    chosen = fit.model.chosen
+    alike = [i for i, c in enumerate(chosen) if (c.effect.family, c.effect.where) == kind]
+    if not (alike and one.effect.family):
+        return False
+    kept = [candidate for i, candidate in enumerate(chosen) if i not in alike]
+    own = fit.theta[~np.isin(fit.model.owner, alike)]
+    model = Model(fit.model.simulator, [*kept, one])
+    starts = (np.append(own, trial.values[0]) for trial in one.trials)
+    return any(fitter.fit(model, start, fit).merit < NEARLY * fit.merit for start in starts)
 
 
 def much_is_left(answer: Answer) -> bool:
