@@ -57,7 +57,7 @@ def pace_of(verdict: Verdict, simulator: HostSimulator) -> str:
         return ""
     units = {channel.name: channel.unit for channel in simulator.action_channels}
     unit = units[verdict.where.split(AND)[0]]
-    return f", so at most {full / time.value:.3g}{unit_text('' if unit == '1' else unit)}/s"
+    return f", so at most {full / time.value:.3g}{unit_text(unit)}/s"
 
 
 def spelt(field: str) -> str:

@@ -201,10 +201,9 @@ def _earlier(run: Trajectory, column: int, seconds: float) -> Trajectory:
     lies beyond the last one, or in a gap of readings, is missing."""
     states = np.array(run.states, float)
     there = np.isfinite(states[:, column])
-    at, read = run.times + seconds, run.times[there]
-    moved = np.interp(at, read, states[there, column], right=np.nan) if there.any() else np.nan
     if there.any():
+        at, read = run.times + seconds, run.times[there]
+        moved = np.interp(at, read, states[there, column], right=np.nan)
         gap = np.diff(read, append=np.inf)[np.searchsorted(read, at, side="right") - 1]
-        moved = np.where(gap > 2.5 * np.median(run.durations), np.nan, moved)
-    states[:, column] = moved
+        states[:, column] = np.where(gap > 2.5 * np.median(run.durations), np.nan, moved)
     return dataclasses.replace(run, states=states)
