@@ -33,7 +33,7 @@ def refuse_ended_at_once(
     if len(rollouts) < SEVERAL or len(single) <= len(rollouts) / 2:
         return
     at = ", ".join(
-        f"{c.name} {value:.4g} {c.unit}".strip()
+        f"{c.name} {value:.4g}{c.unit_text}"
         for c, value in zip(nominal.state_channels, np.asarray(single[0]), strict=True)
     )
     raise Unsound(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import difflib
 import importlib.util
 import inspect
 import pydoc
@@ -167,12 +168,23 @@ def not_found(source: str | Mapping[str, Any]) -> str:
             )
         try:
             if inside and pydoc.locate(path) is None:
-                return f"there is no class {path}; expected MODULE.CLASS, as import would find it"
+                hint = _near(path) or "expected MODULE.CLASS, as import would find it"
+                return f"there is no class {path}; {hint}"
         except pydoc.ErrorDuringImport as error:
             # Parsers take these for a value of another kind; all else is told by whoever loads it.
             if isinstance(error.value, ValueError | TypeError):
                 return f"{error.filename} cannot be imported: {error.value}"
     return ""
+
+
+def _near(path: str) -> str:
+    """What may have been meant by a name that a module does not have; or nothing."""
+    module, _, name = path.rpartition(".")
+    held = getattr(pydoc.locate(module), "__dict__", {})
+    names = sorted({*held, *held.get("__all__", ())})  # what is imported when it is asked for, too
+    there = [other for other in names if not inspect.ismodule(held.get(other))]
+    near = difflib.get_close_matches(name, there, 1)
+    return f"did you mean {module}.{near[0]}?" if near else ""
 
 
 def _class_paths(settings: Any) -> list[str]:

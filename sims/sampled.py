@@ -71,7 +71,8 @@ class SampledEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         )
         if not fits:
             names = ", ".join(
-                f"{c.name} from {c.low:g} to {c.high:g} {c.unit}" for c in nominal.action_channels
+                f"{c.name} from {c.low:g} to {c.high:g}{c.unit_text}"
+                for c in nominal.action_channels
             )
             mend = "wrap the environment (gymnasium.wrappers.RescaleAction) or change the channels"
             if not isinstance(box, gymnasium.spaces.Box):

@@ -77,6 +77,11 @@ class Channel:
         return TURNS.get(self.unit)
 
     @property
+    def unit_text(self) -> str:
+        """The unit as it follows a number, with its space; nothing where there is none."""
+        return "" if self.unit in ("", "1") else f" {self.unit}"
+
+    @property
     def pushes(self) -> bool:
         """Whether an input pushes by itself, as a force or a motor's current does: what a voltage
         or a goal pushes depends on the motion, too."""

@@ -64,8 +64,8 @@ def refuse_not_finite(
     for channel, value in zip(channels, state, strict=True):
         if not math.isfinite(value):
             raise Unsound(
-                f"{what} gave {channel.name} = {value:g} {channel.unit} {where}, expected a finite "
-                "number: mend the sensor or the model, or end the episode before that"
+                f"{what} gave {channel.name} = {value:g}{channel.unit_text} {where}, expected a "
+                "finite number: mend the sensor or the model, or end the episode before that"
             )
     if not math.isfinite(reward):
         reached = ", ".join(f"{c.name} {v:.4g}" for c, v in zip(channels, state, strict=True))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from residual.gap.answer.confirmed import Answer
+from residual.gap.data.stretch import Stretch
 from residual.gap.preparation.prepare import Prepared
 from sims.effects.parameter_curve import ParameterCurve
 
@@ -19,6 +20,7 @@ class Confirmed:
         says: What is to be said of how it was found.
         in_vain: Parameters that follow a channel, asked for and not named.
         unasked: What may be left, in words, and was not asked for lack of time.
+        lone: Where most of the error lies, if nothing explains it and it was not left out.
     """
 
     prepared: Prepared
@@ -26,6 +28,7 @@ class Confirmed:
     says: tuple[str, ...]
     in_vain: tuple[ParameterCurve, ...] = ()
     unasked: tuple[str, ...] = ()
+    lone: Stretch | None = None
 
     def lacks_time(self, *what: str) -> Confirmed:
         """The same with more that was not asked for lack of time."""

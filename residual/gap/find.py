@@ -187,7 +187,7 @@ def find_gap(
     conventions = conventions or other_sign(simulator, result.effects)
     return replace(
         result, corrected=result.corrected.with_scales(declared), conventions=conventions,
-        cut_off=log.cut_off, unlike=differ, changing=over_time, nearly_late=late,
+        cut_off=log.cut_off, unlike=differ, changing=over_time, nearly_late=late, lone=known.lone,
     )  # fmt: skip
 
 

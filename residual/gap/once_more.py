@@ -18,7 +18,7 @@ from residual.gap.answer.left import (
     worth_a_part,
     worth_asking_for,
 )
-from residual.gap.answer.lone import few_stretches, left_stretch, off_stretch
+from residual.gap.answer.lone import few_stretches, left_stretch, lone_stretch, off_stretch
 from residual.gap.answer.varying import no_surer, over_unused, worth_varying
 from residual.gap.clock import OutOfTime
 from residual.gap.confirmed import Confirmed
@@ -37,7 +37,7 @@ class OnceMore(OtherWindows):
         """The same, or what is found without a stretch that nothing explains, with parameters
         free, with more than the library on offer, or over longer forecasts."""
         known = self._step(self.without_lone_stretch, known)
-        lone = bool(known.says)
+        left_out = bool(known.says)
         for step in (
             self.with_parameters_free, self.with_further, self.with_varying, self.with_curves,
             self.with_parts, self.longer, self.longest, self.slow,
@@ -45,11 +45,11 @@ class OnceMore(OtherWindows):
             known = self._step(step, known)
         if known.unasked:
             known = known.and_says(_no_time(known.unasked))
-        if lone:
+        if left_out:
             return known
-        rest = left_stretch(known.answer)
-        if rest:
-            return known.and_says(rest.says(left_out=False))
+        lone = lone_stretch(known.answer)
+        if rest := lone or left_stretch(known.answer):
+            return dataclasses.replace(known.and_says(rest.says(left_out=False)), lone=lone)
         says = few_stretches(known.answer) or off_stretch(known.answer)
         return known.and_says(says) if says else known
 

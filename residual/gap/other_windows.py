@@ -40,16 +40,14 @@ class OtherWindows:
         It counts only if something is named elsewhere.
         """
         stretch = lone_stretch(known.answer)
-        if stretch is None:
+        if stretch is None or self.inquiry.clock.searched or stretch.indispensable:
             return known
-        if self.inquiry.clock.searched or stretch.indispensable:
-            return known.and_says(stretch.says(left_out=False))
         self.inquiry.tell("once more without a stretch that nothing explains")
         simulator = known.answer.found.search.simulator
         runs = stretch.cut_from(self.log.runs)
         ready, answer = self.inquiry.asked_of(simulator, runs, self.log.horizon, self.tolerance)
         if not explains_the_rest(answer):
-            return known.and_says(stretch.says(left_out=False))
+            return known
         return Confirmed(ready, answer, (stretch.says(left_out=True),))
 
     def longer(self, known: Confirmed) -> Confirmed:

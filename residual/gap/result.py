@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.beside import Blind, Changing, Conventions, Unlike
+from residual.gap.data.stretch import Stretch
 from residual.gap.fitting.where import Where
 from residual.logs.checks import Finding
 from sims.effects.base import Effect
@@ -261,6 +262,7 @@ class GapResult:
         changing: What would take most of what is left off if it changed along the records.
         nearly_late: Labels of delays and lags of some inputs that late, or filtering, sensors would
             nearly imitate, since the other inputs hardly change in that time.
+        lone: Where most of the error lies, if nothing explains it and it was not left out.
     """
 
     verdicts: tuple[Verdict, ...]
@@ -283,6 +285,7 @@ class GapResult:
     unlike: tuple[Unlike, ...] = ()
     changing: Changing | None = None
     nearly_late: tuple[str, ...] = ()
+    lone: Stretch | None = None
 
     def __repr__(self) -> str:
         kinds = "; ".join(f"{v.effect} {v.kind}".strip() for v in self.verdicts[:4])

@@ -119,9 +119,8 @@ def _check_actions(runs: Sequence[Run], channels: Sequence[Channel], columns: Lo
         values = np.concatenate([run.actions[:-1, index] for run in runs])
         if columns.allow_constant_action or column.value is not None or np.ptp(values) > 0:
             continue
-        unit = "" if channel.unit == "1" else f" {channel.unit}"
         raise LogError(
-            f"the action {channel.name!r} is {values[0]:g}{unit} in all {len(values)} "
+            f"the action {channel.name!r} is {values[0]:g}{channel.unit_text} in all {len(values)} "
             "samples, expected one that changes; check the column, or if it is a run without "
             "input, such as a free decay, set allow_constant_action: true (on the command line "
             "--columns.allow_constant_action true)",

@@ -131,6 +131,7 @@ def _ordered(run: Run, minimum: int, findings: list[Finding]) -> Run:
     if untimed:
         says = f"{untimed} samples without a time were dropped."
         findings.append(Finding("untimed", run.name, says, {"samples": untimed}))
+    ordered = _once(ordered, findings)
     even, rounding = even_clock(ordered.times)
     if rounding:
         says = (
@@ -154,6 +155,21 @@ def _ordered(run: Run, minimum: int, findings: list[Finding]) -> Run:
             int(run.rows[0]) if len(run) else None,
         )
     return ordered
+
+
+def _once(run: Run, findings: list[Finding]) -> Run:
+    """Without copies, where every sample that repeats the time before it repeats all else, too: a
+    log that was written twice, row by row, is none of twice the rate with rounded times."""
+    again = np.append(False, np.diff(run.times) == 0)[: len(run)]
+    if not again.any():
+        return run
+    read = np.column_stack([run.states, run.actions])
+    if not np.array_equal(read[1:][again[1:]], read[:-1][again[1:]], equal_nan=True):
+        return run
+    first = int(run.rows[again][0])
+    says = f"{again.sum()} samples are copies of the one before (first in row {first}); dropped."
+    findings.append(Finding("repeated", run.name, says, {"samples": int(again.sum())}))
+    return run.take(~again)
 
 
 def _cut(run: Run, gap: float, findings: list[Finding]) -> list[Run]:

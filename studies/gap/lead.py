@@ -5,6 +5,7 @@ from __future__ import annotations
 from residual.gap import GapResult
 from residual.gap.fitting.forecasts import own_channels
 from residual.gap.result import OFF, ChannelGap, Gap, Verdict
+from residual.trajectories import moment
 from studies.gap.answer import cannot_tell, rivals
 from studies.gap.records import beside_lead
 from studies.gap.words import (
@@ -102,8 +103,17 @@ def _named_share(result: GapResult, tolerance: float | None) -> str:
             f"alone makes {floor}."
         )
     if "unexplained" in kinds:
-        return f"The gap has no name: the {ahead(gap)} is {before}."
+        return f"The gap has no name: the {ahead(gap)} is {before}{_in_one_stretch(result)}."
     return _no_gap(gap) + _but_off_apart(result)
+
+
+def _in_one_stretch(result: GapResult) -> str:
+    """Where most of the error lies, if that is one stretch of the log."""
+    lone = result.lone
+    if lone is None:
+        return ""
+    where = f"{lone.run} from {moment(lone.begin)} to {moment(lone.end)}"
+    return f", and {percent(lone.share)} of its square lies in one stretch, {where}"
 
 
 def _no_gap(gap: Gap) -> str:

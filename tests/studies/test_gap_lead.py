@@ -7,6 +7,7 @@ import pytest
 from told import DELAY, FRICTION, MASS, NO_GAP, rest, result
 
 from residual.gap.beside import Changing, Conventions
+from residual.gap.data.stretch import Stretch
 from residual.gap.result import (
     ChannelGap,
     Span,
@@ -35,6 +36,11 @@ def test_what_the_log_may_count_otherwise_comes_first():
     assert "with `scale: -1` for voltage or `unit: mV` for voltage in the column map" in first
     assert first.endswith("errs 19 times less.")
     assert rest == lead(result(MASS))
+
+
+def test_a_gap_without_a_name_that_lies_in_one_stretch_leads_to_it():
+    found = dataclasses.replace(result(rest(1.0)), lone=Stretch("run 2", 1.5, 4.0, 0.93, 0.2))
+    assert lead(found).endswith("93 % of its square lies in one stretch, run 2 from 1.5 s to 4 s.")
 
 
 def test_a_law_that_may_be_another_one_leads_to_what_changes():

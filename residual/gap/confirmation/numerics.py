@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.data.lost_rows import untimed_changes
 from residual.gap.data.samples import Samples
 from residual.gap.fitting.contract import Fit
 from residual.gap.model.model import Model
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 #: Part of the misfit that another way to read the log, such as the other hold, must take off to be
 #: believed.
 CLEARER = 0.05
+#: Part of the windows in which changes of inputs have to be timed to leave out the others.
+TIMED = 0.3
 #: Sub-steps of a corrected simulator, at most, over the nominal one's.
 FINEST = 32
 #: How far a number may lie off, in a fold or with other numerics, as a share of it.
@@ -65,8 +68,17 @@ def fits_better(search: Search, key: Key, other: HostSimulator) -> bool:
     """Whether the chosen set fits clearly better on a simulator with inputs held otherwise."""
     fitter, fit = search.fitter, search.tried[key]
     again = fitter.fit(Model(other, fit.model.chosen), fit.theta)
-    gained = fit.merit - again.merit
-    return gained > max(CLEARER * fit.merit, fitter.tie(search.tried[()]))
+    timed = _timed(search)
+    gained = (fit.loss - again.loss)[timed].sum()
+    return bool(gained > max(CLEARER * fit.loss[timed].sum(), fitter.tie(search.tried[()])))
+
+
+def _timed(search: Search) -> NDArray[np.bool_]:
+    """Windows that tell how inputs are held, (W,): those in which all changes of them are timed, if
+    these are enough."""
+    fitter = search.fitter
+    timed = ~untimed_changes(fitter.samples, fitter.blocks.windows)
+    return timed if timed.mean() > TIMED else np.ones(len(timed), bool)
 
 
 def forecast_error(search: Search, key: Key) -> float:
@@ -109,7 +121,7 @@ def other_numerics(search: Search, key: Key, tie: float) -> list[Array]:
     flipped = held_otherwise(search.simulator)
     if flipped is not None:
         other = fitter.fit(Model(flipped, fit.model.chosen), fit.theta)
-        if other.merit - fit.merit < tie:
+        if (other.loss - fit.loss)[_timed(search)].sum() < tie:
             found.append(other.theta)
     return found
 

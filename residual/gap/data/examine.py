@@ -28,6 +28,7 @@ from residual.gap.data.inspection import (
     sums,
 )
 from residual.gap.data.kinematics import kinematics
+from residual.gap.data.lost_rows import timed_halfway
 from residual.gap.data.nominal import nominal
 from residual.gap.data.onset import begun_late
 from residual.gap.data.repeats import without_repeats
@@ -88,7 +89,8 @@ def examine(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> Exa
     runs = _without_faults(simulator, trajectories, useless)
     runs, scaled = kinematics(simulator, runs)
     runs, late = begun_late(simulator, runs)
-    return Examined(tuple(runs), (*found, *scaled, *late))
+    runs, untimed = timed_halfway(simulator, runs)
+    return Examined(tuple(runs), (*found, *scaled, *late, *untimed))
 
 
 def refuse_columns(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> None:

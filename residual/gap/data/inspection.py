@@ -89,8 +89,8 @@ def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list
                 most = max((most, *values[outside].tolist()), key=abs)
         if not beyond:
             continue
-        bounds = f"{low:g} to {high:g} {channel.unit}"
-        reaches = f"reaches {most:.4g} {channel.unit}, beyond the actuator's bounds of {bounds}"
+        bounds = f"{low:g} to {high:g}{channel.unit_text}"
+        reaches = f"reaches {most:.4g}{channel.unit_text}, beyond the actuator's bounds of {bounds}"
         size = max(abs(bound) for bound in (low, high) if np.isfinite(bound))
         if abs(most) > _FAR_BEYOND * size or beyond > 0.5 * total:
             few = beyond <= max(1, _FEW_WILD * total)
@@ -143,8 +143,8 @@ def still(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[
             moving += 1
             continue
         says = (
-            f"is {values[0]:g} {channel.unit} in all {len(values)} samples: not connected, frozen, "
-            "or at rest throughout; it is taken as not measured"
+            f"is {values[0]:g}{channel.unit_text} in all {len(values)} samples: not connected, "
+            "frozen, or at rest throughout; it is taken as not measured"
         )
         found.append(Finding("still", channel.name, says, {"value": values[0]}, "warning"))
     if not moving:
@@ -177,9 +177,9 @@ def clipped(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
             inside = np.concatenate([values[m] for values, m in zip(runs, masks, strict=True)])
             ends = " and ".join(f"{end:.4g}" for end in np.unique(inside))
             says = (
-                f"{len(rows)} samples stay at {ends} {channel.unit}, the end of all values, and "
-                f"come and go in full motion{_first(rows)}: a sensor at the end of its range, or a "
-                "stop. If the sensor, leave those cells empty: they count as measured here"
+                f"{len(rows)} samples stay at {ends}{channel.unit_text}, the end of all values, "
+                f"and come and go in full motion{_first(rows)}: a sensor at the end of its range, "
+                "or a stop. If the sensor, leave those cells empty: they count as measured here"
             )
             numbers = {"samples": len(rows)}
             found.append(Finding("clipped", channel.name, says, numbers, "warning", rows))
@@ -192,10 +192,9 @@ def rounded(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
     for channel, runs in measured(simulator, trajectories):
         step = rounding(runs)
         if step:
-            unit = "" if channel.unit == "1" else f" {channel.unit}"
             says = (
-                f"was rounded to steps of {step:.4g}{unit}, which alone is a noise of "
-                f"{step / np.sqrt(12):.2g}{unit}"
+                f"was rounded to steps of {step:.4g}{channel.unit_text}, which alone is a noise of "
+                f"{step / np.sqrt(12):.2g}{channel.unit_text}"
             )
             found.append(Finding("rounded", channel.name, says, {"step": step}))
     return found

@@ -41,8 +41,9 @@ def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[
         ]  # fmt: skip
         if near:
             says = (
-                f"has a size of {size:.3g} {channel.unit}, where {declared:.3g} {channel.unit} "
-                f"are declared: if it counts otherwise than read, set {' or '.join(near[:3])}"
+                f"has a size of {size:.3g}{channel.unit_text}, where "
+                f"{declared:.3g}{channel.unit_text} are declared: if it counts otherwise "
+                f"than read, set {' or '.join(near[:3])}"
             )
             found.append(Finding("size", channel.name, says, {"times": times}, "warning"))
     return found

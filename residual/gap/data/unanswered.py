@@ -121,10 +121,9 @@ def _cut_off(
             continue
         first = int(np.flatnonzero(beyond & asked)[0])
         at = _edge(values, response, carried, first, bound)
-        unit = "" if channel.unit == "1" else f" {channel.unit}"
         says = (
-            f"{simulator.name} stays the same whatever it is {side} {at:.3g}{unit}, as if it were "
-            f"cut off there (np.clip, minimum, maximum), and {count / len(values):.0%} of the "
+            f"makes no difference to {simulator.name} {side} {at:.3g}{channel.unit_text}, as if it "
+            f"were cut off there (np.clip, minimum, maximum), and {count / len(values):.0%} of the "
             "samples go beyond: unless the real system does so too, take that limit out of the "
             "simulator; gains and limits that are found make up for it"
         )
@@ -145,8 +144,8 @@ def _unused(
         if _answers(values, response, None, range_ / 2).any():
             return []
     says = (
-        f"{simulator.name} stays the same whatever it is, although it changes in the log: use it "
-        "in the simulator, or leave it there only for parameters that may change with it"
+        f"makes no difference to {simulator.name}, although it changes in the log: use it in the "
+        "simulator, or leave it there only for parameters that may change with it"
     )
     return [Finding("unused", channel.name, says, {}, "warning")]
 

@@ -55,9 +55,9 @@ def without_wild_inputs(
         values = [run.actions[mask, column] for run, mask in zip(runs, masks, strict=True)]
         most = max(np.concatenate(values), key=abs)
         says = (
-            f"reaches {most:.4g} {channel.unit} in {len(rows)} of {sum(map(len, masks))} samples "
-            f"(the first at {moment(rows[0][1])} of {rows[0][0]}), far beyond all others: no such "
-            "command can have been meant; cut there"
+            f"reaches {most:.4g}{channel.unit_text} in {len(rows)} of {sum(map(len, masks))} "
+            f"samples (the first at {moment(rows[0][1])} of {rows[0][0]}), far beyond all "
+            "others: no such command can have been meant; cut there"
         )
         numbers = {"samples": len(rows), "most": float(most)}
         found.append(Finding("wild", channel.name, says, numbers, "warning", rows))

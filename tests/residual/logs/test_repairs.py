@@ -38,7 +38,7 @@ def test_repeated_times_are_dropped(csv):
     data = read(csv(lambda lines: [*lines[:10], lines[9], lines[9], *lines[10:]]))
     assert len(data.trajectories[0].times) == 200
     (finding,) = [finding for finding in data.findings if finding.kind == "repeated"]
-    assert finding.says == ("2 samples repeat the time before them (first in row 11); dropped.")
+    assert finding.says == "2 samples are copies of the one before (first in row 11); dropped."
 
 
 @pytest.mark.parametrize(("rate", "decimals"), [(120, 2), (120, 3), (33, 2), (7, 1)])
@@ -52,6 +52,16 @@ def test_a_clock_rounded_in_print_is_evened(tmp_path, rate, decimals):
     assert np.abs(np.diff(run.times) * rate - 1).max() < 0.02
     assert np.abs(run.times - true["time"]).max() <= 10.0**-decimals
     assert np.array_equal(run.states[:, 0], np.unwrap(true["angle"]))
+
+
+@pytest.mark.parametrize("every", [1, 7])
+def test_rows_that_are_written_twice_are_no_rounded_clock(tmp_path, every):
+    once = swing()
+    rows = np.sort(np.concatenate([np.arange(200), np.arange(0, 200, every)]))
+    data = read(write(tmp_path / "log.csv", {name: v[rows] for name, v in once.items()}))
+    (run,) = data.trajectories
+    assert "repeated" in kinds(data) and "rounded_clock" not in kinds(data)
+    assert np.allclose(run.times, once["time"])
 
 
 def test_a_row_written_twice_is_no_rounded_clock(tmp_path):

@@ -47,6 +47,7 @@ OFFERED = (
 )  # fmt: skip
 
 
+@pytest.mark.long
 def test_friction_and_a_limit_are_no_certain_answer_where_a_curve_does_as_well(wound):
     found = simgap.find_gap(Spool(), [wound], effects=OFFERED)
     named = {v.effect: v for v in found.verdicts if v.kind in ("confirmed", "ambiguous")}

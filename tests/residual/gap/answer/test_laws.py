@@ -1,6 +1,7 @@
 """Two laws that come near a curve, beside what nothing explains, are not certain."""
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 from residual.gap import find_gap
@@ -51,6 +52,7 @@ def of_the_input(found):
     }
 
 
+@pytest.mark.long
 def test_laws_that_a_curve_would_beat_are_not_certain():
     found = find_gap(Fan(), [blown(lambda u: 8 * np.tanh(0.25 * u), 0)], effects=OFFERED)
     named = of_the_input(found)

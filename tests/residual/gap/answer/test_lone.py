@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from residual.gap import find_gap
-from residual.gap.answer.lone import Stretch
 from residual.gap.data import examine
+from residual.gap.data.stretch import Stretch
 from residual.trajectories import Trajectory
 from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
@@ -120,6 +120,7 @@ def test_where_alone_it_moves_is_told_as_such():
     found = find_gap(Servo(), [run], effects=["sensor_offset"])
     (said,) = [one.says for one in found.quality if "one stretch" in one.says]
     assert "of the motion lies there, too" in said
+    assert found.lone is not None and found.lone.run == "run" and found.lone.share > 0.5
 
 
 class Tank(FirstOrderSystem):

@@ -1,6 +1,7 @@
 """A state that settles follows its input: a law of the one is not taken for one of the other."""
 
 import numpy as np
+import pytest
 from plate import Plate
 
 from residual.gap import find_gap
@@ -36,6 +37,7 @@ OFFERED = (
 )  # fmt: skip
 
 
+@pytest.mark.long
 def test_what_holds_the_state_is_no_saturation_of_its_input():
     found = find_gap(Plate(), [fanned(0)], effects=OFFERED)
     named = {v.effect: v for v in found.verdicts if v.kind in ("confirmed", "ambiguous")}
