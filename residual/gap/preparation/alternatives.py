@@ -116,7 +116,7 @@ def _measured_joints(simulator: HostSimulator, samples: Samples) -> list[list[in
 
 
 def _exchanged(simulator: HostSimulator, joints: Sequence[Sequence[int]]) -> list[Convention]:
-    """Two columns of the same unit in each other's place: inputs, or joints with their rates."""
+    """Two columns in each other's place: inputs of the same unit, or joints with their rates."""
     found = []
     for channels, groups, field in (
         (simulator.physical_channels, joints, "states_from"),
@@ -127,7 +127,8 @@ def _exchanged(simulator: HostSimulator, joints: Sequence[Sequence[int]]) -> lis
         ),
     ):
         for one, other in itertools.combinations(groups, 2):
-            if not _alike(channels, one, other):
+            units = field == "inputs_from"
+            if not _alike(channels, one, other, units):
                 continue
             names = [" and ".join(channels[i].name for i in each) for each in (one, other)]
             plain = as_said(simulator)
@@ -137,9 +138,14 @@ def _exchanged(simulator: HostSimulator, joints: Sequence[Sequence[int]]) -> lis
     return found
 
 
-def _alike(channels: Sequence[Channel], one: Sequence[int], other: Sequence[int]) -> bool:
-    """Whether channels at some places are of the same units and kinds as those at others."""
-    first, second = ([(channels[i].unit, channels[i].kind) for i in each] for each in (one, other))
+def _alike(
+    channels: Sequence[Channel], one: Sequence[int], other: Sequence[int], units: bool = True
+) -> bool:
+    """Whether channels at some places are of the same kinds, and units, as those at others."""
+    first, second = (
+        [(channels[i].unit if units else "", channels[i].kind) for i in each]
+        for each in (one, other)
+    )
     return first == second
 
 

@@ -11,8 +11,8 @@ import pytest
 from residual.gap.preparation.conventions import otherwise
 from residual.gap.preparation.prepare import prepare
 from residual.trajectories import Trajectory
-from sims.effects import ActuatorGain, ActuatorLag, ConstantLoad
-from sims.equations import FirstOrderSystem
+from sims.effects import ActuatorGain, ActuatorLag, ConstantLoad, CoulombFriction, Delay
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.simulator import Channel, Parameter
 
 HEATERS = ("left heater", "right heater")
@@ -71,3 +71,41 @@ def test_exchanged_columns_are_told_and_honest_ones_not(effects):
     assert changes(dataclasses.replace(run, actions=run.actions[:, ::-1])) == (
         "the columns of left heater and of right heater exchanged (`column:` for each)",
     )
+
+
+class Crane(EquationOfMotion):
+    """A trolley, in m, with a load on a rope, in rad."""
+
+    dt = 0.05
+    substeps = 2
+    state_channels = (
+        Channel("trolley", "m", "position", scale=1.0),
+        Channel("trolley rate", "m/s", "rate", rate_of="trolley", scale=1.0),
+        Channel("swing", "rad", "position", scale=0.5),
+        Channel("swing rate", "rad/s", "rate", rate_of="swing", scale=1.0),
+    )
+    action_channels = (Channel("force", "N", "input", scale=10.0, low=-30.0, high=30.0),)
+    parameters: ClassVar = {"rope": Parameter(1.2, "m", "length of the rope", low=0.1)}
+
+    def acceleration(self, q, v, u, force, p):
+        pull = (u[:, 0] + force[:, 0] + 20.0 * q[:, 1]) / 5.0
+        return np.stack([pull, (force[:, 1] - pull - 9.81 * q[:, 1]) / p.rope], axis=1)
+
+
+@pytest.mark.parametrize(
+    "effects", [(), (CoulombFriction("trolley", 4.0),), (Delay("force", 0.1),)]
+)
+def test_columns_of_other_units_may_be_exchanged_too(effects):
+    rng, crane = np.random.default_rng(0), Crane(effects=effects)
+    force = np.repeat(rng.uniform(-20.0, 20.0, (1, 20, 1)), 15, axis=1)
+    seen = crane.rollout(crane.augment(np.zeros((1, 4))), force)[0, :, :4]
+    seen += rng.normal(0, 2e-3, seen.shape)
+    seen[:, [1, 3]] = np.nan
+    times = 0.05 * np.arange(len(seen))
+    for order, said in (
+        ([0, 1, 2, 3], ()),
+        ([2, 3, 0, 1], ("the columns of trolley and of swing exchanged (`column:` for each)",)),
+    ):
+        run = Trajectory("crane", times, seen[:, order], force[0])
+        found = otherwise(Crane(), prepare(Crane(), [run], 2.0).fitter)
+        assert (found.changes if found else ()) == said
