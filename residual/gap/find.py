@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from numbers import Real
@@ -18,7 +19,7 @@ from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.out_of_proportion import out_of_proportion
 from residual.gap.answer.records import stands_for, unlike
 from residual.gap.answer.table import lost
-from residual.gap.clock import Clock
+from residual.gap.clock import Clock, OutOfTime
 from residual.gap.confirmation.numerics import times_better
 from residual.gap.confirmation.swapped import swapped
 from residual.gap.fitting.contract import Fitter
@@ -35,10 +36,12 @@ from residual.gap.preparation.conventions import (
 )
 from residual.gap.preparation.horizon import other_length
 from residual.gap.preparation.numerics import held_as
+from residual.gap.read import Read
 from residual.gap.result import GapResult
-from residual.gap.row_late import Read, a_row_earlier
+from residual.gap.row_late import a_row_earlier
 from residual.gap.search.finals import on_more_windows
 from residual.gap.search.known import KNOWN
+from residual.gap.sensor_late import a_sensor_earlier
 from residual.logs import LogData
 from residual.logs.checks import Finding
 from residual.trajectories import Trajectory, trajectories_of
@@ -132,6 +135,9 @@ def find_gap(
         read = Read(log, prepared, found)
         if conventions is None:
             read = a_row_earlier(read, simulator, inquiry.explained, tell)
+        if conventions is None and not read.says:
+            with clock.once_more(), contextlib.suppress(OutOfTime):
+                read = a_sensor_earlier(read, simulator, inquiry.again, tell)
         log, prepared, found = read.log, read.prepared, read.found
         on_hold: list[str] = []
         if hold is None and not read.says:

@@ -14,37 +14,13 @@ import numpy as np
 
 from residual.gap.beside import Conventions
 from residual.gap.confirmation.certainty import CLEARLY
-from residual.gap.confirmation.numerics import forecast_error, in_spreads
-from residual.gap.fitting.validation import validate
-from residual.gap.log import Log
-from residual.gap.model.model import Model
+from residual.gap.confirmation.numerics import forecast_error
 from residual.gap.preparation.prepare import Prepared, prepare
+from residual.gap.read import BETTER, WORTH, Read, error_of
 from residual.gap.search.explain import Explanation
 from residual.trajectories import Trajectory
 from sims.effects.actuator import ActuatorLag, Delay
 from sims.host import HostSimulator
-
-#: Times that forecasts have to be better with inputs a row earlier to ask, and to say so.
-WORTH, BETTER = 1.1, 1.35
-
-
-@dataclasses.dataclass(frozen=True)
-class Read:
-    """A log as it was read, and what was found in it.
-
-    Attributes:
-        log: What was recorded.
-        prepared: Its windows.
-        found: What explains them.
-        says: What is to be said of how it was read.
-        conventions: What is to be looked at first.
-    """
-
-    log: Log
-    prepared: Prepared
-    found: Explanation
-    says: tuple[str, ...] = ()
-    conventions: Conventions | None = None
 
 
 def a_row_earlier(
@@ -73,7 +49,7 @@ def a_row_earlier(
         return read
     ready = prepare(nominal, earlier.runs, log.horizon)
     before = forecast_error(found.search, found.key)
-    if WORTH**2 * _error(ready, nominal, found) > before:
+    if WORTH**2 * error_of(ready, nominal, found) > before:
         return read
     tell("every input a row earlier fits better: once more so")
     again = explained(nominal, ready)
@@ -90,18 +66,6 @@ def a_row_earlier(
     names = " and ".join(channel.name for channel in nominal.action_channels)
     row = Conventions((names,), float(np.sqrt(before / after)), "row")
     return dataclasses.replace(read, conventions=row)
-
-
-def _error(ready: Prepared, nominal: HostSimulator, found: Explanation) -> float:
-    """Squared forecast error with what was found, or none of it, in units of the spread."""
-    fit = found.search.tried[found.key]
-    chosen, own = fit.model.chosen, fit.theta
-    errors = []
-    for members, theta in ((chosen, own), ((), own[:0])):
-        again = ready.fitter.fit(Model(nominal, members), theta)
-        squares = validate(ready.fitter, again).squares
-        errors.append(in_spreads(ready.fitter.samples, squares))
-    return min(errors)
 
 
 def _late_by_a_row(found: Explanation, runs: Sequence[Trajectory]) -> bool:

@@ -66,7 +66,7 @@ def kinematics(
         if abs(late) > least and abs(late - other) < 0.25 * abs(late):
             findings.append(_late(channel.rate_of, channel.name, late))
             behind = position if late > 0 else column
-            runs = [_earlier(run, behind, abs(late)) for run in runs]
+            runs = [earlier(run, behind, abs(late)) for run in runs]
     return runs, findings
 
 
@@ -196,7 +196,7 @@ def _multiplied(run: Trajectory, column: int, factor: float) -> Trajectory:
     return dataclasses.replace(run, states=states)
 
 
-def _earlier(run: Trajectory, column: int, seconds: float) -> Trajectory:
+def earlier(run: Trajectory, column: int, seconds: float) -> Trajectory:
     """The same with a channel as it is read so much later, straight from reading to reading; what
     lies beyond the last one, or in a gap of readings, is missing."""
     states = np.array(run.states, float)

@@ -8,6 +8,8 @@ from residual.gap.fitting.screening import gains
 from residual.gap.search.choice import choose
 from residual.gap.search.sets import Key, Proposals, Search
 
+#: Error with an effect that was lacking over that without, from which on none of them helps.
+HELPS = 0.95
 #: Sets that a new search begins with, and their error over that of the best.
 SEEDS, HOPEFUL = 12, 3.0
 
@@ -47,9 +49,7 @@ def brought(earlier: Search, key: Key, search: Search) -> Proposals:
 def add_what_it_lacked(earlier: Search, search: Search) -> None:
     """Fit what an earlier search chose, and what forecast best in it, with each effect that it
     lacked beside: a search is made again for these, and may not end before it comes to them."""
-    known = {candidate.effect for candidate in earlier.candidates}
-    screened = range(search.screened)
-    fresh = {number for number in screened if search.candidates[number].effect not in known}
+    fresh = _lacked(earlier, search)
     chosen = dict.fromkeys((choose(earlier).key, earlier.best()))
     own = [key for before in chosen for key in brought(earlier, before, search)]
     for key in own if fresh else ():
@@ -61,3 +61,21 @@ def add_what_it_lacked(earlier: Search, search: Search) -> None:
             if number in fresh:
                 more, theta = search.merged(key, [(number, gain.values[0])])
                 search.add({more: theta})
+
+
+def is_in_vain(earlier: Search, search: Search) -> bool:
+    """Whether nothing that an earlier search lacked helps beside what was found: the search that is
+    made for it has no need to grow sets."""
+    fresh = _lacked(earlier, search)
+    errors: dict[bool, float] = {True: np.inf, False: np.inf}
+    for key in search.usable():
+        new = not fresh.isdisjoint(key)
+        errors[new] = min(errors[new], search.error(key))
+    return bool(fresh) and errors[True] > HELPS * errors[False]
+
+
+def _lacked(earlier: Search, search: Search) -> set[int]:
+    """Candidates that an earlier search did not have."""
+    known = {candidate.effect for candidate in earlier.candidates}
+    screened = range(search.screened)
+    return {number for number in screened if search.candidates[number].effect not in known}

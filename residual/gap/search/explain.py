@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
+import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -18,7 +19,7 @@ from residual.gap.preparation.effort import Effort
 from residual.gap.search.beam import extend, improves, run
 from residual.gap.search.choice import Choice, choose
 from residual.gap.search.continuation import add_handed_over
-from residual.gap.search.earlier import add_what_it_lacked, carried, near_best
+from residual.gap.search.earlier import add_what_it_lacked, carried, is_in_vain, near_best
 from residual.gap.search.exchange import add_exchanged, add_pairs_exchanged
 from residual.gap.search.pairs import every_two
 from residual.gap.search.reasons import reasons
@@ -140,6 +141,8 @@ def explain(
                 search.add(carried(earlier, search))
                 add_what_it_lacked(earlier, search)
             search.add(curves_in_place(search, near_best(search)))
+            if earlier is not None and is_in_vain(earlier, search):
+                until = search.until = time.process_time()
         run(search, seeds, functools.partial(_quiet, search, floor))
         in_pairs = every_pair and not (seeds or simulator.has_contacts)
         if in_pairs and not _quiet(search, floor, search.best()):

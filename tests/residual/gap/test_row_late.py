@@ -69,7 +69,7 @@ def answers(monkeypatch, before, after, adequate=False, effects=()):
     )
     errors = {"said": before, "earlier": after}
     monkeypatch.setattr(row_late, "forecast_error", lambda search, key: errors[search.name])
-    monkeypatch.setattr(row_late, "_error", lambda *given: after)
+    monkeypatch.setattr(row_late, "error_of", lambda *given: after)
     monkeypatch.setattr(row_late, "prepare", lambda *given: "ready")
     log = SimpleNamespace(runs=(record(True),), recorded=(record(True),), apart=(), horizon=1.0)
     monkeypatch.setattr(row_late.dataclasses, "replace", replaced)
