@@ -22,6 +22,8 @@ LOST, MOST = 1.5, 10.0
 FEW = 0.1
 #: Part of the steps from one row to the next in which a command that is held stays as it is.
 HELD = 0.5
+#: Part of a command's range by which it changes at once where that matters.
+MUCH = 0.1
 #: Usual steps up to which a change has a time.
 TIMED = 1.25
 
@@ -48,9 +50,10 @@ def timed_halfway(
     if simulator.has_contacts or not lost.any() or lost.mean() > FEW:
         return runs, []
     held = np.mean([_stays(run, usual) for run in runs], axis=0) > HELD
+    least = MUCH * np.ptp(np.concatenate([run.actions for run in runs]), axis=0)
     found, total = np.zeros(len(held), int), np.zeros(len(held), int)
     for number, run in enumerate(runs):
-        changes = (np.diff(run.actions, axis=0) != 0) & held
+        changes = (np.abs(np.diff(run.actions, axis=0)) > least) & held
         gaps = run.durations[:-1]
         untimed = changes & ((gaps > LOST * usual) & (gaps < MOST * usual))[:, None]
         total, found = total + changes.sum(axis=0), found + untimed.sum(axis=0)
