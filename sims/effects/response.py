@@ -10,14 +10,16 @@ import numpy as np
 
 from sims.effects.base import Effect, number, place
 from sims.effects.joint import Value
+from sims.effects.pull import pulled_by_position
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
+    from sims.simulator import Joint
 
 
 @dataclasses.dataclass(frozen=True)
 class AsymmetricResponse(Effect):
-    """On its way back the state x of a first-order system changes ``1 + back`` times as fast.
+    """On its way back a state changes ``1 + back`` times as fast.
 
     A speed is on its way back while it slows down, anything else while it falls: a motor that
     coasts and is driven up, a propeller, a tank or a cylinder that empties by another opening than
@@ -25,7 +27,8 @@ class AsymmetricResponse(Effect):
     for either way (``timeConstantUp`` and ``timeConstantDown`` of Furrer, Burri, Achtelik and
     Siegwart, "RotorS - A modular Gazebo MAV simulator framework", 2016).
 
-    Hosted by ``FirstOrderSystem``.
+    Hosted by ``FirstOrderSystem``, and by ``EquationOfMotion`` for the speed of a joint that moves
+    alike wherever it is, and moves no other one: a wheel of which the angle is read.
     """
 
     joint: str
@@ -44,8 +47,15 @@ class AsymmetricResponse(Effect):
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of the rate of change."""
         joint = place("joint", self.joint, {joint.name: joint for joint in simulator.joints})
-        if not (simulator.written_out and joint.first_order):
+        if not (simulator.written_out and (joint.first_order or _is_a_wheel(simulator, joint))):
             raise ValueError(
-                f"{self.name} needs a state of a FirstOrderSystem; {self.joint!r} is none"
+                f"{self.name} needs a state of a FirstOrderSystem, or a joint that moves alike "
+                f"wherever it is and moves no other one; {self.joint!r} is none"
             )
         return {"force": (joint.unit, simulator.force_scale(joint))}
+
+
+def _is_a_wheel(simulator: HostSimulator, joint: Joint) -> bool:
+    """Whether nothing pulls a joint by where it is, and it moves no other one."""
+    alone = simulator.coupled_inertia(joint) is None
+    return alone and not pulled_by_position(simulator, joint.name)

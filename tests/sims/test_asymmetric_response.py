@@ -8,7 +8,7 @@ import pytest
 from sims.checks import check_simulator
 from sims.effects import AsymmetricResponse, CoulombFriction
 from sims.effects.library import further_in
-from sims.equations import FirstOrderSystem
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel
 
@@ -58,7 +58,34 @@ def test_rows_have_a_pace_of_their_own_and_none_changes_no_bit():
     assert "failed" not in repr(check_simulator(plain.with_effects([AsymmetricResponse("x", 0.4)])))
 
 
-def test_it_is_for_states_of_first_order():
+class Wheel(EquationOfMotion):
+    """A wheel whose angle is read, and which follows its input as a speed does."""
+
+    dt = 0.02
+    state_channels = (
+        Channel("angle", "rad", "position", scale=10.0),
+        Channel("speed", "rad/s", "rate", rate_of="angle", scale=20.0),
+    )
+    action_channels = (Channel("input", "V", "input", scale=10.0),)
+
+    def acceleration(self, q, v, u, force, p):
+        return (GAIN * u - v) / TAU + force
+
+
+@pytest.mark.parametrize(("start", "end", "slow"), [(0, 8, 0), (20, 5, 1), (-20, -5, 1)])
+def test_a_wheel_whose_angle_is_read_slows_down_slower(start, end, slow):
+    wheel = Wheel(effects=[AsymmetricResponse("angle", BACK)])
+    path = wheel.rollout([0.0, float(start)], np.full((30, 1), end / GAIN))
+    times, tau = 0.02 * np.arange(31), TAU / (1 + BACK) if slow else TAU
+    fading = (start - end) * np.exp(-times / tau)
+    assert path[:, 1] == pytest.approx(end + fading, abs=1e-6)
+    turned = end * times + tau * (start - end) * (1 - np.exp(-times / tau))
+    assert path[:, 0] == pytest.approx(turned, abs=1e-6)
+    assert "failed" not in repr(check_simulator(wheel))
+    assert "asymmetric_response@angle" in map(str, further_in(Wheel()))
+
+
+def test_it_is_for_states_of_first_order_and_wheels():
     assert "asymmetric_response@x" in map(str, further_in(follower("other", "degC")))
     with pytest.raises(ValueError, match="needs a state of a FirstOrderSystem"):
         PendulumEquation(effects=[AsymmetricResponse("pivot", 0.4)])

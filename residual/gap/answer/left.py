@@ -19,8 +19,8 @@ from sims.effects.base import Effect
 from sims.effects.flexible import FlexiblePart
 
 #: Part of the squared forecast error of the library's laws, less what noise makes, that further
-#: effects may leave.
-QUARTER = 0.25
+#: effects may leave; where they stand for more effects than they are.
+QUARTER, OF_MORE = 0.25, 0.5
 #: Part of what is left beyond noise that a rarer effect has to take off in the linear picture.
 HALF = 0.5
 #: Loss over that of one of its family, up to which an effect fits about as well.
@@ -96,8 +96,8 @@ def beside_noise(answer: Answer, key: Key) -> tuple[float, float]:
 
 
 def takes_what_is_left(second: Answer, first: Answer, more: Sequence[Effect]) -> bool:
-    """Whether further effects were named and take most of what the library left beside noise, or
-    stand for three of it and more, and forecast no worse.
+    """Whether further effects were named and take most of what the library left beside noise, half
+    of it where they stand for more than they are, or stand for three and forecast no worse.
 
     Args:
         second: What was found with them on offer, too; ``first``: without.
@@ -108,9 +108,11 @@ def takes_what_is_left(second: Answer, first: Answer, more: Sequence[Effect]) ->
         return False
     left, least = beside_noise(first, first.key)
     now = search.currency.error(again.validated[second.key].squares) ** 2
-    if len(first.key) - len(second.key) >= FEWER and now <= left:
+    fewer = len(first.key) - len(second.key)
+    if fewer >= FEWER and now <= left:
         return True
-    return now - least < QUARTER * (left - least) and better(second, first)
+    most = OF_MORE if fewer > 0 else QUARTER
+    return now - least < most * (left - least) and better(second, first)
 
 
 def takes_most_by_itself(answer: Answer, more: Sequence[Effect]) -> bool:
