@@ -52,7 +52,7 @@ def kinematics(
         # Two rules that disagree say that the sampling is too coarse for this check.
         agree = abs(scale - other) < 0.25 * abs(scale - 1)
         clear = abs(scale - 1) > max(4 * error, 0.005)
-        if agree and clear and not seen.by_zero(scale, error):
+        if agree and clear and not (seen.by_zero(scale, error) or seen.by_noise):
             says = (
                 f"changes {scale:.4f} times as much as the integral of {channel.name}: "
                 f"{channel.name} was multiplied by {scale:.4f}; if it is {channel.rate_of} that "
@@ -126,6 +126,15 @@ class _Stretches:
         step = float(np.median([np.median(run.durations) for run in runs]))
         moved, integral, roughly, faster = np.array(rows).T
         return cls(moved, integral, roughly, faster, of_x, of_v, step)
+
+    @property
+    def by_noise(self) -> bool:
+        """Whether both may be on one scale, if all that scatters is noise of one of them: how much
+        each has is told by what is rough, which a filter takes out, and coloured noise is not."""
+        y, z = self.moved, self.integral
+        both = float(y @ z)
+        low, high = both / max(float(z @ z), 1e-300), float(y @ y) / (both or 1e-300)
+        return low <= 1.0 <= high
 
     def by_zero(self, scale: float, error: float) -> bool:
         """Whether a scale is that of a rate whose zero is off, so that another one is found of how
