@@ -51,6 +51,7 @@ def slides(share, level, rows=240, count=3):
         yield Trajectory(f"run {number}", 0.02 * np.arange(rows), states, force[:-1, None])
 
 
+@pytest.mark.long
 def test_a_screw_that_wastes_a_share_of_what_it_carries_is_named():
     told: list[str] = []
     result = find_gap(Slide(), list(slides(0.25, 0.0)), progress=told.append)

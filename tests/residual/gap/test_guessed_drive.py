@@ -72,6 +72,7 @@ def log(seed):
     return Trajectory("run", DT * np.arange(len(seen)), seen, commands[:, None])
 
 
+@pytest.mark.long
 def test_a_search_that_explains_little_tries_all_three(monkeypatch):
     monkeypatch.setattr(beam, "FOUND", 0.0)  # whatever two of them explain
     names = ("actuator_gain@pwm", "dead_zone@pwm", "slow")

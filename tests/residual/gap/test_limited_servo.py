@@ -22,6 +22,7 @@ def log(seed, slow=SLOW, level=np.inf, late=0.0):
     return Trajectory("servo", DT * np.arange(len(angles)), seen[:, None], commands[:, None])
 
 
+@pytest.mark.long
 def test_a_limit_and_a_delay_are_named_with_their_numbers():
     found = find_gap(SlowServo(), [log(0, level=200.0, late=0.04)])
     named = {verdict.effect: verdict for verdict in found.verdicts if verdict.parameters}

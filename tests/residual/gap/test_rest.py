@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
@@ -31,6 +32,7 @@ def kicked_and_left_alone(load: float) -> list[Trajectory]:
     return logs
 
 
+@pytest.mark.long
 def test_a_gap_of_short_motions_is_named_amid_long_rest():
     result = find_gap(PendulumEquation(), kicked_and_left_alone(0.0006), effects=OFFERED)
     first = result.verdicts[0]

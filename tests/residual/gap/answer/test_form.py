@@ -20,7 +20,7 @@ def friction(effects, **hidden):
     ("effect", "hidden"),
     [
         ("viscous_friction", {"drag": 0.025}),
-        ("quadratic_drag", {"damping": lambda place: 1.04}),
+        pytest.param("quadratic_drag", {"damping": lambda place: 1.04}, marks=pytest.mark.long),
     ],
 )
 def test_a_form_that_the_data_reject_is_undecided(effect, hidden):
@@ -33,7 +33,7 @@ def test_a_form_that_the_data_reject_is_undecided(effect, hidden):
     ("effect", "hidden"),
     [
         ("quadratic_drag", {"drag": 0.025}),
-        ("viscous_friction", {"damping": lambda place: 1.04}),
+        pytest.param("viscous_friction", {"damping": lambda place: 1.04}, marks=pytest.mark.long),
     ],
 )
 def test_the_true_form_is_decided(effect, hidden):

@@ -62,6 +62,7 @@ def test_laws_that_a_curve_would_beat_are_not_certain():
         assert "symmetric_input_curve@torque" in alternatives
 
 
+@pytest.mark.long
 def test_a_law_that_is_the_true_one_stays_certain():
     named = of_the_input(find_gap(Fan(), [blown(lambda u: 1.4 * u, 0)], effects=OFFERED))
     kind, alternatives = named["actuator_gain"]

@@ -57,6 +57,7 @@ def test_the_answer_says_so(payloads):
     assert days == sorted(days)
 
 
+@pytest.mark.long
 def test_what_is_the_same_in_all_records_is_named_beside_what_differs():
     truths = [Truth(viscous_friction=2e-4, constant_load=sign * 1e-3) for sign in (1, -1, 1, -1)]
     found = ask(logs(*truths))

@@ -58,6 +58,7 @@ def motor(seed, by_degree, ripple=0.0):
     return Trajectory(f"run {seed}", DT * np.arange(ROWS), seen, volts[:-1, None])
 
 
+@pytest.mark.long
 def test_a_resistance_that_rises_as_it_warms_is_confirmed_at_its_size():
     result = find_gap(Motor(), [motor(seed, 0.0039) for seed in (1, 2)], effects=ASKED)
     (curve,) = [effect for effect in result.effects if isinstance(effect, ParameterCurve)]

@@ -51,6 +51,7 @@ class Head(FirstOrderSystem):
         return 8.0 * u - x + self.spin * x[:, ::-1] * np.array([1.0, -1.0])
 
 
+@pytest.mark.long
 def test_a_wheel_that_spins_inside_is_hinted_at_however_far_beyond_noise_it_is():
     true, rng = Head(), np.random.default_rng(0)
     true.spin = 5.0

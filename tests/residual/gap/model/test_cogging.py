@@ -1,6 +1,7 @@
 """What shows less than a period is no cogging, and a spring may be two plainer effects."""
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 from residual.gap import find_gap
@@ -95,6 +96,7 @@ def shaft(orders):
     return Trajectory("run", DT * np.arange(len(states)), states, torque)
 
 
+@pytest.mark.long
 def test_several_orders_together_are_not_certain():
     """They fit whatever follows the position, as a wind or a path of its own does."""
     for orders, kind in (((3,), "confirmed"), ((3, 5), "ambiguous")):

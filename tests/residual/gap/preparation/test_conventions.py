@@ -111,7 +111,7 @@ def test_zeros_on_which_nothing_depends_are_no_other_convention():
     assert set(found.changes) == {"`scale: -1` for voltage", "`scale: -1` for angle and rate"}
 
 
-@pytest.mark.parametrize("factor", [-1.0, 1000.0])
+@pytest.mark.parametrize("factor", [-1.0, pytest.param(1000.0, marks=pytest.mark.long)])
 def test_nothing_is_certain_before_it_is_seen_how_the_log_counts(factor):
     run = log((CoulombFriction("pivot", 0.003),))
     offered = ["coulomb_friction@pivot"]
