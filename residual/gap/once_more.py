@@ -145,13 +145,18 @@ class OnceMore(OtherWindows):
         fitter = known.prepared.fitter
         if found.answer is not known.answer:
             return found
-        known = dataclasses.replace(known, says=found.says)
-        if not asked or self._late() or self.log.by_user:
+        known = dataclasses.replace(known, says=found.says, unasked=found.unasked)
+        if not asked or self.log.by_user:
             return known
         if not isinstance(fitter, SmoothFitter) or fitter.samples.stride == 1:
             return known
+        if self._late():
+            return known.lacks_time(part)
         horizon, what = self.log.horizon / fitter.samples.stride, f"short forecasts, with {part}"
-        ready, answer = self.over(known, horizon, what, [*_curves(known), *parts])
+        try:
+            ready, answer = self.over(known, horizon, what, [*_curves(known), *parts])
+        except OutOfTime:
+            return known.lacks_time(part)
         if not (takes_most_by_itself(answer, parts) and still_names(answer, known.answer)):
             return known
         says = (
