@@ -180,9 +180,12 @@ class Inquiry:
         beside: Sequence[Candidate],
         more: Sequence[Effect] = (),
     ) -> Answer:
-        """What is found in the same windows with parameters free, or with more on offer."""
+        """What is found in the same windows with parameters free, or with more on offer; how sure
+        it is only if it has some of that."""
         search = known.answer.found.search
         again = self.explained(search.simulator, known.prepared, beside, search, more)
+        if more and not {str(one) for one in more}.intersection(again.search.labels(again.key)):
+            return Answer(again, again.key, (), ())
         return confirm(again, self.offered.groups, True, tolerance, self.clock.confirm_until)
 
     def untried(self, answer: Answer) -> list[str]:

@@ -92,8 +92,8 @@ class OnceMore(OtherWindows):
             return dataclasses.replace(found, answer=beside_their_kind(answer, further))
         beside = beside_further(answer, second, further, self._late)
         named = set(second.found.search.labels(second.key))
-        if better(second, answer):
-            of_these = [effect for effect in further if str(effect) in named]
+        of_these = [effect for effect in further if str(effect) in named]
+        if of_these and better(second, answer):
             beside = beside_their_kind(beside, of_these)
         return dataclasses.replace(found, answer=beside)
 

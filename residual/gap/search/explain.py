@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
-import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -142,7 +141,7 @@ def explain(
                 add_what_it_lacked(earlier, search)
             search.add(curves_in_place(search, near_best(search)))
             if earlier is not None and is_in_vain(earlier, search):
-                until = search.until = time.process_time()
+                return settle(search, floor, exchanges=0)
         run(search, seeds, functools.partial(_quiet, search, floor))
         in_pairs = every_pair and not (seeds or simulator.has_contacts)
         if in_pairs and not _quiet(search, floor, search.best()):
@@ -163,7 +162,9 @@ def explain(
     return settle(search, floor, earlier is not None)
 
 
-def settle(search: Search, floor: Noise, again: bool = False) -> Explanation:
+def settle(
+    search: Search, floor: Noise, again: bool = False, exchanges: int = EXCHANGES
+) -> Explanation:
     """The final choice, after everything chosen has met its rivals.
 
     Args:
@@ -171,6 +172,7 @@ def settle(search: Search, floor: Noise, again: bool = False) -> Explanation:
         floor: Noise around the best of it.
         again: Whether, though time is over, what is chosen in place of a first choice meets its
             rivals, too: a later search may come to what it is made for at the end.
+        exchanges: Rounds of that, at most; none where nothing new is to be chosen.
     """
     fitter = search.fitter
     nominal_left = fitter.left(search.nominal, floor)
@@ -182,7 +184,7 @@ def settle(search: Search, floor: Noise, again: bool = False) -> Explanation:
         )
 
     choice = choose(search, enough)
-    for turn in range(EXCHANGES):
+    for turn in range(exchanges):
         likeliest = min(search.usable(), key=lambda k: score(search, k))
         best = {(), choice.key, search.best(), likeliest}
         quiet = [k for k in best if _quiet(search, floor, k)]
