@@ -137,7 +137,7 @@ def find_gap(
             read = a_row_earlier(read, simulator, inquiry.explained, tell)
         if conventions is None and not read.says:
             with clock.once_more(), contextlib.suppress(OutOfTime):
-                read = a_sensor_earlier(read, simulator, inquiry.again, tell)
+                read = a_sensor_earlier(read, simulator, inquiry.explained, tell)
         log, prepared, found = read.log, read.prepared, read.found
         on_hold: list[str] = []
         if hold is None and not read.says:

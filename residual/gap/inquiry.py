@@ -75,10 +75,6 @@ class Inquiry:
                 twins, every_pair=earlier is None and not more,
             )  # fmt: skip
 
-    def again(self, simulator: HostSimulator, ready: Prepared, earlier: Search) -> Explanation:
-        """The same of a log that is read otherwise, from what a search of it as it was found."""
-        return self.explained(simulator, ready, earlier=earlier)
-
     def other_hold(
         self, log: Log, prepared: Prepared, found: Explanation
     ) -> tuple[Prepared, Explanation, list[str]]:

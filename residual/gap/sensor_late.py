@@ -10,17 +10,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from residual.gap.confirmation.numerics import forecast_error
 from residual.gap.data.kinematics import earlier
 from residual.gap.log import Log
 from residual.gap.model.model import Model
+from residual.gap.preparation.alternatives import measured_joints
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.read import BETTER, WORTH, Read, error_of
 from residual.gap.search.explain import Explanation
-from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
 
@@ -31,7 +28,7 @@ SAMPLES, FINER = (2.0, 4.0, 8.0), (1.4, 1.2, 1.1)
 def a_sensor_earlier(
     read: Read,
     nominal: HostSimulator,
-    explained: Callable[[HostSimulator, Prepared, Search], Explanation],
+    explained: Callable[..., Explanation],
     tell: Callable[[str], None],
 ) -> Read:
     """The same, or the log with one sensor read earlier, if that clearly explains it better.
@@ -39,11 +36,11 @@ def a_sensor_earlier(
     Args:
         read: The log as it is said to be.
         nominal: The simulator with its inputs held as they are said to be.
-        explained: Searches, from what an earlier search found.
+        explained: Searches, ``earlier``: from what an earlier search found.
         tell: Progress.
     """
     found = read.found
-    joints = _measured_joints(nominal, found.search.fitter.samples.measured)
+    joints = measured_joints(nominal, found.search.fitter.samples)
     if found.adequate or found.search.late or nominal.has_contacts or len(joints) < 2:
         return read
     before = forecast_error(found.search, found.key)
@@ -54,7 +51,7 @@ def a_sensor_earlier(
 
     def once_more(way: _Way, earlier: Explanation) -> Explanation:
         tell(f"{name} read {way.seconds:.2g} s earlier fits better: once more so")
-        return explained(nominal, way.ready, earlier.search)
+        return explained(nominal, way.ready, earlier=earlier.search)
 
     again = once_more(way, found)
     way = _finer(read.log, nominal, way, again)
@@ -101,8 +98,7 @@ def _best(
 
     A longer time is tried where the one before it does better.
     """
-    recorded = read.found.search.fitter.samples.recorded
-    step = float(np.median(np.concatenate([one.durations for one in recorded])))
+    step = read.found.search.fitter.samples.recorded_step
     best = None
     for joint in joints:
         before = WORTH**2 * least
@@ -133,16 +129,6 @@ def _finer(log: Log, nominal: HostSimulator, way: _Way, found: Explanation) -> _
             if (its := loss(near)) < least:
                 way, least = near, its
     return way
-
-
-def _measured_joints(nominal: HostSimulator, measured: NDArray[np.int64]) -> list[list[int]]:
-    """Places of what was measured, each with its rates."""
-    channels, there = nominal.physical_channels, set(measured.tolist())
-    names = {channels[i].name: i for i in there}
-    groups = {i: [i] for i in sorted(there) if channels[i].rate_of not in names}
-    for i in sorted(there - set(groups)):
-        groups.setdefault(names[str(channels[i].rate_of)], []).append(i)
-    return list(groups.values())
 
 
 def _earlier(log: Log, joint: Sequence[int], seconds: float) -> Log:

@@ -35,8 +35,8 @@ def untimed(search: Search, number: int, values: Array) -> bool:
     times = [abs(v) for k, v in zip(candidate.knobs, values, strict=True) if k.unit == "s" and v]
     if candidate.effect.enters != "actuator" or not times:
         return False
-    runs = search.fitter.samples.recorded
-    clock = float(np.median(np.concatenate([run.durations for run in runs])))
+    samples = search.fitter.samples
+    runs, clock = samples.recorded, samples.recorded_step
     inputs = {channel.name: j for j, channel in enumerate(search.simulator.action_channels)}
     acting = [inputs[name] for name in getattr(candidate.effect, "actuators", ())]
     changes = any(np.ptp(run.actions[:, acting], axis=0).any() for run in runs)

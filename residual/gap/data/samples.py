@@ -154,6 +154,11 @@ class Samples:
         return float(np.median(self.durations))
 
     @property
+    def recorded_step(self) -> float:
+        """Usual seconds between two recorded samples."""
+        return float(np.median(np.concatenate([one.durations for one in self.recorded])))
+
+    @property
     def recorded_substeps(self) -> int:
         """Sub-steps of a recorded interval."""
         return max(1, self.substeps // self.stride)

@@ -59,7 +59,7 @@ def conventions(
         found += _thousandfold(simulator, place)
         found += _as_a_share(simulator, place, samples.actions[:, place])
     found += _before_a_gear(simulator, samples)
-    joints = _measured_joints(simulator, samples)
+    joints = measured_joints(simulator, samples)
     for seen in joints:
         found += _turned(simulator, seen) + _in_other_units(simulator, seen)
         for says, unit in misread(simulator.physical_channels[seen[0]], converted):
@@ -78,8 +78,7 @@ def _of_the_clock(
 
     A measured rate counts as it is, or it was put on the scale of a position whose clock was wrong.
     """
-    period = float(np.median(np.concatenate([run.durations for run in samples.recorded])))
-    rare = period / simulator.dt
+    rare = samples.recorded_step / simulator.dt
     slips = [n for n in SLIPS for ratio in (rare, 1 / rare) if abs(ratio / n - 1) < SLIPPED]
     also = f" (`period: {simulator.dt:g}` of a log without times)" if slips else ""
     found = []
@@ -102,7 +101,7 @@ def _units_of_time(rare: float) -> list[float]:
     return [f for n in TIMES for f in (n, 1 / n) if 1 / FAR < rare * f < FAR]
 
 
-def _measured_joints(simulator: HostSimulator, samples: Samples) -> list[list[int]]:
+def measured_joints(simulator: HostSimulator, samples: Samples) -> list[list[int]]:
     """Every position with its rates, as far as they were measured."""
     channels = simulator.physical_channels
     measured = set(samples.measured.tolist())

@@ -7,12 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from hanging import Crane
 
 from residual.gap.preparation.conventions import otherwise
 from residual.gap.preparation.prepare import prepare
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorGain, ActuatorLag, ConstantLoad, CoulombFriction, Delay
-from sims.equations import EquationOfMotion, FirstOrderSystem
+from sims.equations import FirstOrderSystem
 from sims.simulator import Channel, Parameter
 
 HEATERS = ("left heater", "right heater")
@@ -71,25 +72,6 @@ def test_exchanged_columns_are_told_and_honest_ones_not(effects):
     assert changes(dataclasses.replace(run, actions=run.actions[:, ::-1])) == (
         "the columns of left heater and of right heater exchanged (`column:` for each)",
     )
-
-
-class Crane(EquationOfMotion):
-    """A trolley, in m, with a load on a rope, in rad."""
-
-    dt = 0.05
-    substeps = 2
-    state_channels = (
-        Channel("trolley", "m", "position", scale=1.0),
-        Channel("trolley rate", "m/s", "rate", rate_of="trolley", scale=1.0),
-        Channel("swing", "rad", "position", scale=0.5),
-        Channel("swing rate", "rad/s", "rate", rate_of="swing", scale=1.0),
-    )
-    action_channels = (Channel("force", "N", "input", scale=10.0, low=-30.0, high=30.0),)
-    parameters: ClassVar = {"rope": Parameter(1.2, "m", "length of the rope", low=0.1)}
-
-    def acceleration(self, q, v, u, force, p):
-        pull = (u[:, 0] + force[:, 0] + 20.0 * q[:, 1]) / 5.0
-        return np.stack([pull, (force[:, 1] - pull - 9.81 * q[:, 1]) / p.rope], axis=1)
 
 
 @pytest.mark.parametrize(
