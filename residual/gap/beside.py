@@ -35,12 +35,13 @@ class Conventions:
         reason: ``"forecasts"`` are far better so, or with the ``"zero"`` of an angle elsewhere; an
             input would be turned round by what was found (``"sign"``); a channel is far beyond the
             ``"scale"`` that it declares; what is found with every input a ``"row"`` earlier
-            forecasts better; or a channel may hold the ``"size"`` of a speed alone.
+            forecasts better, or what is ``"found"`` with the change; or a channel may hold the
+            ``"size"`` of a speed alone.
     """
 
     changes: tuple[str, ...]
     times: float
-    reason: Literal["forecasts", "zero", "sign", "scale", "row", "size"] = "forecasts"
+    reason: Literal["forecasts", "zero", "sign", "scale", "row", "found", "size"] = "forecasts"
 
 
 @dataclasses.dataclass(frozen=True)

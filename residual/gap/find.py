@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from numbers import Real
@@ -19,7 +18,7 @@ from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.out_of_proportion import out_of_proportion
 from residual.gap.answer.records import stands_for, unlike
 from residual.gap.answer.table import lost
-from residual.gap.clock import Clock, OutOfTime
+from residual.gap.clock import Clock
 from residual.gap.confirmation.numerics import times_better
 from residual.gap.confirmation.swapped import swapped
 from residual.gap.fitting.contract import Fitter
@@ -36,12 +35,11 @@ from residual.gap.preparation.conventions import (
 )
 from residual.gap.preparation.horizon import other_length
 from residual.gap.preparation.numerics import held_as
-from residual.gap.read import Read
+from residual.gap.readings.otherwise import read_otherwise
+from residual.gap.readings.read import Asked, Read
 from residual.gap.result import GapResult
-from residual.gap.row_late import a_row_earlier
 from residual.gap.search.finals import on_more_windows
 from residual.gap.search.known import KNOWN
-from residual.gap.sensor_late import a_sensor_earlier
 from residual.logs import LogData
 from residual.logs.checks import Finding
 from residual.trajectories import Trajectory, trajectories_of
@@ -132,18 +130,11 @@ def find_gap(
             tell(f"does the log count otherwise, by {' or '.join(conventions.changes)}?")
 
         found = inquiry.explained(simulator, prepared)
-        read = Read(log, prepared, found)
-        if conventions is None:
-            read = a_row_earlier(read, simulator, inquiry.explained, tell)
-        if conventions is None and not read.says:
-            with clock.once_more(), contextlib.suppress(OutOfTime):
-                read = a_sensor_earlier(read, simulator, inquiry.explained, tell)
+        read = Read(log, prepared, found, conventions=conventions)
+        asks = Asked(simulator, inquiry.explained, tell)
+        read = read_otherwise(read, asks, clock, hold_is_known=hold is not None)
         log, prepared, found = read.log, read.prepared, read.found
-        on_hold: list[str] = []
-        if hold is None and not read.says:
-            prepared, found, on_hold = inquiry.other_hold(log, prepared, found)
-        conventions = conventions or (None if on_hold else read.conventions)
-        log, prepared, found, on_rest = inquiry.begun_from_rest(log, prepared, found)
+        conventions = read.conventions
         with clock.besides():
             prepared, found, on_more = on_more_windows(prepared, found, clock.confirm_until, tell)
         chosen = [found.search.candidates[number].effect for number in found.key]
@@ -165,7 +156,8 @@ def find_gap(
 
         table, judged = summed_up(answer), NOT_JUDGED
         if log.apart:
-            judged = judged_apart(answer, known.prepared, log.apart, table, rested=bool(on_rest))
+            rested = any(run.before is not None for run in log.runs)
+            judged = judged_apart(answer, known.prepared, log.apart, table, rested)
         either = swapped(answer.found.search, answer.key)
         answer = replace(
             answer,
@@ -184,7 +176,7 @@ def find_gap(
         )
         clock.lap("forecast")
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
-    says = [*log.left_out, *other, *on_hold, *read.says, *on_rest, *on_more, *known.says]
+    says = [*log.left_out, *other, *read.says, *on_more, *known.says]
     says += [*_searched(answer.found.search.fitter), *inquiry.untried(answer)]
     says += [*lost(answer.found.search, table), *out_of_proportion(answer)]
     quality = (*log.findings, *(Finding("search", "", one) for one in says))

@@ -8,9 +8,6 @@ from collections.abc import Callable, Sequence
 from residual.gap.answer.confirmed import Answer, confirm
 from residual.gap.answer.curves import over_the_log
 from residual.gap.clock import Clock, seldom
-from residual.gap.confirmation.certainty import CLEARLY
-from residual.gap.confirmation.numerics import fits_better, forecast_error
-from residual.gap.confirmation.rest import fits_better_from_rest
 from residual.gap.confirmation.twins import exact_twins, with_twins
 from residual.gap.confirmed import Confirmed
 from residual.gap.fitting.smooth import LEAD, SmoothFitter
@@ -18,7 +15,6 @@ from residual.gap.log import Log
 from residual.gap.model.candidates import Candidate, candidates, one_way
 from residual.gap.offered import Offered
 from residual.gap.once_more import OnceMore
-from residual.gap.preparation.numerics import held_otherwise, how_held
 from residual.gap.preparation.prepare import Prepared, finely, prepare
 from residual.gap.search.explain import Explanation, explain
 from residual.gap.search.sets import Search
@@ -74,63 +70,6 @@ class Inquiry:
                 self.clock.checked(seldom(self.tell)), self.clock.search_until, beside, earlier,
                 twins, every_pair=earlier is None and not more,
             )  # fmt: skip
-
-    def other_hold(
-        self, log: Log, prepared: Prepared, found: Explanation
-    ) -> tuple[Prepared, Explanation, list[str]]:
-        """Once more with inputs held the other way, if what was found fits better so.
-
-        Returns:
-            What was prepared and found, with the hold that forecasts clearly better, and what is
-            to be said of it.
-        """
-        other = held_otherwise(found.search.simulator)
-        if other is None or not fits_better(found.search, found.key, other):
-            return prepared, found, []
-        self.tell("inputs held the other way fit better: once more so")
-        ready = prepare(other, log.runs, log.horizon)
-        again = self.explained(other, ready, earlier=found.search)
-        if _clearly_better(again, found):
-            says = (
-                f"inputs were taken to {how_held(other)}: the data fit better so; set hold to say "
-                "otherwise"
-            )
-            return ready, again, [says]
-        if not again.search.late:
-            return prepared, found, []
-        says = (
-            f"the data fit better with inputs taken to {how_held(other)}, but there was no time to "
-            "search so: set hold to say which it is, or give more --minutes"
-        )
-        return prepared, found, [says]
-
-    def begun_from_rest(
-        self, log: Log, prepared: Prepared, found: Explanation
-    ) -> tuple[Log, Prepared, Explanation, list[str]]:
-        """Once more with records that begin from rest, if what was found fits better so.
-
-        Returns:
-            What was recorded, prepared and found, with the beginning that forecasts clearly
-            better, and what is to be said of it.
-        """
-        if found.search.late:
-            return log, prepared, found, []
-        runs = fits_better_from_rest(found.search, found.key, log.runs)
-        if runs is None:
-            return log, prepared, found, []
-        self.tell("what came before the records fits better as no input: once more so")
-        begun = dataclasses.replace(log, runs=runs)
-        ready = prepare(found.search.simulator, runs, log.horizon)
-        again = self.explained(found.search.simulator, ready, earlier=found.search)
-        if not _clearly_better(again, found):
-            return log, prepared, found, []
-        late = [run.name for run in runs if run.before is not None]
-        more = f" and {len(late) - 3} more" if len(late) > 3 else ""
-        says = (
-            f"{', '.join(late[:3])}{more}: the first input is on, and what came before is taken to "
-            "be rest, which the data fit better; log some samples from before to be sure"
-        )
-        return begun, ready, again, [says]
 
     def confirmed(
         self, log: Log, prepared: Prepared, found: Explanation, matters: bool, tolerance: float
@@ -196,9 +135,3 @@ class Inquiry:
             "windows), or what it follows never changed"
             for label in asked
         ]
-
-
-def _clearly_better(again: Explanation, found: Explanation) -> bool:
-    """Whether what was found in another reading of the log forecasts clearly better."""
-    errors = [forecast_error(one.search, one.key) for one in (again, found)]
-    return CLEARLY**2 * errors[0] < errors[1]

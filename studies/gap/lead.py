@@ -63,6 +63,7 @@ def _conventions(result: GapResult) -> str:
         f"{changes}",
         "row": f"with {' and '.join(other.changes)} a row earlier in the log, what is found errs "
         f"{_times(other.times)} times less, as where rows hold the command that led to them",
+        "found": f"with {changes} what is found errs {_times(other.times)} times less",
         "size": f"but for {other.changes[0]}, which never goes below zero in the log, the nominal "
         f"simulator errs {_times(other.times)} times less, as where a sensor does not tell which "
         "way",

@@ -46,6 +46,12 @@ class Convention:
             states[:, place] += times * states[:, other]
         return states
 
+    def inputs_of(self, actions: Array) -> Array:
+        """Inputs as they count so, (..., n_a), of the columns as they are said to."""
+        factor, offset = self.inputs
+        inputs: Array = factor * actions[..., self.inputs_from] + offset
+        return inputs
+
     @property
     def sign(self) -> bool:
         """Whether nothing but signs is another one."""

@@ -42,12 +42,7 @@ def errors_of(
             the sign that does better.
     """
     samples, windows = fitter.samples, fitter.blocks.windows
-    gain, bias = convention.inputs
-
-    def acting(actions: Array) -> Array:
-        return gain * actions[..., convention.inputs_from] + bias
-
-    clock = convention.clock
+    acting, clock = convention.inputs_of, convention.clock
     samples = dataclasses.replace(
         samples, seen=convention.states_of(samples.seen),
         actions=acting(samples.actions), durations=clock * samples.durations,

@@ -6,7 +6,7 @@ from pathlib import Path
 import residual.gap
 
 FOLDERS = ["data", "model", "fitting", "preparation", "search", "confirmation", "answer"]
-ABOVE = ["log", "offered", "clock", "inquiry", "find", "rows"]
+ABOVE = ["readings", "log", "offered", "clock", "inquiry", "find", "rows"]
 
 
 def test_data_flow_one_way():

@@ -8,38 +8,28 @@ constants and stores are found that make up for it.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from residual.gap.beside import Conventions
-from residual.gap.confirmation.certainty import CLEARLY
-from residual.gap.confirmation.numerics import forecast_error
-from residual.gap.preparation.prepare import Prepared, prepare
-from residual.gap.read import BETTER, WORTH, Read, error_of
+from residual.gap.preparation.prepare import prepare
+from residual.gap.readings.read import BETTER, WORTH, Asked, Read, error_of
 from residual.gap.search.explain import Explanation
 from residual.trajectories import Trajectory
 from sims.effects.actuator import ActuatorLag, Delay
-from sims.host import HostSimulator
 
 
-def a_row_earlier(
-    read: Read,
-    nominal: HostSimulator,
-    explained: Callable[[HostSimulator, Prepared], Explanation],
-    tell: Callable[[str], None],
-) -> Read:
+def a_row_earlier(read: Read, asked: Asked) -> Read:
     """The same, or the log with every input a row earlier, if that clearly explains it better.
 
     Where only noise is left nothing is asked, nor of what strikes the ground.
 
     Args:
         read: The log as it is said to be.
-        nominal: The simulator with its inputs held as they are said to be.
-        explained: Searches.
-        tell: Progress.
+        asked: What it is asked so.
     """
-    log, found = read.log, read.found
+    log, found, nominal = read.log, read.found, asked.nominal
     if found.adequate or nominal.has_contacts or not nominal.action_channels:
         return read
     earlier = dataclasses.replace(
@@ -48,23 +38,21 @@ def a_row_earlier(
     if not earlier.runs:
         return read
     ready = prepare(nominal, earlier.runs, log.horizon)
-    before = forecast_error(found.search, found.key)
-    if WORTH**2 * error_of(ready, nominal, found) > before:
+    if WORTH**2 * error_of(ready, nominal, found) > read.error:
         return read
-    tell("every input a row earlier fits better: once more so")
-    again = explained(nominal, ready)
-    after = forecast_error(again.search, again.key)
-    if BETTER**2 * after >= before or _late_by_a_row(again, earlier.runs):
-        tell("not by much: inputs stay as logged")
+    asked.tell("every input a row earlier fits better: once more so")
+    says = (
+        "every row was taken to hold the input that led to it, which the data fit better: move "
+        "the inputs' columns a row up, or see whether the simulator acts too late"
+    )
+    again = Read(earlier, ready, asked.explained(nominal, ready), (says,))
+    if BETTER**2 * again.error >= read.error or _late_by_a_row(again.found, earlier.runs):
+        asked.tell("not by much: inputs stay as logged")
         return read
-    if again.adequate or CLEARLY**2 * after < before:
-        says = (
-            "every row was taken to hold the input that led to it, which the data fit better: move "
-            "the inputs' columns a row up, or see whether the simulator acts too late"
-        )
-        return Read(earlier, ready, again, (says,))
+    if again.found.adequate or again.clearly_better_than(read):
+        return again
     names = " and ".join(channel.name for channel in nominal.action_channels)
-    row = Conventions((names,), float(np.sqrt(before / after)), "row")
+    row = Conventions((names,), float(np.sqrt(read.error / again.error)), "row")
     return dataclasses.replace(read, conventions=row)
 
 

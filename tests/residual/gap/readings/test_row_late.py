@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from oven import GAIN, SLOW, Oven
 
-from residual.gap import find_gap, row_late
+from residual.gap import find_gap
 from residual.gap.beside import Conventions
+from residual.gap.readings import read as reading
+from residual.gap.readings import row_late
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorLag, Delay
 from studies.gap import lead
@@ -68,13 +70,14 @@ def answers(monkeypatch, before, after, adequate=False, effects=()):
         for search, enough in zip(searches, (False, adequate), strict=True)
     )
     errors = {"said": before, "earlier": after}
-    monkeypatch.setattr(row_late, "forecast_error", lambda search, key: errors[search.name])
+    monkeypatch.setattr(reading, "forecast_error", lambda search, key: errors[search.name])
     monkeypatch.setattr(row_late, "error_of", lambda *given: after)
     monkeypatch.setattr(row_late, "prepare", lambda *given: "ready")
     log = SimpleNamespace(runs=(record(True),), recorded=(record(True),), apart=(), horizon=1.0)
     monkeypatch.setattr(row_late.dataclasses, "replace", replaced)
     read = row_late.Read(log, "as said", found)
-    return row_late.a_row_earlier(read, Oven(), lambda *given: again, lambda says: None)
+    asked = reading.Asked(Oven(), lambda *given: again, lambda says: None)
+    return row_late.a_row_earlier(read, asked)
 
 
 def replaced(one, **fields):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 from residual.gap.beside import Conventions
-from residual.gap.confirmation.numerics import in_spreads
+from residual.gap.confirmation.certainty import CLEARLY
+from residual.gap.confirmation.numerics import forecast_error, in_spreads
 from residual.gap.fitting.validation import validate
 from residual.gap.log import Log
 from residual.gap.model.model import Model
@@ -34,6 +36,35 @@ class Read:
     found: Explanation
     says: tuple[str, ...] = ()
     conventions: Conventions | None = None
+
+    @property
+    def error(self) -> float:
+        """Cross-validated squared forecast error of what was found, in units of the spread."""
+        return forecast_error(self.found.search, self.found.key)
+
+    @property
+    def by_a_row(self) -> bool:
+        """Whether inputs may be logged a row late, which another hold of them may look like."""
+        return self.conventions is not None and self.conventions.reason == "row"
+
+    def clearly_better_than(self, other: Read) -> bool:
+        """Whether what was found in this reading forecasts clearly better."""
+        return CLEARLY**2 * self.error < other.error
+
+
+@dataclasses.dataclass(frozen=True)
+class Asked:
+    """What a log that is read otherwise is asked.
+
+    Attributes:
+        nominal: The simulator with its inputs held as they are said to be.
+        explained: Searches: a simulator, windows, ``earlier``: from what an earlier search found.
+        tell: Progress.
+    """
+
+    nominal: HostSimulator
+    explained: Callable[..., Explanation]
+    tell: Callable[[str], None]
 
 
 def error_of(ready: Prepared, nominal: HostSimulator, found: Explanation) -> float:

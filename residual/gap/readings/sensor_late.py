@@ -8,15 +8,14 @@ it. Beside a measured rate its own record tells (``data.kinematics``); alone, fo
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from residual.gap.confirmation.numerics import forecast_error
 from residual.gap.data.kinematics import earlier
 from residual.gap.log import Log
 from residual.gap.model.model import Model
 from residual.gap.preparation.alternatives import measured_joints
 from residual.gap.preparation.prepare import Prepared, prepare
-from residual.gap.read import BETTER, WORTH, Read, error_of
+from residual.gap.readings.read import BETTER, WORTH, Asked, Read, error_of
 from residual.gap.search.explain import Explanation
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
@@ -25,46 +24,39 @@ from sims.host import HostSimulator
 SAMPLES, FINER = (2.0, 4.0, 8.0), (1.4, 1.2, 1.1)
 
 
-def a_sensor_earlier(
-    read: Read,
-    nominal: HostSimulator,
-    explained: Callable[..., Explanation],
-    tell: Callable[[str], None],
-) -> Read:
+def a_sensor_earlier(read: Read, asked: Asked) -> Read:
     """The same, or the log with one sensor read earlier, if that clearly explains it better.
 
     Args:
         read: The log as it is said to be.
-        nominal: The simulator with its inputs held as they are said to be.
-        explained: Searches, ``earlier``: from what an earlier search found.
-        tell: Progress.
+        asked: What it is asked so.
     """
-    found = read.found
+    found, nominal = read.found, asked.nominal
     joints = measured_joints(nominal, found.search.fitter.samples)
     if found.adequate or found.search.late or nominal.has_contacts or len(joints) < 2:
         return read
-    before = forecast_error(found.search, found.key)
-    way = _best(read, nominal, joints, before / WORTH**2)
+    way = _best(read, nominal, joints, read.error / WORTH**2)
     if way is None:
         return read
     name = nominal.physical_channels[way.joint[0]].name
 
     def once_more(way: _Way, earlier: Explanation) -> Explanation:
-        tell(f"{name} read {way.seconds:.2g} s earlier fits better: once more so")
-        return explained(nominal, way.ready, earlier=earlier.search)
+        asked.tell(f"{name} read {way.seconds:.2g} s earlier fits better: once more so")
+        return asked.explained(nominal, way.ready, earlier=earlier.search)
 
     again = once_more(way, found)
     way = _finer(read.log, nominal, way, again)
     again = once_more(way, again)
-    if BETTER**2 * forecast_error(again.search, again.key) >= before:
-        tell("not by much: it stays as logged")
-        return read
     says = (
         f"{name} comes about {way.seconds:.2g} s after what else was measured, as from a sensor "
         "that is late or filtered, which no effect of the library is: it was taken to be so much "
         "earlier. Set the clocks right, or leave it out, to be sure"
     )
-    return Read(way.log, way.ready, again, (says,))
+    earlier = Read(way.log, way.ready, again, (says,))
+    if BETTER**2 * earlier.error < read.error:
+        return earlier
+    asked.tell("not by much: it stays as logged")
+    return read
 
 
 @dataclasses.dataclass(frozen=True)

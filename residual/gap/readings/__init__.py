@@ -1,0 +1,1 @@
+"""How else a log may be read, and whether it is explained better so."""
