@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from residual.gap import GapResult
 from residual.gap.answer.doubts import DOUBTS
-from residual.gap.confirmation.certainty import FEW, TOO_FEW
+from residual.gap.confirmation.certainty import TOO_FEW
+from residual.gap.confirmation.rivals import FEW
 from residual.gap.preparation.horizon import SAMPLES
 from residual.gap.result import OFF, Gap, Verdict
 from sims.effects import Curve

@@ -9,9 +9,10 @@ import time
 import numpy as np
 
 from residual.gap.answer.verdicts import nameable
-from residual.gap.confirmation.certainty import claims, in_plain_form
+from residual.gap.confirmation.certainty import claims
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.numerics import other_numerics, with_enough_substeps
+from residual.gap.confirmation.rivals import in_plain_form
 from residual.gap.confirmation.size import may_vanish
 from residual.gap.confirmation.tolerance import allow_for_parameters
 from residual.gap.fitting.contract import Left

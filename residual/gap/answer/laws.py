@@ -8,8 +8,8 @@ from collections.abc import Callable, Collection, Sequence
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.curves import of_its_kind
 from residual.gap.answer.left import beside_noise
-from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.claim import Claim
+from residual.gap.confirmation.rivals import CLEARLY
 from residual.gap.search.earlier import brought
 from residual.gap.search.sets import Key, Search
 from sims.effects.base import Effect

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from residual.gap.answer.doubts import DOUBTS, doubts
 from residual.gap.beside import Blind
-from residual.gap.confirmation.certainty import FEW, TOO_FEW
+from residual.gap.confirmation.certainty import TOO_FEW
 from residual.gap.confirmation.claim import Claim
+from residual.gap.confirmation.rivals import FEW
 from residual.gap.confirmation.size import may_be_none, may_vanish, size_open
 from residual.gap.fitting.contract import Left
 from residual.gap.result import Gap, Kind, Span, Verdict

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.confirmation.certainty import CLEARLY, where_it_matters
-from residual.gap.confirmation.certainty import HOPELESS as NO_MATCH
 from residual.gap.confirmation.claim import Claim
+from residual.gap.confirmation.rivals import CLEARLY, where_it_matters
+from residual.gap.confirmation.rivals import HOPELESS as NO_MATCH
 from residual.gap.confirmation.size import with_size
 from residual.gap.confirmation.widening import widened
 from residual.gap.fitting.bounded import bounded_step

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.confirmation.certainty import CLEARLY, HOPELESS, ratio, where_it_matters
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.drift import Drift
 from residual.gap.confirmation.resolution import below_a_step, untimed
+from residual.gap.confirmation.rivals import CLEARLY, HOPELESS, ratio, where_it_matters
 from residual.gap.fitting.bounded import bounded_step
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.intervals import deviations

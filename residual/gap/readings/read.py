@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Callable
 
 from residual.gap.beside import Conventions
-from residual.gap.confirmation.certainty import CLEARLY
 from residual.gap.confirmation.numerics import forecast_error, in_spreads
+from residual.gap.confirmation.rivals import CLEARLY
 from residual.gap.fitting.validation import validate
 from residual.gap.log import Log
 from residual.gap.model.model import Model

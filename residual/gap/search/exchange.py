@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.fitting.screening import Gain, gains, pair_gains
+from residual.gap.search.parted import add_parted
 from residual.gap.search.redundant import doubles
 from residual.gap.search.sets import Key, Search, all_but
 
@@ -24,6 +25,8 @@ STILL = 3
 SPLITS, SEVERAL = 2, (2, 3)
 #: Pairs that are tried in place of two members.
 PAIRS = 3
+#: Error of a pair in place of a member over that with the member, less one, up to which it grows.
+NEXT_TO = 0.1
 #: Effects that move as another one does in these data, tried beside it: under a constant input a
 #: gain is a load, a dead zone and dry friction, and none of them may lack for the others.
 ALIKE = 4
@@ -49,6 +52,7 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
         most: Effects that are tried in place of each member, beside its family.
     """
     add_without_each(search, key)
+    add_parted(search, key)
     for gone in key:
         rest = all_but(key, gone)
         if rest not in search.tried:
@@ -76,7 +80,7 @@ def add_pairs_exchanged(search: Search, key: Key) -> None:
         search.add({rest: theta})
         if search.late:
             return
-        _add_pairs(search, rest, PAIRS)
+        _add_pairs(search, rest, _pairs_beside(search, rest)[:PAIRS])
 
 
 def _rivals(search: Search, key: Key, gone: int, most: int) -> list[tuple[int, Array]]:
@@ -126,17 +130,36 @@ def _add_plainer(search: Search, key: Key, gone: int) -> None:
 
 
 def _add_split(search: Search, rest: Key, gone: int) -> None:
-    """Fit sets in which two effects of one number each stand for one of two or three."""
-    _add_pairs(search, rest, SPLITS, gone)
+    """Fit sets in which two effects of one number each stand for one of two or three.
+
+    For what holds still, such as friction by direction, so does the best pair with each of what
+    does, such as a dead zone and a bias.
+    """
+    ranked = _pairs_beside(search, rest, gone)
+    pairs = ranked[:SPLITS]
+    if search.candidates[gone].effect.holds_still:
+        variants = search.signatures(rest).variants
+        for number in range(search.screened):
+            its = (p for p in ranked if number in {variants[v].candidate for v in p.variants})
+            if both_hold_still(search, gone, number):
+                pairs += itertools.islice(its, 1)
+    _add_pairs(search, rest, pairs)
 
 
-def _add_pairs(search: Search, rest: Key, most: int, *without: int) -> None:
-    """Fit a set with each of the pairs of effects of one number that gain most beside it."""
+def _pairs_beside(search: Search, rest: Key, *without: int) -> list[Gain]:
+    """Pairs of effects of one number by what they gain beside a set, best first."""
     around = search.signatures(rest)
     without = (*of_several_numbers(search), *rest, *without)
-    for pair in pair_gains(around, most, without=without):
+    return pair_gains(around, len(around.variants) ** 2, without=without)
+
+
+def _add_pairs(search: Search, rest: Key, pairs: Iterable[Gain]) -> None:
+    """Fit a set with each of some pairs."""
+    for pair in pairs:
         fresh, theta = from_screen(search, rest, pair)
         search.add({fresh: theta} if search.fits_in(fresh) else {})
+        if fresh in search.tried:
+            add_parted(search, fresh)
 
 
 def of_several_numbers(search: Search) -> list[int]:
@@ -199,3 +222,15 @@ def split(search: Search, key: Key, number: int) -> list[tuple[Key, list[int]]]:
         and number not in rival
         and search.numbers(rival) <= search.numbers(key)
     ]
+
+
+def as_good_splits(search: Search, key: Key) -> list[Key]:
+    """For each member the set with two effects in its place that forecasts best, if it is next to
+    the set or better: what stands for that has not grown yet."""
+    found = []
+    for number in key:
+        rivals = [rival for rival, _ in split(search, key, number)]
+        best = min(rivals, key=search.error, default=key)
+        if best != key and search.error(best) <= (1 + NEXT_TO) * search.error(key):
+            found.append(best)
+    return found

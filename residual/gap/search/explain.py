@@ -19,7 +19,7 @@ from residual.gap.search.beam import extend, improves, run
 from residual.gap.search.choice import Choice, choose
 from residual.gap.search.continuation import add_handed_over
 from residual.gap.search.earlier import add_what_it_lacked, carried, is_in_vain, near_best
-from residual.gap.search.exchange import add_exchanged, add_pairs_exchanged
+from residual.gap.search.exchange import add_exchanged, add_pairs_exchanged, as_good_splits
 from residual.gap.search.pairs import every_two
 from residual.gap.search.reasons import reasons
 from residual.gap.search.redundant import curves_in_place
@@ -202,6 +202,8 @@ def settle(
         add_exchanged(search, key, most)
         if not quiet and improves(search, search.best(), reached):
             extend(search, search.best())
+        for rival in [] if quiet or search.late else as_good_splits(search, key):
+            extend(search, rival)
         if not (search.simulator.has_contacts or search.late):
             add_handed_over(search, key)
             if not quiet:

@@ -235,8 +235,8 @@ class Search:
             self.refused[key] = reason
             if nearly(found, number, self.fitter):
                 self.nearly.add(key)
-            if number < len(key):
-                self._with_twins(key, key[number])
+            for twin in self.twins_of(key[number]) if number < len(key) else ():
+                self.add_twin(key, key[number], twin)
         for gone in absent(found.model, key, found.theta):
             smaller, start = self.merged(key, (), drop=(gone,))
             if smaller:  # the same motion with fewer numbers
@@ -252,13 +252,12 @@ class Search:
         self._from_longer_leads.pop(key, None)
         self._signatures.pop(key, None)
 
-    def _with_twins(self, key: Key, gone: int) -> None:
-        """Fit a set with each exact twin of a member in its place."""
-        known = [candidate.effect for candidate in self.candidates]
-        for twin in self.twins_of(gone):
-            start = 0.01 * twin.trials[0].values[0]
-            fresh, theta = self.merged(key, [(known.index(twin.effect), start)], drop=(gone,))
-            self.add({fresh: theta})
+    def add_twin(self, key: Key, gone: int, twin: Candidate) -> None:
+        """Fit a set with an exact twin of a member in its place."""
+        place = [candidate.effect for candidate in self.candidates].index(twin.effect)
+        start = 0.01 * twin.trials[0].values[0]
+        fresh, theta = self.merged(key, [(place, start)], drop=(gone,))
+        self.add({fresh: theta})
 
     def twins_of(self, number: int) -> list[Candidate]:
         """Candidates that move exactly as one does."""

@@ -10,13 +10,12 @@ from toy import Toy
 from residual.gap.answer.verdicts import effect_verdict, minor_verdict, nameable
 from residual.gap.confirmation.certainty import (
     Claim,
-    in_plain_form,
     in_the_limit,
-    near,
     needed,
     steady,
     survives,
 )
+from residual.gap.confirmation.rivals import in_plain_form, near
 from residual.gap.confirmation.widening import vital
 from residual.gap.data.samples import Samples
 from residual.gap.fitting.intervals import at_bound, bounded, deviations
