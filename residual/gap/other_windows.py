@@ -7,17 +7,20 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.left import names_more
+from residual.gap.answer.left import names_more, still_names
 from residual.gap.answer.lone import explains_the_rest, lone_stretch
 from residual.gap.confirmed import Confirmed
 from residual.gap.log import Log
 from residual.gap.longer import LESS, LONGER, longer_horizon, over, slow_error, slow_remainder
-from residual.gap.preparation.horizon import longest_horizon
+from residual.gap.preparation.horizon import FEWER, WINDOWS, longest_horizon
 from residual.gap.preparation.prepare import Prepared
 from sims.effects.base import Effect
 
 if TYPE_CHECKING:
     from residual.gap.inquiry import Inquiry
+
+#: Part of a slow error that may be left by what takes the place of names that are not certain.
+HALF = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,8 +94,9 @@ class OtherWindows:
         answer, search = known.answer, known.answer.found.search
         if self.log.by_user or not answer.key or search.beside or self.inquiry.clock.searched:
             return known
-        horizon = longest_horizon(self.log.recorded)
-        if search.simulator.has_contacts or horizon < LONGER * self.log.horizon:
+        lengths = (longest_horizon(self.log.recorded, windows) for windows in (WINDOWS, FEWER))
+        horizon = next((one for one in lengths if one >= LONGER * self.log.horizon), None)
+        if search.simulator.has_contacts or horizon is None:
             return known
         slow = slow_remainder(self.log, answer)
         if slow is None:
@@ -101,7 +105,8 @@ class OtherWindows:
         left = over(slow.horizon, self.log, longer).errors[slow.place]
         if left >= LESS * slow.error:
             return known.and_says(slow.says)
-        if not names_more(longer, answer):
+        doubted = left < HALF * slow.error and still_names(longer, answer)
+        if not (doubted or names_more(longer, answer)):
             return known  # the same names, of which longer forecasts tell the sizes better
         says = (
             f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s "

@@ -175,7 +175,10 @@ def clipped(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
         rows = _rows(trajectories, masks)
         if rows:
             inside = np.concatenate([values[m] for values, m in zip(runs, masks, strict=True)])
-            ends = " and ".join(f"{end:.4g}" for end in np.unique(inside))
+            every = np.concatenate(runs)
+            upper = inside > (np.nanmin(every) + np.nanmax(every)) / 2
+            sides = [side for side in (inside[~upper], inside[upper]) if side.size]
+            ends = " and ".join(f"{np.median(side):.4g}" for side in sides)
             says = (
                 f"{len(rows)} samples stay at {ends}{channel.unit_text}, the end of all values, "
                 f"and come and go in full motion{_first(rows)}: a sensor at the end of its range, "

@@ -141,6 +141,15 @@ def test_a_sensor_at_the_end_of_its_range_is_told():
     assert len(found.rows) > 0.9 * len(at_end)
 
 
+def test_noise_at_the_end_of_its_range_does_not_hide_it():
+    run = noisy()
+    clipped = np.minimum(run.states[:, 1], 1.5)
+    wobble = np.where(clipped == 1.5, 1e-3 * np.sin(np.arange(len(clipped))), 0.0)
+    told = findings(PendulumEquation(), [changed(run, 1, slice(None), clipped + wobble)])
+    (found,) = [one for one in told if one.kind == "clipped"]
+    assert "stay at 1.5 rad/s" in found.words
+
+
 @given(step=st.floats(0.001, 0.3), phase=st.floats(0, 6))
 @settings(max_examples=40)
 def test_a_rounded_swing_is_not_taken_for_a_clipped_one(step, phase):
