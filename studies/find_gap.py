@@ -20,7 +20,7 @@ import dataclasses
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 
@@ -67,7 +67,7 @@ class GapStudy:
     simulator: Simulator
     columns: LogFormat = dataclasses.field(default_factory=LogFormat)
     tolerance: PositiveFloat | None = None
-    hold: Literal["auto", "zero", "linear"] | dict[str, Literal["zero", "linear"]] = "auto"
+    hold: str | dict[str, str] = "auto"
     horizon: PositiveFloat | None = None
     parameter_tolerance: NonNegativeFloat = 0.03
     minutes: PositiveFloat = 2.0
@@ -180,21 +180,23 @@ def run(
     return dataclasses.replace(result, quality=(*first, *result.quality))
 
 
-def holds(simulator: HostSimulator, hold: str | Mapping[str, Hold]) -> dict[str, Hold]:
+def holds(simulator: HostSimulator, hold: str | Mapping[str, str]) -> dict[str, Hold]:
     """What the user says of every input, by name; empty if the data are to decide.
 
     Raises:
-        ValueError: There is no such input.
+        ValueError: There is no such input, or no such way to run.
     """
-    if hold == "auto":
-        return {}
     names = [channel.name for channel in simulator.action_channels]
-    if isinstance(hold, Mapping):
-        unknown = ", ".join(name for name in hold if name not in names)
-        if unknown:
-            raise ValueError(f"--hold: no input {unknown}; there are {', '.join(names) or 'none'}")
-        return dict(hold)
-    return {name: "linear" if hold == "linear" else "zero" for name in names}
+    each = hold if isinstance(hold, Mapping) else dict.fromkeys(names, hold)
+    unknown = ", ".join(name for name in each if name not in names)
+    if unknown:
+        raise ValueError(f"--hold: no input {unknown}; there are {', '.join(names) or 'none'}")
+    ways: dict[str, Hold] = {"zero": "zero", "linear": "linear"}
+    for name, way in each.items():
+        if way not in ways and hold != "auto":
+            known = "zero or linear" if isinstance(hold, Mapping) else "zero, linear or auto"
+            raise ValueError(f"--hold is {way!r} for {name}, expected {known}")
+    return {name: ways[way] for name, way in each.items() if way in ways}
 
 
 def read(simulator: HostSimulator, logs: Sequence[str], columns: LogFormat) -> LogData:

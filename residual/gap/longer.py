@@ -79,9 +79,9 @@ class Slow:
     @property
     def says(self) -> str:
         """What is to be said if nothing was found for it."""
-        unit = self.channel.unit
+        error = f"{self.error:.3g}{self.channel.unit_text}"
         return (
-            f"over {self.seconds:.3g} s the corrected simulator errs by {self.error:.3g} {unit} in "
+            f"over {self.seconds:.3g} s the corrected simulator errs by {error} in "
             f"{self.channel.name} ({self.usual:.3g} over the length of the forecasts): what is "
             "slow may be missing (a leak, a little damping); --horizon asks over longer forecasts"
         )

@@ -273,7 +273,7 @@ def _with_rivals(verdict: Verdict, result: GapResult) -> str:
     if not others:
         return f"perhaps {name}"
     if len(others) <= FEW_RIVALS:
-        return f"{name} or {names_of(others)}"
+        return f"perhaps {name} or {names_of(others)}"
     return f"perhaps {name} or one of {len(others)} others"
 
 

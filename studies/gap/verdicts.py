@@ -87,7 +87,9 @@ def _sentences(clauses: Sequence[str]) -> str:
 
 def evidence(result: GapResult) -> Table:
     """What was tried: the chosen set, then by error."""
-    shown = list(result.evidence[:RIVALS])
+    # Of orders of a cogging, and the like, only the best is listed.
+    named = {rival.effects: rival for rival in reversed(result.evidence)}
+    shown = [rival for rival in result.evidence if rival is named[rival.effects]][:RIVALS]
     if not any(not rival.effects for rival in shown):
         shown += [rival for rival in result.evidence if not rival.effects][:1]
     rows: list[list[Cell]] = [

@@ -184,7 +184,7 @@ def test_the_first_sentence_says_where_only_records_set_aside_have_a_gap(error, 
             [MASS, dataclasses.replace(FRICTION, family="", form=())],
             "98 % of the gap is mass and Coulomb friction.",
         ),
-        ([DELAY], "98 % of the gap is delay at voltage or actuator lag at voltage."),
+        ([DELAY], "98 % of the gap is perhaps delay at voltage or actuator lag at voltage."),
         (
             [MASS, dataclasses.replace(DELAY, alternatives=(), doubts=("unsteady",))],
             "98 % of the gap is mass and perhaps delay at voltage.",

@@ -26,6 +26,7 @@ from residual.gap.data.inspection import (
     speeds,
     still,
     sums,
+    times_in,
 )
 from residual.gap.data.kinematics import kinematics
 from residual.gap.data.lost_rows import timed_halfway
@@ -139,11 +140,10 @@ def _refusals(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> l
     for run in trajectories:
         if run.durations.min() > _SLOWEST * simulator.dt:
             period = float(np.median(run.durations))
-            unit = other_clock(period / simulator.dt) or "ms"
+            otherwise = other_clock(period / simulator.dt) or times_in("ms")
             says = (
                 f"a sample every {period:.4g} s, {period / simulator.dt:.0f} control periods of "
-                f"{simulator.name}: if the times are in {unit}, set columns.time to "
-                f"{{column: time, unit: {unit}}}"
+                f"{simulator.name}: {otherwise}"
             )
             return [refusal("sampling", run.name, says)]
     if simulator.has_contacts:

@@ -41,11 +41,10 @@ def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
     """Samples much rarer than the control period, or as if minutes were seconds."""
     period = float(np.median(np.concatenate([run.durations for run in trajectories])))
     numbers = {"period_s": period, "control_period_s": simulator.dt}
-    if unit := other_clock(period / simulator.dt):
+    if otherwise := other_clock(period / simulator.dt):
         says = (
             f"a sample every {period:.4g} s, beside a control period of {simulator.name} of "
-            f"{simulator.dt:g} s: if the times are in {unit}, set columns.time to "
-            f"{{column: time, unit: {unit}}}"
+            f"{simulator.dt:g} s: {otherwise}"
         )
         return [Finding("sampling", "", says, numbers, "warning")]
     if period <= _SLOW * simulator.dt:
@@ -61,14 +60,20 @@ def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
 
 
 def other_clock(times: float) -> str:
-    """What unit the times of a log are in, perhaps, if samples come so many control periods apart;
-    empty if no other one is likely."""
+    """What to say of the times of a log, perhaps, if samples come so many control periods apart;
+    empty if no other clock is likely."""
     for unit, seconds in _LONGER.items():
         if abs(seconds * times - 1) < _ALMOST:
-            return unit
+            return times_in(unit)
         if abs(times / seconds - 1) < _ALMOST:
-            return "s"
-    return "s" if abs(_FINER * times - 1) < _ALMOST else ""
+            scale = f"{{column: time, scale: {1 / seconds:.6g}}}"
+            return f"{times_in('s')}; if the simulator counts in {unit}, to {scale}"
+    return times_in("s") if abs(_FINER * times - 1) < _ALMOST else ""
+
+
+def times_in(unit: str) -> str:
+    """What to set if times are in a unit that they were not taken to be in."""
+    return f"if the times are in {unit}, set columns.time to {{column: time, unit: {unit}}}"
 
 
 def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:

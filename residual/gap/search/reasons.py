@@ -6,6 +6,7 @@ from residual.gap.search.comparisons import MATERIAL, SAME, as_good
 from residual.gap.search.known import departures
 from residual.gap.search.sets import Key, Search
 from residual.gap.search.significance import score
+from residual.trajectories import moment
 
 
 def reasons(search: Search, chosen: Key) -> dict[Key, str]:
@@ -24,7 +25,7 @@ def reasons(search: Search, chosen: Key) -> dict[Key, str]:
         elif set(chosen) < set(key):
             found[key] = _not_enough(search, key, chosen)
         elif search.numbers(key) >= search.numbers(chosen):
-            found[key] = "as good, with as many or more numbers"
+            found[key] = _no_fewer_numbers(search, key, chosen)
         elif departures(search, key) > departures(search, chosen):
             found[key] = "as good, but departs more from what was known beforehand"
         else:
@@ -36,6 +37,16 @@ def _errs_more(search: Search, key: Key, chosen: Key) -> str:
     """How much more a set errs, and where most."""
     times = search.error(key) / max(search.error(chosen), 1e-12)
     return f"{times:.2g} times the error" + _worst(search, key, chosen)
+
+
+def _no_fewer_numbers(search: Search, key: Key, chosen: Key) -> str:
+    """Why a set of other effects and no fewer numbers does not take the place of the chosen one."""
+    more = search.numbers(key) - search.numbers(chosen)
+    if not more or search.error(key) > (1 - MATERIAL) * search.error(chosen):
+        return "as good, with as many or more numbers"
+    times = search.error(chosen) / max(search.error(key), 1e-12)
+    numbers = f"{more} numbers more" if more > 1 else "a number more"
+    return f"{times:.2g} times less error with {numbers}, which these blocks do not establish"
 
 
 def _not_enough(search: Search, key: Key, chosen: Key) -> str:
@@ -61,5 +72,4 @@ def _worst(search: Search, key: Key, chosen: Key) -> str:
     windows, samples = blocks.windows, search.fitter.samples
     first = int((blocks.block == number).argmax())
     start = samples.times[windows.index[first, 0]]
-    digits = 6 if start < 1e6 else 12  # of a date, counted from 1970
-    return f", most at {start:.{digits}g} s of {samples.names[windows.run[first]]}"
+    return f", most at {moment(start)} of {samples.names[windows.run[first]]}"
