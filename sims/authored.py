@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sims.host import Joint
 from sims.motion import Acceleration, DriveForce
-from sims.simulator import Array, Channel
+from sims.simulator import Array, Channel, Joint
 
 
 def by_joint(found: Any, shape: tuple[int, ...], what: str, column: str = "q") -> Array:

@@ -13,11 +13,11 @@ import numpy as np
 from sims.authored import beyond_rest, by_joint, force_is_added, joint_of, mobility, push_of_inputs
 from sims.effects.base import Effect
 from sims.effects.pull import ELSEWHERE
-from sims.host import HostSimulator, Joint
+from sims.host import HostSimulator
 from sims.hosted import kept_motion, motion_of
 from sims.motion import Motion, substep_ends
 from sims.rows import State
-from sims.simulator import Array, Parameter
+from sims.simulator import Array, Joint, Parameter
 from sims.sliding import move
 from sims.unsound import cannot_call
 

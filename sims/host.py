@@ -24,8 +24,7 @@ from sims.effects.base import Effect, place
 from sims.effects.joint import JointEffect
 from sims.effects.parameter import ParameterChange
 from sims.effects.sensor import through_sensors
-from sims.simulator import Array, Channel, Hold, Simulator, physical, random_values
-from sims.simulator import Joint as Joint
+from sims.simulator import Array, Channel, Hold, Joint, Simulator, physical, random_values
 
 
 class HostSimulator(Simulator):
@@ -40,6 +39,7 @@ class HostSimulator(Simulator):
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
         written_out: True if given by equations, which host rate limits, exchanges, stores, parts.
         has_contacts: True if motion jumps at impacts: see ``for_motion``.
+        binds_positions: True if positions are bound to each other, as in a closed chain.
         advances_rows_at_once: True if ``integrate`` advances rows together, each its own values.
         lagged: How an input with a lag acts in sub-steps, see ``sims.drive.lagged``.
     """
@@ -50,6 +50,7 @@ class HostSimulator(Simulator):
     has_drive_force: bool = False
     written_out: bool = False
     has_contacts: bool = False
+    binds_positions: bool = False
     advances_rows_at_once: bool = False
     lagged = staticmethod(lagged)
 

@@ -11,9 +11,9 @@ import pymunk
 from numpy.typing import NDArray
 
 from sims.effects.base import Effect
-from sims.host import HostSimulator, Joint
+from sims.host import HostSimulator
 from sims.render import PendulumRenderer
-from sims.simulator import Array, Channel, Parameter
+from sims.simulator import Array, Channel, Joint, Parameter
 from sims.swing import swing
 
 IDEALISED_MASS, TRUE_MASS = 0.055, 0.090

@@ -9,13 +9,13 @@ from typing import Any, Self
 import numpy as np
 
 from sims.effects.base import Effect
-from sims.host import HostSimulator, Joint
+from sims.host import HostSimulator
 from sims.leo.body import ARM, COORDINATES, FOOT, GEAR, MOTORS, SHANK, THIGH, TORSO
 from sims.leo.build import Build
 from sims.leo.chain import chain
 from sims.leo.forces import Forces
 from sims.leo.render import LeoRenderer
-from sims.simulator import Array, Channel, Parameter
+from sims.simulator import Array, Channel, Joint, Parameter
 
 IDEALISED_TORSO, TRUE_TORSO = TORSO.mass, 1.25
 TRUE_FRICTION = 0.03

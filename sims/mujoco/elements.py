@@ -8,8 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sims.host import Joint
-from sims.simulator import Array, Channel
+from sims.simulator import Array, Channel, Joint
 
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 FREE, BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)

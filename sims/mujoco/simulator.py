@@ -91,6 +91,7 @@ class MujocoSimulator(HostSimulator):
         self.state_channels = elements.state_channels(self.model)
         self.action_channels = elements.action_channels(self.model)
         self.has_contacts = bool(touching_geoms(self.model))
+        self.binds_positions = bool(self.model.eq_active0.any())
         # Within a step only Runge-Kutta asks again what the actuators do.
         self.lagged = lagged if self.runge_kutta else lagged_at_ends
         self._rows = Rows(self.model)

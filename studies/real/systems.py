@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from sims.equations import EquationOfMotion, FirstOrderSystem
-from sims.host import Joint
-from sims.simulator import Array, Channel, Parameter
+from sims.simulator import Array, Channel, Joint, Parameter
 
 GRAVITY = 9.81
 

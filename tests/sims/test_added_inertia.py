@@ -9,9 +9,8 @@ from scipy.integrate import solve_ivp
 from sims.checks import check_simulator
 from sims.effects import AddedInertia, CoulombFriction, FlexiblePart, exact_aliases, library
 from sims.equations import EquationOfMotion
-from sims.host import Joint
 from sims.pendulum_equation import PendulumEquation
-from sims.simulator import Channel, Parameter
+from sims.simulator import Channel, Joint, Parameter
 
 JOINTS = ("shoulder", "elbow")
 

@@ -16,10 +16,9 @@ from sims.effects import (
     library,
 )
 from sims.equations import EquationOfMotion, FirstOrderSystem
-from sims.host import Joint
 from sims.pendulum import Pendulum
 from sims.pendulum_equation import PendulumEquation
-from sims.simulator import Channel, Parameter
+from sims.simulator import Channel, Joint, Parameter
 from sims.sliding import BLOCK
 
 CART, POLE, ARM, GRAVITY = 0.5, 0.2, 0.3, 9.81

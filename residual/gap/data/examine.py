@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from residual.gap.data.bound import bound
 from residual.gap.data.bursts import without_bursts
 from residual.gap.data.copies import once
 from residual.gap.data.inspection import (
@@ -121,8 +122,8 @@ def findings(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
         return [refusal("empty", "", "there are no trajectories: give at least one measured run")]
     found = _refusals(simulator, trajectories)
     if not found:
-        checks = (sampling, bounds, speeds, sizes, other_zero, wrapped, wrapped_inputs, still,
-                  faults, clipped, rounded, sums, sweeps, nominal, unanswered)  # fmt: skip
+        checks = (sampling, bounds, bound, speeds, sizes, other_zero, wrapped, wrapped_inputs,
+                  still, faults, clipped, rounded, sums, sweeps, nominal, unanswered)  # fmt: skip
         found = [one for check in checks for one in check(simulator, trajectories)]
     ranks = {"refuse": 0, "warning": 1, "note": 2}
     return sorted(found, key=lambda one: ranks[one.severity])
