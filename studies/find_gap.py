@@ -25,6 +25,7 @@ from typing import Any
 from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
+from residual.gap.data.own_period import own_period
 from residual.gap.find import hosting
 from residual.logs import LogData, LogFormat, read_logs
 from residual.logs.checks import Finding
@@ -201,7 +202,9 @@ def holds(simulator: HostSimulator, hold: str | Mapping[str, str]) -> dict[str, 
 
 def read(simulator: HostSimulator, logs: Sequence[str], columns: LogFormat) -> LogData:
     """The logs, by the simulator's channels; see ``read_logs``."""
-    return read_logs(logs, simulator.physical_channels, simulator.action_channels, columns)
+    data = read_logs(logs, simulator.physical_channels, simulator.action_channels, columns)
+    period = own_period(simulator, columns.period)
+    return dataclasses.replace(data, findings=(*data.findings, *period))
 
 
 def apart(
