@@ -106,8 +106,8 @@ def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list
                 if few
                 else "the other sign (`scale: -1`)"
                 if turned
-                else f"another unit ({_misread(channel.unit)}), or bounds of the simulator's "
-                f"channel {channel.name!r} that are not the actuator's"
+                else f"another unit ({_misread(channel.unit)}) or column, or bounds of the "
+                f"simulator's channel {channel.name!r} that are not the actuator's"
             )
             found.append(refusal("bounds", channel.name, says))
             continue
