@@ -108,6 +108,16 @@ def test_a_plainer_form_stands_where_a_laws_own_numbers_are_not_told(number, key
     assert in_plain_form(toy, (1,), [dataclasses.replace(law, form=())]) is None
 
 
+def test_a_plainer_form_that_errs_far_more_does_not():
+    """With a load beside it Coulomb friction is friction by direction; alone it is far behind."""
+    toy = Toy({(1,): 0.01, (2,): 0.4, (2, 3): 0.01})
+    toy.numbers = lambda key: 2 if key == (1,) else len(key)
+    law = claim(
+        1, numbers={"change": Number(1.0, 0.0, 1.1, "N m")}, form=("coulomb_friction@pivot",)
+    )
+    assert in_plain_form(toy, (1,), [law]) is None
+
+
 def test_a_set_that_did_not_converge_is_no_rival():
     toy = Toy({(0,): 0.3, (3,): 0.3})
     toy.unfit.add((3,))
