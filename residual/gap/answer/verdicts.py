@@ -9,7 +9,7 @@ from residual.gap.beside import Blind
 from residual.gap.confirmation.certainty import TOO_FEW
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.rivals import FEW
-from residual.gap.confirmation.size import may_be_none, may_vanish, size_open
+from residual.gap.confirmation.size import half_open, may_be_none, may_vanish, size_open
 from residual.gap.fitting.contract import Left
 from residual.gap.result import Gap, Kind, Span, Verdict
 from residual.gap.search.sets import Search
@@ -66,6 +66,7 @@ def effect_verdict(
     claim = claim.less(stand_ins)
     effect = search.candidates[claim.number].effect
     vanishes = may_vanish(search, claim) if claim.there else may_be_none(search, claim)
+    vanishes = vanishes or half_open(search, claim)
     thin, wide = blocks < FEW and left > MUCH, size_open(search, claim)
     sure = claim.sure and blocks >= TOO_FEW and not (vanishes or thin or wide)
     kind: Kind = "confirmed" if sure else "ambiguous"

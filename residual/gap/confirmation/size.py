@@ -13,6 +13,8 @@ from sims.effects.curves import StateCurve
 
 #: Part of a strength below which an effect hardly acts.
 NEARLY_NONE = 0.1
+#: Size of one of two strengths over that of the other from which on it matters.
+AS_LARGE = 0.5
 #: Times as large as what was found that a strength may be, beyond which its size is open.
 OPEN = 10.0
 
@@ -36,6 +38,19 @@ def may_be_none(search: Search, claim: Claim) -> bool:
     numbers = [claim.numbers[knob.field] for knob in strengths(search, claim)]
     told = [n for n in numbers if n.value and not n.at_bound]
     return bool(told) and max(min(n.low / n.value, n.high / n.value) for n in told) < NEARLY_NONE
+
+
+def half_open(search: Search, claim: Claim) -> bool:
+    """Whether one of an effect's two strengths may be zero, though it was found at half the size of
+    the other or more: friction by direction, of which a dead zone and a bias may be half."""
+    numbers = [claim.numbers[knob.field] for knob in strengths(search, claim)]
+    if len({number.unit for number in numbers}) != 1 or len(numbers) != 2:
+        return False
+    most = max(abs(number.value) for number in numbers)
+    return any(
+        number.low <= 0 <= number.high and 0 < most <= abs(number.value) / AS_LARGE
+        for number in numbers
+    )
 
 
 def size_open(search: Search, claim: Claim) -> bool:

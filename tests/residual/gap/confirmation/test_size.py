@@ -11,7 +11,7 @@ from slides import braked, recorded
 
 from residual.gap import find_gap
 from residual.gap.confirmation.claim import Claim
-from residual.gap.confirmation.size import by_factors, may_vanish
+from residual.gap.confirmation.size import by_factors, half_open, may_vanish
 from residual.gap.model.candidates import Knob
 from residual.gap.result import Number
 from sims.effects.curves import InputCurve, StateCurve
@@ -82,13 +82,13 @@ def test_a_side_that_a_bound_cuts_off_goes_as_far_as_the_other():
     assert 0 < low < 34.0 - 20.0
 
 
-def told(effect, *spans):
+def told(effect, *spans, asked=may_vanish):
     """Whether an effect with these intervals may be nothing."""
     knobs = [Knob(f"n{i}", "K/s", -np.inf, np.inf, 1.0, True) for i in range(len(spans))]
     numbers = {f"n{i}": Number(0.5 * (a + b), a, b, "K/s") for i, (a, b) in enumerate(spans)}
     search = SimpleNamespace(candidates=[SimpleNamespace(effect=effect, knobs=knobs)])
     claim = Claim(0, numbers, (), (), (), (), True, True, True, False, (0.5, 0.4, 0.6))
-    return may_vanish(search, claim)
+    return asked(search, claim)
 
 
 def test_a_curve_along_a_state_needs_two_points_that_are_none_of_zero():
@@ -97,3 +97,16 @@ def test_a_curve_along_a_state_needs_two_points_that_are_none_of_zero():
     assert not told(StateCurve("room"), something, something, nothing)
     assert not told(InputCurve("heat"), nothing, something, nothing)
     assert told(InputCurve("heat"), nothing, nothing, nothing)
+
+
+@pytest.mark.parametrize(
+    ("spans", "half"),
+    [
+        ([(0.0, 2.0), (0.6, 2.4)], True),  # forward 1.0, backward 1.5
+        ([(0.1, 1.9), (0.6, 2.4)], False),
+        ([(-0.3, 0.5), (0.6, 2.4)], False),  # forward 0.1: friction one way, perhaps
+        ([(0.0, 2.0)], False),  # told by may_vanish
+    ],
+)
+def test_of_two_strengths_none_that_is_large_may_be_zero(spans, half):
+    assert told(InputCurve("heat"), *spans, asked=half_open) == half
