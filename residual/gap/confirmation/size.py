@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 
 from residual.gap.confirmation.claim import Claim
+from residual.gap.confirmation.resolution import below_a_step
 from residual.gap.model.candidates import Knob
 from residual.gap.search.sets import Search
 from sims.effects.curves import StateCurve
@@ -84,7 +85,9 @@ def with_size(search: Search, claim: Claim) -> Claim:
         return claim
     exact = number.if_exact and by_factors(number.value, *number.if_exact, knob)
     number = dataclasses.replace(number, low=low, high=high, if_exact=exact)
-    return dataclasses.replace(claim, numbers={**claim.numbers, knob.field: number})
+    numbers = {**claim.numbers, knob.field: number}
+    within = claim.within_step and below_a_step(search, claim.number, numbers)
+    return dataclasses.replace(claim, numbers=numbers, within_step=within)
 
 
 def by_factors(value: float, low: float, high: float, knob: Knob) -> tuple[float, float]:
