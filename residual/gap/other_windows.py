@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.left import names_more, still_names
+from residual.gap.answer.left import names_more
 from residual.gap.answer.lone import explains_the_rest, lone_stretch
 from residual.gap.confirmed import Confirmed
 from residual.gap.log import Log
@@ -19,7 +19,8 @@ from sims.effects.base import Effect
 if TYPE_CHECKING:
     from residual.gap.inquiry import Inquiry
 
-#: Part of a slow error that may be left by what takes the place of names that are not certain.
+#: Part of a slow error that may be left by what takes the place of names of which none is certain,
+#: where more than noise is left.
 HALF = 0.5
 
 
@@ -105,8 +106,8 @@ class OtherWindows:
         left = over(slow.horizon, self.log, longer).errors[slow.place]
         if left >= LESS * slow.error:
             return known.and_says(slow.says)
-        doubted = left < HALF * slow.error and still_names(longer, answer)
-        if not (doubted or names_more(longer, answer)):
+        open_ = not (answer.found.adequate or any(claim.sure for claim in answer.claims))
+        if not (open_ and left < HALF * slow.error) and not names_more(longer, answer):
             return known  # the same names, of which longer forecasts tell the sizes better
         says = (
             f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s "
