@@ -83,7 +83,9 @@ def test_numbers_of_another_law_are_not_certain(seed):
         first, *_, last = named[sure.pop()].parameters.values()
         assert first.value > 0 > last.value
     else:
-        assert any("law" in verdict.doubts for verdict in named.values())
+        # Either number's own curve stands for the law, or the law is doubted.
+        curves = {"parameter_curve@growth over substrate", "parameter_curve@half over substrate"}
+        assert curves & named.keys() or any("law" in one.doubts for one in named.values())
 
 
 def test_numbers_that_are_off_are_certain():
