@@ -54,6 +54,11 @@ class Log:
         runs, left_out = excerpt(self.recorded, stride_for(self.recorded, horizon))
         return dataclasses.replace(self, runs=runs, horizon=horizon, left_out=left_out)
 
+    def read_as(self, change: Callable[[Sequence[Trajectory]], Sequence[Trajectory]]) -> Log:
+        """The same with all runs, those set aside too, read otherwise."""
+        recorded, runs, apart = map(change, (self.recorded, self.runs, self.apart))
+        return dataclasses.replace(self, recorded=recorded, runs=runs, apart=apart)
+
 
 def look(
     simulator: HostSimulator,

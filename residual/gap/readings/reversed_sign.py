@@ -45,12 +45,7 @@ def a_sign_reversed(read: Read, asked: Asked) -> Read:
         return read
     best = signs[errors.index(least)]
     asked.tell(f"with {best.says} the simulator errs less: once more so")
-    log = dataclasses.replace(
-        read.log,
-        recorded=_counted(read.log.recorded, best),
-        runs=_counted(read.log.runs, best),
-        apart=_counted(read.log.apart, best),
-    )
+    log = read.log.read_as(lambda runs: _counted(runs, best))
     ready = prepare(nominal, log.runs, log.horizon)
     again = Read(log, ready, asked.explained(nominal, ready))
     if FAR_BETTER**2 * again.error >= read.error:

@@ -32,9 +32,7 @@ def a_row_earlier(read: Read, asked: Asked) -> Read:
     log, found, nominal = read.log, read.found, asked.nominal
     if found.adequate or nominal.has_contacts or not nominal.action_channels:
         return read
-    earlier = dataclasses.replace(
-        log, recorded=_shifted(log.recorded), runs=_shifted(log.runs), apart=_shifted(log.apart)
-    )
+    earlier = log.read_as(_shifted)
     if not earlier.runs:
         return read
     ready = prepare(nominal, earlier.runs, log.horizon)

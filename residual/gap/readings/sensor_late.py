@@ -131,6 +131,4 @@ def _earlier(log: Log, joint: Sequence[int], seconds: float) -> Log:
             runs = [earlier(run, column, seconds) for run in runs]
         return tuple(runs)
 
-    return dataclasses.replace(
-        log, recorded=moved(log.recorded), runs=moved(log.runs), apart=moved(log.apart)
-    )
+    return log.read_as(moved)

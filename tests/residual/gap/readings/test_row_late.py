@@ -8,6 +8,7 @@ from oven import GAIN, SLOW, Oven
 
 from residual.gap import find_gap
 from residual.gap.beside import Conventions
+from residual.gap.log import Log
 from residual.gap.readings import read as reading
 from residual.gap.readings import row_late
 from residual.trajectories import Trajectory
@@ -73,15 +74,11 @@ def answers(monkeypatch, before, after, adequate=False, effects=()):
     monkeypatch.setattr(reading, "forecast_error", lambda search, key: errors[search.name])
     monkeypatch.setattr(row_late, "error_of", lambda *given: after)
     monkeypatch.setattr(row_late, "prepare", lambda *given: "ready")
-    log = SimpleNamespace(runs=(record(True),), recorded=(record(True),), apart=(), horizon=1.0)
-    monkeypatch.setattr(row_late.dataclasses, "replace", replaced)
+    runs = (record(True),)
+    log = Log(Oven(), runs, runs, 1.0, by_user=False, apart=(), findings=[], left_out=[])
     read = row_late.Read(log, "as said", found)
     asked = reading.Asked(Oven(), lambda *given: again, lambda says: None)
     return row_late.a_row_earlier(read, asked)
-
-
-def replaced(one, **fields):
-    return type(one)(**{**vars(one), **fields})
 
 
 def test_clearly_better_is_read_so_a_little_better_is_told_first_and_else_nothing(monkeypatch):
