@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sims.actuation import clipped, driven, memory_channels, moving_memory, next_inputs, with_memory
+from sims.bonds import Bonds
 from sims.drive import lagged
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
@@ -38,8 +39,7 @@ class HostSimulator(Simulator):
         substeps: Sub-steps in one control period.
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
         written_out: True if given by equations, which host rate limits, exchanges, stores, parts.
-        has_contacts: True if motion jumps at impacts: see ``for_motion``.
-        binds_positions: True if positions are bound to each other, as in a closed chain.
+        has_contacts, bonds: Whether motion jumps at impacts (``for_motion``), what binds positions.
         advances_rows_at_once: True if ``integrate`` advances rows together, each its own values.
         lagged: How an input with a lag acts in sub-steps, see ``sims.drive.lagged``.
     """
@@ -50,7 +50,7 @@ class HostSimulator(Simulator):
     has_drive_force: bool = False
     written_out: bool = False
     has_contacts: bool = False
-    binds_positions: bool = False
+    bonds: Bonds | None = None
     advances_rows_at_once: bool = False
     lagged = staticmethod(lagged)
 

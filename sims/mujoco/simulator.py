@@ -23,6 +23,7 @@ from sims.effects.sensor import SensorOffset
 from sims.host import HostSimulator
 from sims.mujoco import elements
 from sims.mujoco.attributes import Attribute, attributes, row_fields
+from sims.mujoco.bonds import MujocoBonds
 from sims.mujoco.compiled import INTEGRATORS, Source, compiled, control_period
 from sims.mujoco.contacts import touches, touching_geoms
 from sims.mujoco.corrected import corrected_files
@@ -91,7 +92,7 @@ class MujocoSimulator(HostSimulator):
         self.state_channels = elements.state_channels(self.model)
         self.action_channels = elements.action_channels(self.model)
         self.has_contacts = bool(touching_geoms(self.model))
-        self.binds_positions = bool(self.model.eq_active0.any())
+        self.bonds = MujocoBonds(self.model) if self.model.eq_active0.any() else None
         # Within a step only Runge-Kutta asks again what the actuators do.
         self.lagged = lagged if self.runge_kutta else lagged_at_ends
         self._rows = Rows(self.model)

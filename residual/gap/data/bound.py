@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from residual.gap.data.inspection import measured
 from residual.logs.checks import Finding
 from residual.trajectories import Trajectory
@@ -11,18 +13,21 @@ from sims.host import HostSimulator
 
 
 def bound(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
-    """Positions that were not logged, though others that were leave them no choice: forecasts that
-    begin off the bond are thrown about by it."""
-    if not simulator.binds_positions:
+    """Positions that were not logged, and that others that were leave no choice."""
+    if simulator.bonds is None:
         return []
+    channels = simulator.physical_channels
     logged = {channel.name for channel, _ in measured(simulator, trajectories)}
-    positions = [c.name for c in simulator.physical_channels if c.kind != "rate"]
-    missing = [name for name in positions if name not in logged]
-    if not missing:
-        return []
-    says = (
-        f"the position {missing[0]} was not logged, and {simulator.name} binds positions to each "
-        "other (<equality>): forecasts begin off that bond, which throws them about. Compute it "
-        "from the others and add its column"
-    )
-    return [Finding("bound", missing[0], says, {"missing": len(missing)}, "warning")]
+    unknown = np.array([not {c.name, c.rate_of} & logged for c in channels])
+    states = np.nan_to_num(np.concatenate([run.states[:, : len(channels)] for run in trajectories]))
+    told = simulator.bonds.told(states, unknown)
+    return [
+        Finding(
+            "bound",
+            channel.name,
+            f"was not logged, and is worked out from the others: {simulator.name} binds them to "
+            "each other (<equality>)",
+        )
+        for channel, known in zip(channels, told, strict=True)
+        if known and channel.kind != "rate"
+    ]

@@ -9,15 +9,17 @@ from numpy.typing import NDArray
 
 from residual.gap.data.samples import Samples
 from residual.gap.model.model import Model
+from sims.bonds import Bonds
 from sims.simulator import Channel
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 #: Rows that are reckoned one after the other; longer runs are cut, and the cuts gone over again.
 LONGEST = 400
 
 
-def unseen(channels: Sequence[Channel], measured: Iterable[int]) -> NDArray[np.bool_]:
+def unseen(channels: Sequence[Channel], measured: Iterable[int]) -> Mask:
     """States of which the log says nothing: not measured, nor rates of what was, (n_p,)."""
     seen = {channels[i].name for i in measured}
     return np.array([not {c.name, c.rate_of} & seen for c in channels], bool)
@@ -26,8 +28,9 @@ def unseen(channels: Sequence[Channel], measured: Iterable[int]) -> NDArray[np.b
 def measured(model: Model, samples: Samples, theta: Array) -> Array:
     """Nodes straight from the measurement; an unmeasured rate by central differences.
 
-    What cannot be told so, such as the level of a tank without a sensor, is where the model goes
-    from zero while the measured states are as measured.
+    Positions keep the bonds of the simulator, which may tell some that were not measured. What
+    cannot be told so, such as the level of a tank without a sensor, is where the model goes from
+    zero while the measured states are as measured.
     """
     channels = model.simulator.physical_channels
     names = [c.name for c in channels]
@@ -47,9 +50,29 @@ def measured(model: Model, samples: Samples, theta: Array) -> Array:
                 column[~good] = np.interp(at[~good], at[good], column[good])
     if model.has_sensor:
         nodes = model.bind(theta).unsense(nodes)
+    hidden = unseen(channels, samples.measured)
+    if (bonds := model.simulator.bonds) is not None:
+        told = bonds.told(nodes, hidden)
+        nodes, hidden = _bound(nodes, samples, channels, bonds, told), hidden & ~told
     nodes = model.widen(samples, nodes, theta)
-    hidden = np.flatnonzero(unseen(channels, samples.measured))
-    return _reckoned(model, samples, nodes, theta, hidden) if hidden.size else nodes
+    columns = np.flatnonzero(hidden)
+    return _reckoned(model, samples, nodes, theta, columns) if columns.size else nodes
+
+
+def _bound(
+    nodes: Array, samples: Samples, channels: Sequence[Channel], bonds: Bonds, told: Mask
+) -> Array:
+    """Nodes that keep the bonds; rates that were not measured by central differences of these."""
+    names = [channel.name for channel in channels]
+    nodes = bonds.closed(nodes, told)
+    for i, channel in enumerate(channels):
+        if channel.kind == "rate" and i not in samples.measured and channel.rate_of in names:
+            position = names.index(channel.rate_of)
+            if position in samples.measured or told[position]:
+                for start, stop in samples.runs:
+                    at, moved = samples.times[start:stop], nodes[start:stop, position]
+                    nodes[start:stop, i] = np.gradient(moved, at)
+    return bonds.along(nodes)
 
 
 def _reckoned(
