@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from residual.gap.data.blocks import Blocks
 from residual.gap.data.samples import Samples
-from residual.gap.data.windows import carry
 from residual.gap.fitting import shooting
 from residual.gap.fitting.adequacy import ERRORS, remainder
 from residual.gap.fitting.chance import TIE, threshold
+from residual.gap.fitting.columns import columns
 from residual.gap.fitting.contract import Fit, Fitter, Foretold, Left
 from residual.gap.fitting.noise import Floor, Noise
 from residual.gap.fitting.screening import Signatures
@@ -21,7 +21,6 @@ from residual.gap.fitting.starts import starts
 from residual.gap.fitting.where import Where, locate
 from residual.gap.model.candidates import Candidate
 from residual.gap.model.model import Model
-from residual.gap.model.slopes import observe
 
 Array = NDArray[np.float64]
 
@@ -81,7 +80,10 @@ class SmoothFitter:
         return dataclasses.replace(self, sigma=self.samples.of_these(other.samples, other.sigma))
 
     def fit(self, model: Model, theta: Array, near: Fit | None = None) -> Fit:
-        """See ``Fitter.fit``; always from the measured path, since a rival's may mislead."""
+        """See ``Fitter.fit``; always from the measured path, since a rival's may mislead.
+
+        Where that leads nowhere, once more from forecasts by what was found.
+        """
         theta = np.clip(theta, model.low, model.high)
         nodes = model.widen(self.samples, self.nodes, theta)
         known = self.by_state if model.width == self.by_state.shape[1] else None
@@ -89,14 +91,21 @@ class SmoothFitter:
         if len(theta) and not found.converged:
             again = self._shot(model, found.nodes, found.theta, None, 0.05)
             found = again if again.merit <= found.merit else found
+        if len(theta) and not found.converged:
+            again = self._shot_from_forecasts(model, found.theta, found)
+            found = again if again.merit < found.merit else found
         return self._as_fit(found)
 
     def from_forecasts(self, model: Model, theta: Array, near: Fit) -> Fit:
         """Numbers of least loss from ``theta`` and its forecasts of all windows on: where motion
         begins and stops, the measured path tells a linear picture little."""
         theta = np.clip(theta, model.low, model.high)
-        nodes = self._foretold(model, theta, near.inner)
-        return self._as_fit(self._shot(model, nodes, theta, None, 0.05))
+        return self._as_fit(self._shot_from_forecasts(model, theta, near.inner))
+
+    def _shot_from_forecasts(
+        self, model: Model, theta: Array, near: shooting.ShootingFit
+    ) -> shooting.ShootingFit:
+        return self._shot(model, self._foretold(model, theta, near), theta, None, 0.05)
 
     def _foretold(self, model: Model, theta: Array, near: shooting.ShootingFit) -> Array:
         """Nodes on forecasts from the lead-ins of all windows, (n, n_s)."""
@@ -131,50 +140,8 @@ class SmoothFitter:
     def columns(
         self, fit: Fit, candidates: Sequence[Candidate], share: Array | None = None
     ) -> Array:
-        """See ``Fitter.columns``.
-
-        A candidate acts for one sample interval from every row, and the change it makes is
-        carried linearly along the window: one batch serves all windows, and none runs away.
-        ``share`` is how much it acts from each row, (n,), fully by default; or several of them,
-        (k, n), for each of which the first trial alone has a column.
-        """
-        if not candidates:
-            return np.zeros((*fit.projected.shape, 0))
-        model, samples, windows = fit.model, self.samples, self.blocks.windows
-        inner: shooting.ShootingFit = fit.inner
-        n, width = inner.nodes.shape
-        moved: list[Array] = []
-        shown: list[Array] = []
-        for candidate in candidates:
-            joint = Model(model.simulator, (*model.chosen, candidate))
-            values = np.vstack([trial.values for trial in candidate.trials])
-            theta = np.hstack([np.repeat(fit.theta[None], len(values), axis=0), values])
-            states = np.broadcast_to(inner.nodes, (len(values), n, width))
-            if joint.width > width:
-                nodes = inner.nodes[:, : joint.physical]
-                play = [joint.widen(samples, nodes, t, without=True) for t in theta]
-                states = np.concatenate([states, np.stack(play)[:, :, width:]], axis=2)
-            still = np.zeros((n, width, len(values)))
-            if candidate.effect.enters == "sensor":
-                moved.append(still)
-                seen = joint.sense(states, theta) - inner.slope.shown
-                shown.append(seen.transpose(1, 2, 0))
-            else:
-                after = joint.advance(samples, states, theta)[..., :width] - inner.slope.after
-                moved.append(after.transpose(1, 2, 0))
-                shown.append(still)
-        start, acts = np.zeros((width, 0)), np.concatenate(moved, axis=2)
-        seen = np.concatenate(shown, axis=2)
-        if share is not None and share.ndim == 2:
-            acts, seen = (some[..., :1] * share.T[:, None, :] for some in (acts, seen))
-        elif share is not None:
-            acts = acts * share[:, None, None]
-        response = carry(windows, inner.slope.by_state, start, acts)
-        columns = observe(samples, windows, inner.slope, response, self.sigma)
-        measured = samples.measured
-        direct = seen[:, measured][windows.index] / self.sigma[:, None]
-        columns = columns + direct * self.valid[..., None]
-        return columns.reshape(len(windows), -1, columns.shape[-1])
+        """See ``Fitter.columns``."""
+        return columns(self, fit, candidates, share)
 
     def redrawn(self, fit: Fit, sigma: Array, rng: np.random.Generator) -> SmoothFitter:
         """See ``Fitter.redrawn``."""
