@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 if TYPE_CHECKING:
     import pint
 
-#: Spellings that Pint does not know, or knows for something else (Nm, a measure of yarn).
+#: Spellings that Pint does not know, or knows for something else (Nm, a measure of yarn; kmph, a
+#: thousand mph).
 _DEFINED = (
     "newton_meter = newton * meter = Nm",
     "newton_centimeter = newton * centimeter = Ncm",
     "newton_millimeter = newton * millimeter = Nmm",
     "foot_per_minute = foot / minute = fpm",
     "@alias turn = rev",
+    "@alias kilometer_per_hour = kmph",
     "@alias standard_gravity = gn",
 )
 #: What a symbol also stands for, where its first meaning cannot be: ``C`` is a charge or degC.

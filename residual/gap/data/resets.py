@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from residual.gap.data.nominal import filled
 from residual.gap.data.turns import wrapped
 from residual.logs.checks import Finding
-from residual.logs.faults import grain
+from residual.logs.faults import dropped_samples, grain
 from residual.trajectories import Trajectory, moment
 from sims.host import HostSimulator
 
@@ -38,6 +38,17 @@ NEAR, STEP, OTHERS = 3, 0.05, 2
 LEAST = 5
 
 
+def _received(runs: Sequence[Array], turn: float) -> list[Array]:
+    """Values with a straight line where a reading was not received: no leap goes there and back."""
+    filled = []
+    for values, lost in zip(runs, dropped_samples(runs, turn), strict=True):
+        rows = np.arange(len(values))
+        line = np.interp(rows[lost], rows[~lost], values[~lost])
+        filled.append(np.array(values))
+        filled[-1][lost] = line
+    return filled
+
+
 def cut_at_resets(
     simulator: HostSimulator, trajectories: Sequence[Trajectory]
 ) -> tuple[list[Trajectory], list[Finding]]:
@@ -56,8 +67,9 @@ def cut_at_resets(
     for column, channel in enumerate(channels):
         if channel.name in turning_over:
             continue
-        values = [run.states[:, column] for run in trajectories]
         turning = 2 * np.pi if channel.angle else np.inf
+        values = [run.states[:, column] for run in trajectories]
+        values = _received(values, turning if channel.angle else 0.0)
         if channel.kind == "position" and channel.name in rate_of:
             rates = [run.states[:, rate_of[channel.name]] for run in trajectories]
             measured = any(np.isfinite(own).any() for own in rates)

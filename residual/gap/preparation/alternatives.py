@@ -76,10 +76,13 @@ def _of_the_clock(
     seldom; or another unit of time, where samples are far from the control period as they are said
     to come and near it in that unit.
 
-    A measured rate counts as it is, or it was put on the scale of a position whose clock was wrong.
+    Times that count rows may be their numbers, whatever the control period. A measured rate counts
+    as it is, or it was put on the scale of a position whose clock was wrong.
     """
     rare = samples.recorded_step / simulator.dt
     slips = [n for n in SLIPS for ratio in (rare, 1 / rare) if abs(ratio / n - 1) < SLIPPED]
+    if samples.recorded_step == 1.0 and rare != 1.0:
+        slips.append(rare)
     also = f" (`period: {simulator.dt:g}` of a log without times)" if slips else ""
     found = []
     for clock in [1 / rare] if slips else _units_of_time(rare):

@@ -63,7 +63,8 @@ def test_units_agree_with_their_definitions():
     freezing = find_unit("degF", "K")
     assert freezing.factor * 32 + freezing.offset == pytest.approx(273.15)
     assert find_unit("rpm", "rad/s").factor * 60 == pytest.approx(2 * np.pi)
-    assert find_unit("km/h", "m/s").factor * 36 == pytest.approx(10)
+    for hourly in ("km/h", "kph", "kmph"):
+        assert find_unit(hourly, "m/s").factor * 36 == pytest.approx(10)
     assert find_unit("knots", "m/s").factor * 3600 == pytest.approx(find_unit("nmi", "m").factor)
     assert find_unit("fpm", "m/s").factor * 60 == pytest.approx(find_unit("ft", "m").factor)
     assert find_unit("", "counts") == (1.0, 0.0)

@@ -132,6 +132,16 @@ def test_a_state_that_the_simulator_does_not_move_so_fast_begins_anew(seed, seco
     assert finding.says.startswith("log.csv begins anew at 750 s without saying so: water leaps")
 
 
+def test_a_number_that_stands_for_a_missing_reading_is_no_beginning():
+    water, power = heated(3, 20.0)
+    lost = np.array(water)
+    for row in (20, 50, 51, 90, 91, 92, 120):
+        lost[row] = 9999.0
+    runs, findings = cut_at_resets(Kettle(), [joined([(lost, power)])])
+    assert len(runs) == 1 and not findings
+    assert (runs[0].states[:, 0] == lost).all()
+
+
 def test_what_a_step_of_an_input_brings_every_time_is_no_beginning():
     # A thermometer beside the heater: part of the power is read at once.
     water, power = heated(3, 20.0)

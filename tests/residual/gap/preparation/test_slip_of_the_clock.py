@@ -44,6 +44,17 @@ def test_a_slip_of_the_clock_is_told(slip):
     assert says == f"`scale: {1 / slip:.6g}` for the time (`period: 1` of a log without times)"
 
 
+def test_numbers_of_rows_in_place_of_times_are_told():
+    run = heated(dt=0.2)
+    found = asked(dataclasses.replace(run, times=np.arange(len(run.times), dtype=float)), dt=0.2)
+    assert found is not None
+    assert found.changes[0].startswith("`scale: 0.2` for the time")
+
+
+def test_a_sample_a_second_of_a_faster_simulator_is_none():
+    assert asked(heated(dt=1.0), dt=0.2) is None
+
+
 @pytest.mark.parametrize("effects", LARGE)
 def test_rare_and_frequent_samples_are_none(effects):
     run = heated(effects)
