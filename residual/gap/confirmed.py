@@ -20,6 +20,7 @@ class Confirmed:
         says: What is to be said of how it was found.
         in_vain: Parameters that follow a channel, asked for and not named.
         unasked: What may be left, in words, and was not asked for lack of time.
+        why: Why forecasts go over windows of another length than the usual one, in words.
         lone: Where most of the error lies, if nothing explains it and it was not left out.
     """
 
@@ -28,6 +29,7 @@ class Confirmed:
     says: tuple[str, ...]
     in_vain: tuple[ParameterCurve, ...] = ()
     unasked: tuple[str, ...] = ()
+    why: str = ""
     lone: Stretch | None = None
 
     def lacks_time(self, *what: str) -> Confirmed:

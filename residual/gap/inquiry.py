@@ -54,7 +54,8 @@ class Inquiry:
             for curve in self.offered.asked:
                 if str(curve) not in map(str, more):
                     offered += over_the_log(curve, ready.fitter, simulator)
-        pool = ready.pool([*candidates(simulator, offered, samples), *less])
+        there = candidates(simulator, offered, samples, ready.fitter.seconds)
+        pool = ready.pool([*there, *less])
         pool = [candidate for candidate in pool if candidate.label not in free]
         others = {label: e for label, e in self.offered.by_label.items() if label not in free}
         twins = exact_twins(simulator, ready.fitter.samples, self.offered.groups, others)

@@ -43,6 +43,8 @@ class OnceMore(OtherWindows):
             self.with_parts, self.longer, self.longest, self.slow,
         ):  # fmt: skip
             known = self._step(step, known)
+        if known.why:
+            known = known.and_says(known.why)
         if known.unasked:
             known = known.and_says(_no_time(known.unasked))
         if left_out:
@@ -160,10 +162,11 @@ class OnceMore(OtherWindows):
         if not (takes_most_by_itself(answer, parts) and still_names(answer, known.answer)):
             return known
         says = (
-            f"forecasts go over {ready.fitter.seconds:.3g} s, in which every sample shows: over "
-            f"{fitter.seconds:.3g} s rows are too far apart for what swings so fast"
+            f"forecasts go over {ready.fitter.seconds:.3g} s, in which every sample shows: those "
+            f"over {fitter.seconds:.3g} s have one of {fitter.samples.stride}, too few for what "
+            "swings so fast"
         )
-        return dataclasses.replace(known, prepared=ready, answer=answer, says=(*known.says, says))
+        return dataclasses.replace(known, prepared=ready, answer=answer, why=says)
 
     def _with_more(
         self, known: Confirmed, more: Sequence[Effect], what: str, lacking: str

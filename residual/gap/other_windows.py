@@ -73,7 +73,7 @@ class OtherWindows:
             f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s, "
             "of which these records hold more, nothing can be named"
         )
-        return dataclasses.replace(known, prepared=ready, answer=answer, says=(*known.says, says))
+        return dataclasses.replace(known, prepared=ready, answer=answer, why=says)
 
     def longest(self, known: Confirmed) -> Confirmed:
         """The same, or what is found over forecasts as long as the records where these alone show
@@ -87,7 +87,7 @@ class OtherWindows:
         horizon, says = slow
         what = "the longest forecasts, where a slow error shows"
         ready, answer = self.over(known, horizon, what)
-        return dataclasses.replace(known, prepared=ready, answer=answer, says=(*known.says, says))
+        return dataclasses.replace(known, prepared=ready, answer=answer, why=says)
 
     def slow(self, known: Confirmed) -> Confirmed:
         """The same, or what is found beside it over longer forecasts, of which the records hold as
@@ -113,7 +113,7 @@ class OtherWindows:
             f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s "
             "what is slow hardly shows"
         )
-        return dataclasses.replace(known, prepared=ready, answer=longer, says=(*known.says, says))
+        return dataclasses.replace(known, prepared=ready, answer=longer, why=says)
 
     def over(
         self, known: Confirmed, horizon: float, what: str, more: Sequence[Effect] = ()

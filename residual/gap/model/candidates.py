@@ -130,12 +130,21 @@ class Candidate:
 
 
 def candidates(
-    simulator: HostSimulator, effects: Iterable[Effect], samples: Samples
+    simulator: HostSimulator,
+    effects: Iterable[Effect],
+    samples: Samples,
+    seconds: float = np.inf,
 ) -> list[Candidate]:
     """All candidates: effects on channels that were measured, whole numbers spelt out.
 
     An effect with a whole-numbered shape (the order of cogging) becomes one candidate for each
     of its start values.
+
+    Args:
+        simulator: Hosts the effects.
+        effects: That may be missing.
+        samples: The measured table.
+        seconds: How long windows are in which their states go on by themselves.
     """
     measured = {simulator.state_channels[i].name for i in samples.measured}
     inputs = [channel.name for channel in simulator.action_channels]
@@ -159,7 +168,7 @@ def candidates(
             continue
         if isinstance(effect, Unbalance) and not shows_weight(effect, simulator, samples):
             continue
-        known = within_reach(effect, effect.quantities(simulator), simulator, samples)
+        known = within_reach(effect, simulator, samples, seconds)
         whole = {n: q for n, q in known.items() if q.integer and q.role == "shape"}
         for values in itertools.product(*(q.starts for q in whole.values())):
             fixed = effect.with_values(**dict(zip(whole, values, strict=True)))

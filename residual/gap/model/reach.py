@@ -23,9 +23,10 @@ OF_A_TURN = 0.25
 BEYOND, SPAN = 1.2, 5
 #: Time constants of a store that are tried, as parts of the longest record.
 STORED = (0.01, 0.03, 0.1, 0.3)
-#: Frequencies of a part that are tried: swings in the longest record at least, and in a sample at
-#: most; from one to the next by so much at the most, which a damping to begin with makes up for.
-SWINGS, IN_A_SAMPLE, FURTHER = 3.0, 0.4, 1.35
+#: Frequencies of a part that are tried: swings in the longest record and in a window at least, and
+#: in a sample at most; from one to the next by so much at the most, which a damping to begin with
+#: makes up for.
+SWINGS, IN_A_WINDOW, IN_A_SAMPLE, FURTHER = 3.0, 0.25, 0.4, 1.35
 
 
 def full_command(channel: Channel, reach: float) -> float:
@@ -73,17 +74,19 @@ def _longest(samples: Samples) -> float:
 
 
 def within_reach(
-    effect: Effect, known: dict[str, Quantity], simulator: HostSimulator, samples: Samples
+    effect: Effect, simulator: HostSimulator, samples: Samples, seconds: float
 ) -> dict[str, Quantity]:
     """Numbers of an effect for the positions that were measured, and for how long.
 
-    No command is later than the longest record lasts.
+    No command is later than the longest record lasts. A swing of which a window of so many
+    ``seconds`` holds next to nothing is a free force in each of them, and would explain anything.
 
     An angle that counts turns goes far beyond its channel's scale, where a cubic spring of usual
     size would be a wall, and trial steps of that size would tell nothing. A place, such as where a
     spring rests, is looked for near the channel's zero and no farther beyond what was measured
     than that is wide: a spring that rests farther away is a constant load with another name.
     """
+    known = effect.quantities(simulator)
     if effect.enters == "actuator":
         longest = _longest(samples)
         return {
@@ -91,7 +94,8 @@ def within_reach(
             for name, q in known.items()
         }
     if isinstance(effect, FlexiblePart):
-        slow, fast = SWINGS / _longest(samples), IN_A_SAMPLE / float(np.median(samples.durations))
+        slow = max(SWINGS / _longest(samples), IN_A_WINDOW / seconds)
+        fast = IN_A_SAMPLE / float(np.median(samples.durations))
         count = max(1 + int(np.ceil(np.log(fast / slow) / np.log(FURTHER))), 2)
         starts = tuple(np.geomspace(slow, max(fast, slow), count).tolist())
         swing = dataclasses.replace(

@@ -10,6 +10,7 @@ from sims.effects import (
     ActuatorLag,
     CubicSpring,
     Delay,
+    FlexiblePart,
     ForceCurve,
     FrictionCurve,
     InputCurve,
@@ -85,3 +86,17 @@ def test_a_curve_keeps_the_points_that_it_was_given():
     given = [InputCurve("voltage", low=0.5, high=1.0), Saturation("voltage")]
     curve, _ = candidates(PendulumEquation(), given, Samples.join([run], 5))
     assert curve.effect.reach == (0.5, 1.0)
+
+
+def test_no_swing_is_looked_for_that_a_window_holds_next_to_nothing_of():
+    states = np.column_stack([np.linspace(-1.0, 1.0, 401), np.zeros(401)])
+    run = Trajectory("run", 0.05 * np.arange(401.0), states, np.ones((400, 1)))
+    pendulum, samples, low = PendulumEquation(), Samples.join([run], 5), {}
+    for seconds in (np.inf, 2.0, 0.5):
+        (part,) = candidates(pendulum, [FlexiblePart("pivot")], samples, seconds)
+        (swing,) = (knob for knob in part.knobs if knob.field == "frequency")
+        column = part.knobs.index(swing)
+        assert min(float(trial.values[:, column].min()) for trial in part.trials) >= swing.low
+        low[seconds] = swing.low
+    assert low[np.inf] == low[2.0] == pytest.approx(3 / 20, rel=0.01)
+    assert low[0.5] == 0.25 / 0.5
