@@ -152,6 +152,11 @@ def not_found(source: str | Mapping[str, Any]) -> str:
     What a file names has to be trusted already: to look for a class is to import its module.
     """
     settings: Any = source
+    if isinstance(source, str) and Path(source).is_dir():
+        return (
+            f"{source} is a folder; expected MODULE.CLASS, as import would find it, or a file that "
+            "names one"
+        )
     if isinstance(source, str) and Path(source).suffix in (".yaml", ".yml"):
         if not Path(source).is_file():
             return "there is no such file"

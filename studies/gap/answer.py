@@ -87,7 +87,8 @@ def headline(verdict: Verdict, result: GapResult) -> str:
     if verdict.effect == verdict.where and parameter is not None:
         (change,) = verdict.parameters.values()
         half = 0.0 if change.at_bound else 0.5 * (change.high - change.low)
-        total = told(float(parameter.value) + change.value, half)
+        # However wide the interval: it is to be seen from what it is told.
+        total = told(float(parameter.value) + change.value, min(half, abs(change.value)))
         return (
             f"{name}: {number_text(change, sign=True)}, so {total}"
             f"{unit_text(change.unit)} in place of {six_digits(float(parameter.value))}."

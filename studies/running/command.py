@@ -264,7 +264,7 @@ def _check_given(name: str, value: str) -> None:
         except ValueError as error:
             raise ValueError(f"{name} {error}") from None
     elif name in CLASSES:
-        path = IMPORT_PATH.fullmatch(value) and not Path(value).exists()
+        path = Path(value).is_dir() or (IMPORT_PATH.fullmatch(value) and not Path(value).exists())
         if lacking := in_file(value) or (not_found(value) if path else ""):
             raise ValueError(f"{name}: {lacking}")
 

@@ -39,6 +39,15 @@ def test_a_gain_is_told_as_a_share_more_and_as_times():
     assert times_of(back) == ", so 0.6 times as fast on the way back"
 
 
+def test_a_parameter_with_a_wide_interval_differs_from_what_the_simulator_has():
+    wide = dataclasses.replace(MASS, parameters={"change": Number(0.0054, -0.3, 33.0, "kg")})
+    said = headline(wide, result(wide))
+    own = float(result(wide).corrected.parameters["mass"].value)
+    now, before = said.split(", so ")[1].rstrip(".").split(" kg in place of ")
+    assert float(before) == pytest.approx(own)
+    assert float(now) == pytest.approx(own + 0.0054, abs=5e-4) != own
+
+
 def test_other_channels_have_their_errors_below_the_table():
     found = result(MASS)
     table = found.gap.by_channel | {

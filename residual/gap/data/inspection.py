@@ -269,12 +269,10 @@ def faulty(
         moved = None
         if channel.name in rates:
             moved = [run.states[:-1, rates[channel.name]] * run.durations for run in trajectories]
-        masks = {
-            "dropped": dropped_samples(runs, 2 * np.pi if channel.angle else 0.0),
-            "wild": wild_samples(runs),
-            "frozen": frozen_samples(runs, moved),
-        }
-        found.append((channel, masks))
+        dropped = dropped_samples(runs, 2 * np.pi if channel.angle else 0.0)
+        wild = [a & ~b for a, b in zip(wild_samples(runs), dropped, strict=True)]
+        frozen = frozen_samples(runs, moved)
+        found.append((channel, {"dropped": dropped, "wild": wild, "frozen": frozen}))
     return found
 
 
