@@ -239,6 +239,7 @@ class Effect(abc.ABC):
                 nominal=known["nominal"],
                 starts=tuple(_tidy(start * typical) for start in known["starts"]),
                 integer=known["integer"],
+                above=known["above"],
                 bold=None if known["bold"] is None else _tidy(known["bold"] * typical),
             )
         return found

@@ -43,14 +43,18 @@ def may_be_none(search: Search, claim: Claim) -> bool:
 
 def half_open(search: Search, claim: Claim) -> bool:
     """Whether one of an effect's two strengths may be zero, though it was found at half the size of
-    the other or more: friction by direction, of which a dead zone and a bias may be half."""
-    numbers = [claim.numbers[knob.field] for knob in strengths(search, claim)]
-    if len({number.unit for number in numbers}) != 1 or len(numbers) != 2:
+    the other or more: friction by direction, of which a dead zone and a bias may be half. Or though
+    the other begins above it: friction that may be none in motion is no friction."""
+    knobs = strengths(search, claim)
+    numbers = {knob.field: claim.numbers[knob.field] for knob in knobs}
+    if len({number.unit for number in numbers.values()}) != 1 or len(numbers) != 2:
         return False
-    most = max(abs(number.value) for number in numbers)
+    most = max(abs(number.value) for number in numbers.values())
+    under = {knob.above for knob in knobs}
     return any(
-        number.low <= 0 <= number.high and 0 < most <= abs(number.value) / AS_LARGE
-        for number in numbers
+        number.low <= 0 <= number.high
+        and (field in under or 0 < most <= abs(number.value) / AS_LARGE)
+        for field, number in numbers.items()
     )
 
 

@@ -134,7 +134,7 @@ class Search:
 
     def surprises(self, key: Key) -> int:
         """Effects of a set that are larger than usual, end at a bound, or are unlikely so."""
-        return surprises(self.tried[key], self.fitter.samples)
+        return surprises(self.tried[key], self.fitter.samples) + (key in self.extreme)
 
     def undone(self, key: Key) -> int:
         """Pairs of a set that undo nearly all of each other."""
@@ -229,12 +229,13 @@ class Search:
         self.tried[key] = found
         self.validated[key] = validate(self.fitter, found)
         number, reason = absurd(found.model, found.theta, self.fitter.samples)
-        if reason and told_by_data(found, self.nominal, self.fitter, self._noise):
-            self.extreme.add(key)
-        elif reason:
-            self.refused[key] = reason
-            if nearly(found, number, self.fitter):
-                self.nearly.add(key)
+        if reason:
+            if told_by_data(found, self.nominal, self.fitter, self._noise):
+                self.extreme.add(key)
+            else:
+                self.refused[key] = reason
+                if nearly(found, number, self.fitter):
+                    self.nearly.add(key)
             for twin in self.twins_of(key[number]) if number < len(key) else ():
                 self.add_twin(key, key[number], twin)
         for gone in absent(found.model, key, found.theta):

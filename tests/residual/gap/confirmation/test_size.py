@@ -82,9 +82,10 @@ def test_a_side_that_a_bound_cuts_off_goes_as_far_as_the_other():
     assert 0 < low < 34.0 - 20.0
 
 
-def told(effect, *spans, asked=may_vanish):
-    """Whether an effect with these intervals may be nothing."""
-    knobs = [Knob(f"n{i}", "K/s", -np.inf, np.inf, 1.0, True) for i in range(len(spans))]
+def told(effect, *spans, asked=may_vanish, above=""):
+    """Whether an effect with these intervals may be nothing, the last number above another."""
+    ends = [*[""] * (len(spans) - 1), above]
+    knobs = [Knob(f"n{i}", "K/s", -np.inf, np.inf, 1.0, True, above=e) for i, e in enumerate(ends)]
     numbers = {f"n{i}": Number(0.5 * (a + b), a, b, "K/s") for i, (a, b) in enumerate(spans)}
     search = SimpleNamespace(candidates=[SimpleNamespace(effect=effect, knobs=knobs)])
     claim = Claim(0, numbers, (), (), (), (), True, True, True, False, (0.5, 0.4, 0.6))
@@ -110,3 +111,10 @@ def test_a_curve_along_a_state_needs_two_points_that_are_none_of_zero():
 )
 def test_of_two_strengths_none_that_is_large_may_be_zero(spans, half):
     assert told(InputCurve("heat"), *spans, asked=half_open) == half
+
+
+def test_friction_that_may_be_none_in_motion_is_no_friction():
+    sliding, breakaway = (0.0, 0.4), (1.0, 1.2)
+    assert told(InputCurve("heat"), sliding, breakaway, asked=half_open, above="n0")
+    assert not told(InputCurve("heat"), sliding, breakaway, asked=half_open)
+    assert not told(InputCurve("heat"), (0.1, 0.4), breakaway, asked=half_open, above="n0")

@@ -17,6 +17,7 @@ from sims.effects import (
     LinearSpring,
     Saturation,
     SensorScale,
+    StribeckFriction,
 )
 from sims.pendulum_equation import PendulumEquation
 
@@ -100,3 +101,11 @@ def test_no_swing_is_looked_for_that_a_window_holds_next_to_nothing_of():
         low[seconds] = swing.low
     assert low[np.inf] == low[2.0] == pytest.approx(3 / 20, rel=0.01)
     assert low[0.5] == 0.25 / 0.5
+
+
+def test_a_number_that_does_nothing_below_another_knows_that_one():
+    states = np.column_stack([np.linspace(-1.0, 1.0, 51), np.zeros(51)])
+    run = Trajectory("run", 0.05 * np.arange(51.0), states, np.ones((50, 1)))
+    (found,) = candidates(PendulumEquation(), [StribeckFriction("pivot")], Samples.join([run], 5))
+    above = {knob.field: knob.above for knob in found.knobs}
+    assert above == {"sliding": "", "breakaway": "sliding", "speed": ""}
