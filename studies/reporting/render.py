@@ -12,6 +12,8 @@ from markupsafe import Markup, escape
 
 _INLINE = (
     (re.compile(r"\*\*(\S(?:.*?\S)?)\*\*"), r"<strong>\1</strong>"),
+    # An option stays on one line: a browser would break it behind its first hyphen.
+    (re.compile(r"(?<![\w-])(--[a-z][\w-]*)"), r'<span class="option">\1</span>'),
     (re.compile(r"\[([^\]]+)\]\(((?:https?://|#)[^\s)]+)\)"), r'<a href="\2">\1</a>'),
 )
 # A number stays on one line with its unit.

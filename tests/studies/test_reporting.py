@@ -111,6 +111,13 @@ def test_page_escapes_what_is_not_markup():
     assert "seed: 0 <script>" in page.text
 
 
+def test_an_option_is_kept_on_one_line():
+    text = str(reporting.Report("Gap", "Give more --minutes.", []).html())
+    page = Page(text)
+    assert [span for span in page.all("span") if span.get("class") == "option"]
+    assert "Give more --minutes." in page.text and ".option { white-space: nowrap; }" in text
+
+
 def test_headings_are_ordered_and_linked_from_the_contents():
     page = Page(full_report().html())
     assert len(page.all("h1")) == 1
