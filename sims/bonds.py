@@ -27,6 +27,3 @@ class Bonds(Protocol):
         What was told moves first, from where it was in the row before; other positions move as
         little as closes the bonds. Rows whose bonds cannot be closed stay as they are.
         """
-
-    def along(self, states: Array) -> Array:
-        """The same states with rates that do not open the bonds, (n, n_p)."""

@@ -67,16 +67,6 @@ class MujocoBonds:
             move[~moving] = 0.0
         return found
 
-    def along(self, states: Array) -> Array:
-        """See ``Bonds.along``."""
-        data, found = mujoco.MjData(self.model), np.array(states, float)
-        rates = found[:, self.model.nq : self.model.nq + self.model.nv]
-        for row, pose in enumerate(states[:, : self.model.nq]):
-            data.qpos[:] = pose
-            slope = self._open(data)[1]
-            rates[row] -= np.linalg.lstsq(slope, slope @ rates[row], rcond=SINGULAR)[0]
-        return found
-
     def _motions(self, channels: Mask) -> Mask:
         """Degrees of freedom of joints with such positions, (n_p,) -> (nv,)."""
         found = np.zeros(self.model.nv, bool)

@@ -28,9 +28,9 @@ def unseen(channels: Sequence[Channel], measured: Iterable[int]) -> Mask:
 def measured(model: Model, samples: Samples, theta: Array) -> Array:
     """Nodes straight from the measurement; an unmeasured rate by central differences.
 
-    Positions keep the bonds of the simulator, which may tell some that were not measured. What
-    cannot be told so, such as the level of a tank without a sensor, is where the model goes from
-    zero while the measured states are as measured.
+    Positions keep the bonds of the simulator. What was not measured, such as the level of a tank
+    without a sensor, is where the model goes from zero, or from where bonds have it, while the
+    measured states are as measured: bonds would carry their noise over.
     """
     channels = model.simulator.physical_channels
     names = [c.name for c in channels]
@@ -52,8 +52,7 @@ def measured(model: Model, samples: Samples, theta: Array) -> Array:
         nodes = model.bind(theta).unsense(nodes)
     hidden = unseen(channels, samples.measured)
     if (bonds := model.simulator.bonds) is not None:
-        told = bonds.told(nodes, hidden)
-        nodes, hidden = _bound(nodes, samples, channels, bonds, told), hidden & ~told
+        nodes = _bound(nodes, samples, channels, bonds, bonds.told(nodes, hidden))
     nodes = model.widen(samples, nodes, theta)
     columns = np.flatnonzero(hidden)
     return _reckoned(model, samples, nodes, theta, columns) if columns.size else nodes
@@ -72,7 +71,7 @@ def _bound(
                 for start, stop in samples.runs:
                     at, moved = samples.times[start:stop], nodes[start:stop, position]
                     nodes[start:stop, i] = np.gradient(moved, at)
-    return bonds.along(nodes)
+    return nodes
 
 
 def _reckoned(

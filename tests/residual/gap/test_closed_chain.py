@@ -70,7 +70,7 @@ def test_forecasts_of_the_true_press_begin_on_its_bond(run, tmp_path):
     ready = prepare(simulator, [run], 0.3)
     nominal = ready.fitter.fit(Model(simulator), np.zeros(0))
     errors = np.sqrt(np.nanmean(validate(ready.fitter, nominal).squares, axis=0))
-    assert (errors < [0.01, 1e-3]).all(), errors  # crank in rad, ram in m
+    assert (errors < [3e-3, 3e-4]).all(), errors  # crank in rad, ram in m
 
 
 @pytest.mark.long

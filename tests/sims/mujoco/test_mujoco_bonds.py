@@ -84,17 +84,3 @@ def test_noise_is_moved_by_no_more_than_noise(bonds):
     assert np.abs(kept - seen).max() < 6e-3
     gap = kept[:, 1] + kept[:, 0] + np.arcsin(CRANK * np.sin(kept[:, 0]) / ROD)
     assert np.abs(gap).max() < 1e-8
-
-
-def test_rates_along_a_path_stay_and_others_lose_what_opens_it(bonds):
-    true = path(rows=2000)[5:-5]
-    assert np.abs(bonds.along(true)[:, 3:] - true[:, 3:]).max() < 1e-2 * np.abs(true[:, 3:]).max()
-    off = true.copy()
-    off[:, 4] += 3.0
-    found = bonds.along(off)
-    # The rod's own rate is bound to the crank's: cos(tilt) ROD (rod' + crank') = -CRANK cos crank'.
-    tilt = -(found[:, 0] + found[:, 1])
-    turning = -(found[:, 3] + found[:, 4])
-    assert np.abs(
-        ROD * np.cos(tilt) * turning - CRANK * np.cos(found[:, 0]) * found[:, 3]
-    ).max() < (1e-9)
