@@ -21,9 +21,9 @@ class Bonds(Protocol):
             unknown: Channels of which nothing was measured, (n_p,).
         """
 
-    def closed(self, states: Array, told: NDArray[np.bool_]) -> Array:
-        """A path, (n, n_p), with positions that keep the bonds, as near as can be.
+    def filled(self, states: Array, told: NDArray[np.bool_]) -> Array:
+        """A path, (n, n_p), with what is told where it opens the bonds least.
 
-        What was told moves first, from where it was in the row before; other positions move as
-        little as closes the bonds. Rows whose bonds cannot be closed stay as they are.
+        Each row begins where the one before ended; one that leads nowhere stays as it is. Rates
+        stay as they are.
         """

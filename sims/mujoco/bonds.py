@@ -1,4 +1,4 @@
-"""States that keep the bonds of a model's ``<equality>`` elements."""
+"""What a model's ``<equality>`` elements tell of positions that were not measured."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from sims.simulator import Array
 
-#: Newton steps of a row; they end once no bond is off by more than ``CLOSED`` (m or rad), or where
-#: what was told by the others moves no more than ``STILL``.
-STEPS, CLOSED, STILL = 20, 1e-10, 1e-9
+#: Newton steps of a row at most; they end where none moves anything more than that (m or rad).
+STEPS, STILL = 20, 1e-9
 #: Singular values below this part of the largest one are none.
 SINGULAR = 1e-6
 #: Rows of a path at which it is asked what the bonds tell: at a dead centre that is less.
@@ -51,20 +50,16 @@ class MujocoBonds:
             found[model.nq :][motions] = by_most[motions].all()
         return found & unknown
 
-    def closed(self, states: Array, told: Mask) -> Array:
-        """See ``Bonds.closed``."""
+    def filled(self, states: Array, told: Mask) -> Array:
+        """See ``Bonds.filled``."""
         model, found, moving = self.model, np.array(states, float), self._motions(told)
         data, move = mujoco.MjData(model), np.zeros(model.nv)
-        for row, given in enumerate(states[:, : model.nq]):
+        for row, given in enumerate(states[:, : model.nq] if moving.any() else ()):
             data.qpos[:] = given
-            if moving.any():
-                mujoco.mj_integratePos(model, data.qpos, move, 1.0)
-                self._close(data, moving, STILL)
-            if not self._close(data, np.ones_like(moving), 0.0):
-                continue
-            found[row, : model.nq] = data.qpos
-            mujoco.mj_differentiatePos(model, move, 1.0, given, data.qpos)
-            move[~moving] = 0.0
+            mujoco.mj_integratePos(model, data.qpos, move, 1.0)
+            if self._close(data, moving):
+                found[row, : model.nq] = data.qpos
+                mujoco.mj_differentiatePos(model, move, 1.0, given, data.qpos)
         return found
 
     def _motions(self, channels: Mask) -> Mask:
@@ -74,17 +69,15 @@ class MujocoBonds:
             found[motions] = channels[positions].any()
         return found
 
-    def _close(self, data: Any, moving: Mask, still: float) -> bool:
-        """Move some degrees of freedom until the bonds are closed, or they rest; whether closed."""
+    def _close(self, data: Any, moving: Mask) -> bool:
+        """Move some degrees of freedom to where the bonds are open least; whether they rest."""
+        step = np.zeros(self.model.nv)
         for _ in range(STEPS):
             gap, slope = self._open(data)
-            if np.abs(gap).max(initial=0.0) < CLOSED:
-                return True
-            step = np.zeros(self.model.nv)
             step[moving] = np.linalg.lstsq(slope[:, moving], -gap, rcond=SINGULAR)[0]
             mujoco.mj_integratePos(self.model, data.qpos, step, 1.0)
-            if np.abs(step).max() < still:
-                break
+            if np.abs(step).max() < STILL:
+                return True
         return False
 
     def _open(self, data: Any) -> tuple[Array, Array]:

@@ -28,9 +28,9 @@ def unseen(channels: Sequence[Channel], measured: Iterable[int]) -> Mask:
 def measured(model: Model, samples: Samples, theta: Array) -> Array:
     """Nodes straight from the measurement; an unmeasured rate by central differences.
 
-    Positions keep the bonds of the simulator. What was not measured, such as the level of a tank
-    without a sensor, is where the model goes from zero, or from where bonds have it, while the
-    measured states are as measured: bonds would carry their noise over.
+    What cannot be told so, such as the level of a tank without a sensor, is where the model goes
+    from zero, or from where bonds have it, while the measured states are as measured: bonds alone
+    would carry their noise over.
     """
     channels = model.simulator.physical_channels
     names = [c.name for c in channels]
@@ -50,27 +50,24 @@ def measured(model: Model, samples: Samples, theta: Array) -> Array:
                 column[~good] = np.interp(at[~good], at[good], column[good])
     if model.has_sensor:
         nodes = model.bind(theta).unsense(nodes)
-    hidden = unseen(channels, samples.measured)
-    if (bonds := model.simulator.bonds) is not None:
-        nodes = _bound(nodes, samples, channels, bonds, bonds.told(nodes, hidden))
+    if model.simulator.bonds is not None:
+        nodes = _filled(nodes, samples, channels, model.simulator.bonds)
     nodes = model.widen(samples, nodes, theta)
-    columns = np.flatnonzero(hidden)
-    return _reckoned(model, samples, nodes, theta, columns) if columns.size else nodes
+    hidden = np.flatnonzero(unseen(channels, samples.measured))
+    return _reckoned(model, samples, nodes, theta, hidden) if hidden.size else nodes
 
 
-def _bound(
-    nodes: Array, samples: Samples, channels: Sequence[Channel], bonds: Bonds, told: Mask
-) -> Array:
-    """Nodes that keep the bonds; rates that were not measured by central differences of these."""
+def _filled(nodes: Array, samples: Samples, channels: Sequence[Channel], bonds: Bonds) -> Array:
+    """Nodes with what bonds tell of positions that were not measured, and their rates."""
     names = [channel.name for channel in channels]
-    nodes = bonds.closed(nodes, told)
+    told = bonds.told(nodes, unseen(channels, samples.measured))
+    nodes = bonds.filled(nodes, told)
     for i, channel in enumerate(channels):
-        if channel.kind == "rate" and i not in samples.measured and channel.rate_of in names:
-            position = names.index(channel.rate_of)
-            if position in samples.measured or told[position]:
-                for start, stop in samples.runs:
-                    at, moved = samples.times[start:stop], nodes[start:stop, position]
-                    nodes[start:stop, i] = np.gradient(moved, at)
+        if told[i] and channel.kind == "rate":
+            position = names.index(str(channel.rate_of))
+            for start, stop in samples.runs:
+                at, moved = samples.times[start:stop], nodes[start:stop, position]
+                nodes[start:stop, i] = np.gradient(moved, at)
     return nodes
 
 
