@@ -13,7 +13,7 @@ from residual.gap.confirmation.numerics import at_half_step
 from residual.gap.search.comparisons import no_match
 from residual.gap.search.exchange import exchanged, split
 from residual.gap.search.sets import Key, Search, all_but
-from residual.gap.search.significance import BETTER, NO_DIFFERENCE, score, tie
+from residual.gap.search.significance import BETTER, score, tie
 
 Array = NDArray[np.float64]
 
@@ -67,12 +67,11 @@ def excluded(
     left, a rival has to be clearly worse, also from starts that are better known: errors of the
     start fade in a sluggish model otherwise than in a late one. One that differs in form alone
     has to lose at the horizon, beyond chance, and at half of it. What leaves three times as much
-    of all data is out, and of another family what has more numbers and fits no better than one
-    does by chance: a store that is quickly filled is nothing but more capacity.
+    of all data is out, and of another family what has more numbers and fits no better: a store that
+    is quickly filled is nothing but more capacity.
     """
     more = search.numbers(rival) > search.numbers(key)
-    gained = search.tried[key].merit - search.tried[rival].merit
-    if more and not alike and gained <= NO_DIFFERENCE:
+    if more and not alike and search.tried[rival].merit >= search.tried[key].merit:
         return True
     if adequate:
         if search.simulator.has_contacts and search.error(key) >= BETTER * search.error(rival):
