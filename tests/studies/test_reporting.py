@@ -233,7 +233,9 @@ def test_shown_number_is_right_to_its_digits(value):
 def test_any_text_gives_well_formed_html_without_tags_of_its_own(text):
     for filter_ in (inline, paragraphs):
         page = Page(f"<div>{filter_(text)}</div>")
-        assert {tag for tag, _ in page.tags} <= {"div", "p", "ul", "li", "strong", "code", "a"}
+        own = {"div", "p", "ul", "li", "strong", "code", "a", "span"}
+        assert {tag for tag, _ in page.tags} <= own
+        assert all(span == {"class": "option"} for span in page.all("span"))
 
 
 def test_links_lead_to_web_pages_only():
