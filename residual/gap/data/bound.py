@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from residual.gap.data.inspection import measured
+from residual.gap.data.samples import unseen
 from residual.logs.checks import Finding
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
@@ -17,10 +18,9 @@ def bound(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[
     if simulator.bonds is None:
         return []
     channels = simulator.physical_channels
-    logged = {channel.name for channel, _ in measured(simulator, trajectories)}
-    unknown = np.array([not {c.name, c.rate_of} & logged for c in channels])
+    logged = [channels.index(channel) for channel, _ in measured(simulator, trajectories)]
     states = np.nan_to_num(np.concatenate([run.states[:, : len(channels)] for run in trajectories]))
-    told = simulator.bonds.told(states, unknown)
+    told = simulator.bonds.told(states, unseen(channels, logged))
     return [
         Finding(
             "bound",

@@ -7,13 +7,14 @@ import functools
 import hashlib
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.merging import Merging
 from residual.trajectories import Trajectory
+from sims.simulator import Channel
 
 Array = NDArray[np.float64]
 
@@ -230,3 +231,9 @@ def _content(run: Trajectory) -> bytes:
     """Puts runs in an order that depends on what was measured alone."""
     parts = (run.states, run.actions, run.durations)
     return hashlib.sha256(b"".join(np.ascontiguousarray(p).tobytes() for p in parts)).digest()
+
+
+def unseen(channels: Sequence[Channel], measured: Iterable[int]) -> NDArray[np.bool_]:
+    """States of which the log says nothing: not measured, nor rates of what was, (n_p,)."""
+    seen = {channels[i].name for i in measured}
+    return np.array([not {c.name, c.rate_of} & seen for c in channels], bool)

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.data.samples import Samples
+from residual.gap.data.samples import Samples, unseen
 from residual.gap.model.model import Model
 from sims.bonds import Bonds
 from sims.simulator import Channel
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Rows that are reckoned one after the other; longer runs are cut, and the cuts gone over again.
 LONGEST = 400
-
-
-def unseen(channels: Sequence[Channel], measured: Iterable[int]) -> Mask:
-    """States of which the log says nothing: not measured, nor rates of what was, (n_p,)."""
-    seen = {channels[i].name for i in measured}
-    return np.array([not {c.name, c.rate_of} & seen for c in channels], bool)
 
 
 def measured(model: Model, samples: Samples, theta: Array) -> Array:
@@ -41,8 +35,7 @@ def measured(model: Model, samples: Samples, theta: Array) -> Array:
             column = nodes[rows, i]
             good = np.isfinite(column)
             if not good.any() and channel.kind == "rate" and channel.rate_of in names:
-                position = nodes[rows, names.index(channel.rate_of)]
-                column[:] = np.gradient(position, samples.times[rows])
+                column[:] = _slope(samples, nodes, rows, names.index(channel.rate_of))
             elif not good.any():
                 column[:] = 0.0
             elif not good.all():
@@ -65,10 +58,15 @@ def _filled(nodes: Array, samples: Samples, channels: Sequence[Channel], bonds: 
     for i, channel in enumerate(channels):
         if told[i] and channel.kind == "rate":
             position = names.index(str(channel.rate_of))
-            for start, stop in samples.runs:
-                at, moved = samples.times[start:stop], nodes[start:stop, position]
-                nodes[start:stop, i] = np.gradient(moved, at)
+            for rows in itertools.starmap(slice, samples.runs):
+                nodes[rows, i] = _slope(samples, nodes, rows, position)
     return nodes
+
+
+def _slope(samples: Samples, nodes: Array, rows: slice, position: int) -> Array:
+    """Rate of a position over a run by central differences, (n,)."""
+    slope: Array = np.gradient(nodes[rows, position], samples.times[rows])
+    return slope
 
 
 def _reckoned(

@@ -107,7 +107,8 @@ def within_reach(
         longest = _longest(samples)
         starts = tuple(part * longest for part in STORED)
         # What follows faster than samples come is a part of the state.
-        time = dataclasses.replace(known["time"], low=simulator.dt, high=longest, starts=starts)
+        fast = min(float(np.median(samples.durations)), starts[0])
+        time = dataclasses.replace(known["time"], low=fast, high=longest, starts=starts)
         return {**known, "time": time}
     joint = next((j for j in simulator.joints if j.name == effect.where), None)
     if effect.enters != "joint" or joint is None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.blocks import blocks, drive
-from residual.gap.data.samples import Samples
+from residual.gap.data.samples import Samples, unseen
 from residual.gap.data.windows import cut
 from residual.gap.fitting import noise
 from residual.gap.fitting.contract import Fit, Fitter
@@ -186,7 +186,7 @@ def _scales(simulator: HostSimulator, samples: Samples, nodes: Array) -> Array:
     channels = simulator.physical_channels
     physical = paths.variation(samples, nodes[:, : len(channels)])
     usual = np.array([channel.scale for channel in channels])
-    hidden = paths.unseen(channels, samples.measured)
+    hidden = unseen(channels, samples.measured)
     return np.where(hidden, np.maximum(physical, usual), physical)
 
 
