@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from sims.effects.joint import LinearSpring, ViscousFriction
-from sims.mujoco import elements
+from sims.mujoco import elements, payload
 from sims.mujoco.contacts import touching_geoms
 from sims.simulator import Array, Parameter
 
@@ -47,12 +47,14 @@ class Attribute:
         parameter: Its nominal value, unit, meaning, bounds, and the size of a change that matters.
         slots: What it sets in the compiled model.
         offered: Whether it is searched by default.
+        place: Where it is a point mass, in place of slots.
     """
 
     name: str
     parameter: Parameter
-    slots: tuple[Slot, ...]
+    slots: tuple[Slot, ...] = ()
     offered: bool = True
+    place: payload.Place | None = None
 
 
 def attributes(model: Any) -> dict[str, Attribute]:
@@ -60,6 +62,7 @@ def attributes(model: Any) -> dict[str, Attribute]:
     found = [
         *_of_joints(model),
         *_of_bodies(model),
+        *_payloads(model),
         *_of_actuators(model),
         *_of_contacts(model),
         *_of_the_world(model),
@@ -101,7 +104,8 @@ def row_fields(
         # Below its bound an attribute is no physics: a negative frictionloss would drive.
         value = np.maximum(value, lowest) if math.isfinite(lowest) else value
         changed.append((attribute, np.broadcast_to(np.asarray(value, float), (rows,))))
-    # What is set comes before what is multiplied, in whatever order attributes are listed.
+    # What is set comes before what is multiplied, in whatever order attributes are listed, and
+    # what is carried last.
     for scaled in (False, True):
         for attribute, value in changed:
             nominal = float(attribute.parameter.value)
@@ -113,6 +117,11 @@ def row_fields(
                     array = fields[slot.field] = repeated(model, slot.field, rows)
                 at: Any = (slice(None), *slot.index)
                 array[at] = _scaled(array[at], value, nominal) if scaled else value
+    for attribute, value in changed:
+        if attribute.place is not None:
+            for field in payload.FIELDS:
+                fields.setdefault(field, repeated(model, field, rows))
+            payload.load(fields, attribute.place, value)
     return fields
 
 
@@ -204,6 +213,14 @@ def _of_bodies(model: Any) -> Iterator[Attribute]:
             full = f"center of mass {axis} of body {name}"
             parameter = Parameter(float(model.body_ipos[b, k]), "m", full, scale=max(size, 1e-3))
             yield Attribute(full, parameter, (Slot("body_ipos", (b, k)),))
+
+
+def _payloads(model: Any) -> Iterator[Attribute]:
+    for place in payload.places(model):
+        full = f"payload at {place.name}"
+        mass = float(model.body_mass[place.body]) or float(model.body_mass.sum())
+        parameter = Parameter(0.0, "kg", full, 0.0, scale=mass)
+        yield Attribute(full, parameter, place=place)
 
 
 def _of_actuators(model: Any) -> Iterator[Attribute]:

@@ -19,7 +19,7 @@ from sims.effects.backlash import Backlash
 from sims.effects.base import Effect
 from sims.effects.joint import ConstantLoad, JointEffect
 from sims.effects.sensor import SensorEffect
-from sims.mujoco import elements
+from sims.mujoco import elements, payload
 from sims.mujoco.actuators import Circuit, written
 from sims.mujoco.attributes import nominal_field
 from sims.mujoco.compiled import HARD_FRICTION, model_text
@@ -135,14 +135,11 @@ class _Writer:
     def _bodies(self, fields: dict[str, Array]) -> None:
         model = self.model
         for b in range(1, model.nbody):
-            if not any(
-                _changed(model, fields, field, b)
-                for field in ("body_mass", "body_inertia", "body_ipos")
-            ):
+            if not any(_changed(model, fields, field, b) for field in payload.FIELDS):
                 continue
             inertial: dict[str, str | None] = {
                 "pos": written(_value(model, fields, "body_ipos", b)),
-                "quat": written(model.body_iquat[b]),
+                "quat": written(_value(model, fields, "body_iquat", b)),
                 "mass": written([_value(model, fields, "body_mass", b)]),
                 "diaginertia": written(_value(model, fields, "body_inertia", b)),
             }

@@ -24,6 +24,7 @@ def name_of(kind: str, model: Any, index: int) -> str:
         "body": mujoco.mjtObj.mjOBJ_BODY,
         "actuator": mujoco.mjtObj.mjOBJ_ACTUATOR,
         "geom": mujoco.mjtObj.mjOBJ_GEOM,
+        "site": mujoco.mjtObj.mjOBJ_SITE,
     }
     return mujoco.mj_id2name(model, types[kind], index) or f"{kind}{index}"
 
