@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sims import drive as path
-from sims.effects.actuator import ActuatorEffect, ActuatorLag
+from sims import followers as follow
+from sims.effects.actuator import ActuatorEffect
 from sims.effects.dimensions import product
 from sims.effects.flexible import flexible_parts
+from sims.effects.hysteresis import Hysteresis
 from sims.effects.slew import SlewLimit
 from sims.effects.store import stores
 from sims.simulator import Array, Channel, Hold
@@ -51,7 +53,7 @@ def memory_channels(simulator: HostSimulator) -> Iterator[Channel]:
         for k in range(history(simulator, channel.name), 0, -1):
             past = f"{channel.name} {k} ago"
             yield Channel(past, channel.unit, "memory", scale=channel.scale)
-        for i, _ in enumerate(path.followers(simulator.actuator_effects(channel.name))):
+        for i, _ in enumerate(follow.followers(simulator.actuator_effects(channel.name))):
             name = f"{channel.name} lagged" + (f" {i + 1}" if i else "")
             yield Channel(name, channel.unit, "memory", scale=channel.scale)
 
@@ -123,7 +125,7 @@ def with_memory(simulator: HostSimulator, states: Array, actions: Array) -> Arra
         kept = history(simulator, channel.name)
         full[:, at : at + kept] = actions[:, j : j + 1]
         at += kept
-        count = len(path.followers(effects))
+        count = len(follow.followers(effects))
         full[:, at : at + count] = received[:, j : j + 1]
         at += count
     if simulator.plays():
@@ -160,7 +162,7 @@ def recorded_inputs(
         if np.ndim(late):
             samples = np.broadcast_to(samples, (len(np.asarray(late)), samples.shape[1]))
         means, rises = path.substep_inputs(samples, durations, substeps, late, holds[j], bounds)
-        for one in path.followers(effects):
+        for one in follow.followers(effects):
             shape = (one.rows or len(means), *means.shape[1:])
             means, rises = np.broadcast_to(means, shape), np.broadcast_to(rises, shape)
             start = np.broadcast_to(samples[:, bounds[:-1]], (len(means), len(bounds) - 1))
@@ -173,18 +175,20 @@ def recorded_inputs(
 
 def followed(
     simulator: HostSimulator,
-    effect: ActuatorLag | SlewLimit,
+    effect: follow.Follower,
     means: Array,
     rises: Array,
     durations: Array,
     start: Array,
     bounds: Sequence[int],
 ) -> tuple[Array, Array, Array]:
-    """What comes out of a lag, as the simulator filters, or of a limit of pace; see
-    ``sims.drive.lagged``."""
+    """What comes out of a lag, as the simulator filters, of a limit of pace, or of a play; see
+    ``sims.followers.lagged``."""
     if isinstance(effect, SlewLimit):
         slow = effect.seconds_per_unit
-        return path.limited(means, rises, durations, slow, start, bounds)
+        return follow.limited(means, rises, durations, slow, start, bounds)
+    if isinstance(effect, Hysteresis):
+        return follow.dragged(means, rises, effect.width, start, bounds)
     return simulator.lagged(means, rises, durations, effect.time_constant, start, bounds)
 
 
@@ -229,7 +233,7 @@ def next_inputs(
             (0, commands.shape[1]),
         )
         means, rises = means[:, kept : kept + 1], rises[:, kept : kept + 1]
-        for one in path.followers(effects):
+        for one in follow.followers(effects):
             means, rises, after[:, at] = followed(
                 simulator, one, means, rises, np.array([simulator.dt]), memory[:, at, None], (0, 1)
             )

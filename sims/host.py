@@ -18,13 +18,13 @@ from numpy.typing import ArrayLike
 
 from sims.actuation import clipped, driven, memory_channels, moving_memory, next_inputs, with_memory
 from sims.bonds import Bonds
-from sims.drive import lagged
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.backlash import Backlash
 from sims.effects.base import Effect, place
 from sims.effects.joint import JointEffect
 from sims.effects.parameter import ParameterChange
 from sims.effects.sensor import through_sensors
+from sims.followers import lagged
 from sims.simulator import Array, Channel, Hold, Joint, Simulator, physical, random_values
 
 
@@ -41,7 +41,7 @@ class HostSimulator(Simulator):
         written_out: True if given by equations, which host rate limits, exchanges, stores, parts.
         has_contacts, bonds: Whether motion jumps at impacts (``for_motion``), what binds positions.
         advances_rows_at_once: True if ``integrate`` advances rows together, each its own values.
-        lagged: How an input with a lag acts in sub-steps, see ``sims.drive.lagged``.
+        lagged: How an input with a lag acts in sub-steps, see ``sims.followers.lagged``.
     """
 
     effects: tuple[Effect, ...] = ()

@@ -32,6 +32,7 @@ from sims.effects.friction import DirectionalFriction as DirectionalFriction
 from sims.effects.friction import DryFriction as DryFriction
 from sims.effects.friction import LoadDependentFriction as LoadDependentFriction
 from sims.effects.friction import StribeckFriction as StribeckFriction
+from sims.effects.hysteresis import Hysteresis as Hysteresis
 from sims.effects.inertia import AddedInertia as AddedInertia
 from sims.effects.joint import Cogging as Cogging
 from sims.effects.joint import ConstantLoad as ConstantLoad

@@ -30,6 +30,7 @@ from sims.effects.friction import (
     LoadDependentFriction,
     StribeckFriction,
 )
+from sims.effects.hysteresis import Hysteresis
 from sims.effects.inertia import AddedInertia
 from sims.effects.joint import (
     Cogging,
@@ -159,13 +160,15 @@ def parts_in(simulator: HostSimulator) -> tuple[FlexiblePart, ...]:
 def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     """What is rarer than the library, at zero strength: friction by load of every joint that the
     inputs move by themselves, states that fall at another pace than they rise, inputs that act
-    otherwise below zero, and inputs, but goals, that are followed at a limited pace."""
+    otherwise below zero or through a play, and inputs, but goals, that are followed at a limited
+    pace."""
     found: list[Effect] = list(_geared(simulator))
     inputs = [channel.name for channel in simulator.action_channels]
     inputs += [AND.join(names) for names in like_inputs(simulator)]
     both: list[Effect] = [AsymmetricResponse(joint.name) for joint in simulator.joints]
     slow = [name for name in inputs if name not in goals(simulator)]
-    for effect in (*both, *map(AsymmetricActuator, inputs), *map(SlewLimit, slow)):
+    at_inputs = [kind(name) for kind in (AsymmetricActuator, Hysteresis) for name in inputs]
+    for effect in (*both, *at_inputs, *map(SlewLimit, slow)):
         with contextlib.suppress(ValueError):
             effect.quantities(simulator)
             found.append(effect)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sims.drive import lagged
+from sims.followers import lagged
 from sims.simulator import Array
 
 
@@ -22,7 +22,7 @@ def lagged_at_ends(
 
     It is what an actuator with ``dyntype="filterexact" actearly="true"`` receives, so that a
     corrected model file moves as the corrected simulator. Arguments and values are those of
-    ``sims.drive.lagged``; rises are zero.
+    ``sims.followers.lagged``; rises are zero.
     """
     through, tilts, last = lagged(
         means, np.zeros(means.shape), durations, time_constant, start, bounds

@@ -9,7 +9,6 @@ from typing import Self
 
 import numpy as np
 
-from sims.drive import lagged
 from sims.effects.actuator import (
     ActuatorBias,
     ActuatorLag,
@@ -20,6 +19,7 @@ from sims.effects.actuator import (
 from sims.effects.base import Effect
 from sims.effects.joint import ConstantLoad, LinearSpring
 from sims.effects.sensor import SensorOffset
+from sims.followers import lagged
 from sims.host import HostSimulator
 from sims.mujoco import elements
 from sims.mujoco.attributes import Attribute, attributes, row_fields

@@ -69,6 +69,7 @@ OTHERS = [
     effects.ParameterCurve("mass", "voltage"), effects.Unbalance("pivot"),
     effects.LoadDependentFriction("pivot"), effects.AsymmetricResponse("level"),
     effects.AsymmetricActuator("voltage"), effects.SlewLimit("voltage"),
+    effects.Hysteresis("voltage"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from sims import drive
+from sims import drive, followers
 from sims.checks import check_simulator
 from sims.effects import ActuatorLag, Delay, SlewLimit
 from sims.effects.library import further_in, library
@@ -54,7 +54,7 @@ def test_means_and_rises_are_those_of_the_definition(hold):
         return samples[0, k] + steep[k] * (time - begins[k]) / durations[k]
 
     means, rises = drive.substep_inputs(samples, durations, substeps, 0.0, hold, (0, 30))
-    means, rises, last = drive.limited(means, rises, durations, slow, samples[:, :1], (0, 30))
+    means, rises, last = followers.limited(means, rises, durations, slow, samples[:, :1], (0, 30))
     fine = 400
     ends = begins[:-1, None] + durations[:, None] * np.arange(substeps * fine) / (substeps * fine)
     times = np.append(ends.ravel(), begins[-1])
