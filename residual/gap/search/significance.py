@@ -88,15 +88,20 @@ def least_otherwise(search: Search, key: Key) -> Key:
 
 
 def pruned(search: Search, key: Key, needed: float) -> Key:
-    """What is left of a set when all has gone that chance could do."""
+    """What is left of a set when all has gone that chance could do.
+
+    What stands in place of more has to be one that may be right itself.
+    """
     while key:
         add_without_each(search, key)
-        smaller = [all_but(key, gone) for gone in key]
+        smaller = [k for k in (all_but(key, gone) for gone in key) if search.sound(k)]
         falls = {
             k: search.tried[k].merit - search.tried[key].merit
             - np.log(size(search)) * (search.numbers(key) - search.numbers(k) - 1)
             for k in smaller if k in search.tried
         }  # fmt: skip
+        if not falls:
+            break
         if search.simulator.has_contacts:
             # Luck foretells nothing.
             falls = {
@@ -106,6 +111,5 @@ def pruned(search: Search, key: Key, needed: float) -> Key:
         weakest = min(falls, key=lambda k: falls[k])
         if falls[weakest] > needed:
             break
-        key = min([weakest, *(k for k in search.usable() if len(k) < len(key))],
-                  key=lambda k: score(search, k))  # fmt: skip
+        key = min((k for k in search.usable() if len(k) < len(key)), key=lambda k: score(search, k))
     return key
