@@ -10,6 +10,7 @@ from scipy.stats import t
 
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.numerics import at_half_step
+from residual.gap.confirmation.settled import settled
 from residual.gap.search.comparisons import no_match
 from residual.gap.search.exchange import exchanged, split
 from residual.gap.search.sets import Key, Search, all_but
@@ -63,8 +64,9 @@ def excluded(
 
     Down to the noise, chance decides, at half the step, too, where that matters: a delay may fit
     what a lag did only because steps are coarse. Of what strikes the ground forecasts have to be
-    worse as well, since fits hang on luck in finding start states there. While a remainder is
-    left, a rival has to be clearly worse, also from starts that are better known: errors of the
+    worse as well, since fits hang on luck in finding start states there; clearly so of what settles
+    from sample to sample, where all hangs on a time constant that nothing shows. While a remainder
+    is left, a rival has to be clearly worse, also from starts that are better known: errors of the
     start fade in a sluggish model otherwise than in a late one. One that differs in form alone
     has to lose at the horizon, beyond chance, and at half of it. What leaves three times as much
     of all data is out, and of another family what has more numbers and fits no better: a store that
@@ -75,6 +77,9 @@ def excluded(
         return True
     if adequate:
         if search.simulator.has_contacts and search.error(key) >= BETTER * search.error(rival):
+            return False
+        group = where_it_matters(search, key, number)
+        if ratio(search, rival, key, group) <= CLEARLY and settled(search, group):
             return False
         behind = score(search, rival) - score(search, key)
         return behind > tie(search, key, rival) and not _by_numerics(search, key, rival, behind)
