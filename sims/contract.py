@@ -123,6 +123,8 @@ def forces_act(simulator: EquationOfMotion, states: Array, actions: Array) -> Fi
     for j, joint in enumerate(simulator.joints):
         with np.errstate(all="ignore"):
             free = accelerations(np.zeros_like(q), j)
+            if not np.isfinite(free).any():
+                continue  # which is another fault
             for size in _FORCES:
                 force = np.zeros_like(q)
                 force[:, j] = size

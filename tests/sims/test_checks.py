@@ -228,9 +228,17 @@ class Bent(PendulumEquation):
         return super().acceleration(q, v, u, force * np.abs(force), p)
 
 
+class Undefined(PendulumEquation):
+    """No force changes what is not a number, which is not what is wrong with it."""
+
+    def acceleration(self, q, v, u, force, p):
+        return np.nan * super().acceleration(q, v, u, force, p)
+
+
 @pytest.mark.parametrize(
     ("broken", "check"),
     [
+        (Undefined, "finite"),
         (BreakingFarOut, "finite to the bounds"),
         (Timeless, "period"),
         (Empty, "channels"),
