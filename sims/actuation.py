@@ -188,7 +188,7 @@ def followed(
         slow = effect.seconds_per_unit
         return follow.limited(means, rises, durations, slow, start, bounds)
     if isinstance(effect, Hysteresis):
-        return follow.dragged(means, rises, effect.width, start, bounds)
+        return follow.dragged(means, rises, durations, effect.width, start, bounds)
     return simulator.lagged(means, rises, durations, effect.time_constant, start, bounds)
 
 

@@ -1,12 +1,20 @@
 """What follows a command with a memory of where it is: a lag, a limit of pace, a play.
 
 Inputs run straight in each sub-step, given by mean and rise as in ``sims.drive``; outputs are lines
-that keep the mean and the first moment.
+that keep the mean and the first moment. Each function takes
+
+- ``means`` and ``rises``, (rows, T, substeps), and ``durations``, (T,) seconds,
+- its number, scalar or (rows,); zero leaves the input as it is,
+- ``start``, the output before the first sub-step of each record, (rows, records),
+- ``bounds``, where each record begins, and T,
+
+and returns means and rises of the output, and its last value, (rows,). Kernels put the former in
+place of those of the input.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +26,7 @@ from sims.effects.slew import SlewLimit
 from sims.simulator import Array
 
 Integers = NDArray[np.int64]
+Followed = tuple[Array, Array, Array]
 #: Effects whose output follows the command, with a memory of where it is.
 Follower = ActuatorLag | SlewLimit | Hysteresis
 
@@ -29,41 +38,46 @@ def followers(effects: Iterable[ActuatorEffect]) -> list[Follower]:
 
 
 def lagged(
-    means: Array,
-    rises: Array,
-    durations: Array,
-    time_constant: float | Array,
-    start: Array,
+    means: Array, rises: Array, durations: Array, time_constant: float | Array, start: Array,
     bounds: Sequence[int],
-) -> tuple[Array, Array, Array]:
-    """First-order filter of an input that runs straight in each sub-step, exactly.
+) -> Followed:  # fmt: skip
+    """First-order filter, exactly; ``time_constant`` in seconds."""
+    return _along(_filtered, means, rises, durations, time_constant, start, bounds)
 
-    Args:
-        means, rises: (rows, T, substeps).
-        durations: (T,) seconds.
-        time_constant: Seconds, scalar or (rows,); zero leaves the input as it is.
-        start: Output before the first sub-step of each record, (rows, records).
-        bounds: Where each record begins, and T.
 
-    Returns:
-        Means and rises of the output, same shapes, and its last value, (rows,).
-    """
-    constants = np.broadcast_to(np.asarray(time_constant, float), len(means))
-    filtered, tilted = np.empty(means.shape), np.empty(means.shape)
-    last = _filtered(
-        np.ascontiguousarray(means, float), np.ascontiguousarray(rises, float),
-        np.ascontiguousarray(durations, float), np.ascontiguousarray(constants),
-        np.ascontiguousarray(start, float), np.asarray(bounds, np.int64), filtered, tilted,
+def limited(
+    means: Array, rises: Array, durations: Array, seconds_per_unit: float | Array, start: Array,
+    bounds: Sequence[int],
+) -> Followed:  # fmt: skip
+    """An input followed at a limited pace, exactly, by what a change by one unit takes."""
+    return _along(_limited, means, rises, durations, seconds_per_unit, start, bounds)
+
+
+def dragged(
+    means: Array, rises: Array, durations: Array, width: float | Array, start: Array,
+    bounds: Sequence[int],
+) -> Followed:  # fmt: skip
+    """An input followed through a play of that ``width``, exactly."""
+    return _along(_dragged, means, rises, durations, width, start, bounds)
+
+
+def _along(
+    kernel: Callable[..., Array], means: Array, rises: Array, durations: Array,
+    number: float | Array, start: Array, bounds: Sequence[int],
+) -> Followed:  # fmt: skip
+    followed, tilted = np.array(means, float), np.array(rises, float)
+    numbers = np.ascontiguousarray(np.broadcast_to(np.asarray(number, float), len(means)))
+    last = kernel(
+        np.ascontiguousarray(durations, float), numbers, np.ascontiguousarray(start, float),
+        np.asarray(bounds, np.int64), followed, tilted,
     )  # fmt: skip
-    return filtered, tilted, last
+    return followed, tilted, last
 
 
 @compiled
 def _filtered(
-    means: Array, rises: Array, durations: Array, constants: Array, start: Array,
-    bounds: Integers, filtered: Array, tilted: Array,
-) -> Array:  # fmt: skip
-    """Writes means and rises of the output of ``lagged``, and returns where it ends."""
+    durations: Array, constants: Array, start: Array, bounds: Integers, means: Array, rises: Array
+) -> Array:
     rows, length, substeps = means.shape
     y = np.empty(rows)
     for v in range(rows):
@@ -81,47 +95,16 @@ def _filtered(
                 first = means[v, t, s] - 0.5 * rises[v, t, s] - behind
                 last = means[v, t, s] + 0.5 * rises[v, t, s] - behind
                 lack = y[v] - first
-                filtered[v, t, s] = means[v, t, s] - behind + lack * share
-                tilted[v, t, s] = rises[v, t, s] + lack * tilt
+                means[v, t, s] += lack * share - behind
+                rises[v, t, s] += lack * tilt
                 y[v] = stays * y[v] + last - first * stays
     return y
-
-
-def limited(
-    means: Array,
-    rises: Array,
-    durations: Array,
-    seconds_per_unit: float | Array,
-    start: Array,
-    bounds: Sequence[int],
-) -> tuple[Array, Array, Array]:
-    """An input that runs straight in each sub-step, followed at a limited pace, exactly.
-
-    Args:
-        means, rises: (rows, T, substeps).
-        durations: (T,) seconds.
-        seconds_per_unit: What a change by one unit takes, scalar or (rows,); zero leaves the
-            input as it is.
-        start: Output before the first sub-step of each record, (rows, records).
-        bounds: Where each record begins, and T.
-
-    Returns:
-        As ``lagged``.
-    """
-    slow = np.broadcast_to(np.asarray(seconds_per_unit, float), len(means))
-    followed, tilted = np.array(means, float), np.array(rises, float)
-    last = _limited(
-        np.ascontiguousarray(durations, float), np.ascontiguousarray(slow),
-        np.ascontiguousarray(start, float), np.asarray(bounds, np.int64), followed, tilted,
-    )  # fmt: skip
-    return followed, tilted, last
 
 
 @compiled
 def _limited(
     durations: Array, slow: Array, start: Array, bounds: Integers, means: Array, rises: Array
 ) -> Array:
-    """Replaces means and rises by those of the output of ``limited``; returns where it ends."""
     rows, length, substeps = means.shape
     y = np.empty(rows)
     for v in range(rows):
@@ -156,53 +139,27 @@ def _limited(
     return y
 
 
-def dragged(
-    means: Array,
-    rises: Array,
-    width: float | Array,
-    start: Array,
-    bounds: Sequence[int],
-) -> tuple[Array, Array, Array]:
-    """An input that runs straight in each sub-step, followed through a play, exactly.
-
-    Args:
-        means, rises: (rows, T, substeps).
-        width: Of the play, scalar or (rows,); zero leaves the input as it is.
-        start: Output before the first sub-step of each record, (rows, records).
-        bounds: Where each record begins, and T.
-
-    Returns:
-        As ``lagged``.
-    """
-    half = 0.5 * np.broadcast_to(np.asarray(width, float), len(means))
-    followed, tilted = np.array(means, float), np.array(rises, float)
-    last = _dragged(
-        np.ascontiguousarray(half), np.ascontiguousarray(start, float),
-        np.asarray(bounds, np.int64), followed, tilted,
-    )  # fmt: skip
-    return followed, tilted, last
-
-
 @compiled
-def _dragged(half: Array, start: Array, bounds: Integers, means: Array, rises: Array) -> Array:
-    """Replaces means and rises by those of the output of ``dragged``; returns where it ends."""
+def _dragged(
+    durations: Array, widths: Array, start: Array, bounds: Integers, means: Array, rises: Array
+) -> Array:
     rows, length, substeps = means.shape
     y = np.empty(rows)
     for v in range(rows):
-        record = 0
+        record, half = 0, 0.5 * widths[v]
         for t in range(length):
             if t == bounds[record]:
                 y[v] = start[v, record]
                 record += 1
             for s in range(substeps):
                 first, rise = means[v, t, s] - 0.5 * rises[v, t, s], rises[v, t, s]
-                if not half[v] > 0:
+                if not half > 0:
                     y[v] = first + rise
                     continue
-                y[v] = min(max(y[v], first - half[v]), first + half[v])
+                y[v] = min(max(y[v], first - half), first + half)
                 # It rests until the far side of the play arrives, and runs along from there.
                 towards = np.sign(rise)
-                rest = towards * (y[v] - first) + half[v]
+                rest = towards * (y[v] - first) + half
                 rest = min(rest / abs(rise), 1.0) if rise != 0 else 1.0
                 runs = 1.0 - rest
                 gained = rise * runs

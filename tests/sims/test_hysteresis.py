@@ -48,7 +48,8 @@ def test_means_and_rises_are_those_of_the_definition(seed, hold, width):
     middles = (np.arange(fine) + 0.5) / fine - 0.5
     path = (means[0, ..., None] + rises[0, ..., None] * middles).ravel()
     within = in_small_steps(path, width, samples[0, 0]).reshape(12, n, fine)
-    means, rises, last = followers.dragged(means, rises, width, samples[:, :1], (0, 12))
+    start = samples[:, :1]
+    means, rises, last = followers.dragged(means, rises, np.ones(12), width, start, (0, 12))
     assert means[0] == pytest.approx(within.mean(axis=2), abs=0.02)
     assert rises[0] == pytest.approx(12 * (within * middles).mean(axis=2), abs=0.05)
     assert last[0] == pytest.approx(within[-1, -1, -1], abs=0.02)
