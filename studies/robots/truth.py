@@ -25,6 +25,9 @@ LOOK = 1e-4
 #: Friction of the truth creeps a hundred times less than that which find_gap hosts.
 HARDER = (0.9999, 0.99999, 0.001)
 
+#: What begins the name of a point mass at the end of a link, and its radius there, in m.
+CARRIED, RADIUS = "payload at tip of body ", 1e-4
+
 #: Time, positions and velocities of the truth -> command.
 Controller = Callable[[float, Array, Array], Array]
 
@@ -44,6 +47,29 @@ class Sensors:
     rates: bool = False
 
 
+def _carrying(path: str | Path, hidden: Mapping[str, float]) -> mujoco.MjModel:
+    """A model file with a small heavy sphere at the end of each capsule that is to carry one."""
+    spec, plain = mujoco.MjSpec.from_file(str(path)), mujoco.MjModel.from_xml_path(str(path))
+    for name, mass in hidden.items():
+        if not name.startswith(CARRIED):
+            continue
+        body = name.removeprefix(CARRIED)
+        (geom,) = spec.body(body).geoms
+        g = int(plain.body(body).geomadr[0])
+        if geom.type != mujoco.mjtGeom.mjGEOM_CAPSULE:
+            raise ValueError(f"nothing called {name!r} can be hidden")
+        axis = np.zeros(3)
+        mujoco.mju_rotVecQuat(axis, [0.0, 0.0, plain.geom_size[g, 1]], plain.geom_quat[g])
+        ends = plain.geom_pos[g] + axis, plain.geom_pos[g] - axis
+        tip = max(ends, key=lambda end: float(np.linalg.norm(end)))
+        # A body of its own: beside an inertial element geoms count nothing.
+        spec.body(body).add_body(pos=tip).add_geom(
+            type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[RADIUS, 0, 0], mass=mass, contype=0,
+            conaffinity=0,
+        )  # fmt: skip
+    return spec.compile()
+
+
 class Truth:
     """A model file with hidden changes, simulated finely.
 
@@ -61,8 +87,7 @@ class Truth:
     """
 
     def __init__(self, path: str | Path, hidden: Mapping[str, float], finer: int = 10) -> None:
-        self.model = mujoco.MjModel.from_xml_path(str(path))
-        model = self.model
+        model = self.model = _carrying(path, hidden)
         kinds = mujoco.mjtIntegrator
         self.own = model.opt.integrator == kinds.mjINT_RK4
         if self.own and model.na:
@@ -78,7 +103,8 @@ class Truth:
         self.level = np.full(model.nu, np.inf)
         self.offset = np.zeros(model.nq)
         for name, size in hidden.items():
-            self._hide(name, size)
+            if not name.startswith(CARRIED):
+                self._hide(name, size)
         if self.delay.any() or self.lag.any():
             model.opt.timestep /= max(1, round(model.opt.timestep / LOOK))
         # What is derived from masses follows; bodies here are not compiled as "simple".
