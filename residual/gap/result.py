@@ -161,6 +161,7 @@ class Gap:
         share: Part of the nominal simulator's squared error that has a name.
         blocks, folds: Blocks of data, and groups of them that were left out in turn.
         no_better: Blocks in which the corrected simulator forecasts no better than the nominal one.
+        drowned: Whether noise alone makes forecasts of every channel nearly as bad as its mean is.
     """
 
     channel: str
@@ -177,6 +178,7 @@ class Gap:
     blocks: int
     folds: int
     no_better: int = 0
+    drowned: bool = False
 
     def exceeds_noise(self, times: float, *, corrected: bool = False) -> bool:
         """Whether the nominal (or the corrected) simulator errs by more than so many times what

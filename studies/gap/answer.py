@@ -191,10 +191,11 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
 
 
 def cannot_tell(result: GapResult) -> bool:
-    """Whether too few data err by no more than noise, so that there may be a gap or none."""
+    """Whether too few data, or drowned in noise, err by no more than that, so that there may be a
+    gap or none."""
     gap = result.gap
     plain = gap.exceeds_noise(OFF) or gap.before.value > PLAINLY * gap.noise_floor.value
-    return gap.blocks < TOO_FEW and not plain and not result.effects
+    return (gap.blocks < TOO_FEW or gap.drowned) and not plain and not result.effects
 
 
 def provisional(result: GapResult) -> str:

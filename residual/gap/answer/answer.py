@@ -127,7 +127,7 @@ def verdicts(
         )
     elif search.simulator.has_contacts and table.exceeds_noise(PARTED, corrected=True):
         made.append(parted_verdict(table, answer.leads))
-    elif not made and blocks < TOO_FEW:  # too few to say that there is no gap
+    elif not made and (blocks < TOO_FEW or table.drowned):  # too little to say there is no gap
         made.append(remainder_verdict(left, table, answer.leads))
     elif not answer.key and left.adequate and not search.beside:
         made.append(no_gap_verdict("no gap above noise"))

@@ -25,6 +25,9 @@ BESIDE = "parameters within their tolerance"
 NEARLY = 0.97
 #: Forecasts drawn for pictures.
 PICTURES = 6
+#: Error of forecasts by noise alone over the standard deviation of a channel, from which on they
+#: tell next to nothing.
+DROWNED = 0.8
 #: Squared error of a block over that of noise alone, up to which it is as good as can be.
 AS_GOOD_AS_NOISE = 2.0
 
@@ -81,7 +84,15 @@ def gap(
         tuple(steps), by_channel, *ratios,
         Span(*share) if key or search.beside else Span(0.0, 0.0, 0.0), len(blocks), blocks.folds,
         no_better(before.squares[:, main], after.squares[:, main], floor[:, main]),
+        not simulator.has_contacts and drowned(samples.seen[:, samples.measured], floor),
     )  # fmt: skip
+
+
+def drowned(seen: Array, floor: Array) -> bool:
+    """Whether of all that was measured, (n, m), noise hides what moves, by its squared errors of
+    forecasts, (B, m)."""
+    by_noise = np.sqrt(np.nanmean(floor, axis=0))
+    return bool((by_noise > DROWNED * np.nanstd(seen, axis=0)).all())
 
 
 def lost(search: Search, table: Gap) -> list[str]:
