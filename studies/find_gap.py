@@ -221,8 +221,6 @@ def apart(
     both = [log for log in held_out if Path(log).resolve() in used]
     if both:
         raise ValueError(f"{both[0]} is in --logs and in --held-out, expected it in one of them")
-    # What they judge was learnt elsewhere: an input need not change in them.
-    columns = dataclasses.replace(columns, allow_constant_action=True)
     return read(simulator, sorted(held_out), columns)
 
 

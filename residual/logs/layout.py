@@ -58,7 +58,6 @@ class LogFormat:
         gap: A trajectory is cut where samples are further apart than this many usual periods: the
             median step, or that of the longest tenth.
         minimum_samples: A trajectory with fewer is an error; a piece with fewer is left out.
-        allow_constant_action: Accept logs in which an action never changes, such as free decays.
     """
 
     time: str | int | Column = "time"
@@ -77,7 +76,6 @@ class LogFormat:
     decimal: str = "."
     gap: float = 5.0
     minimum_samples: int = 5
-    allow_constant_action: bool = False
 
 
 def check_layout(columns: LogFormat, states: Sequence[Channel], actions: Sequence[Channel]) -> None:

@@ -88,7 +88,7 @@ def read_logs(
             runs, columns.gap, columns.minimum_samples, findings, [c.name for c in channels]
         )
         runs = continued(runs, channels, columns, findings)
-        _check_actions(runs, action_channels, columns)
+        findings += _constant_actions(runs, action_channels, columns)
         for path in dict.fromkeys(run.path for run in runs):
             of_file = [run for run in runs if run.path == path]
             findings += _check_numbers(path, of_file, channels, columns)
@@ -112,21 +112,23 @@ def _refuse_nowhere(runs: Sequence[Run], channels: Sequence[Channel], columns: L
             )
 
 
-def _check_actions(runs: Sequence[Run], channels: Sequence[Channel], columns: LogFormat) -> None:
-    """Refuse logs in which an action never changes: they cannot tell what it does."""
+def _constant_actions(
+    runs: Sequence[Run], channels: Sequence[Channel], columns: LogFormat
+) -> list[Finding]:
+    """Inputs that never change, which mostly are a wrong column, but for those that were said to be
+    constant."""
+    findings = []
     for index, channel in enumerate(channels):
         column = named_column(columns.actions.get(channel.name, channel.name), channel.name)
-        values = np.concatenate([run.actions[:-1, index] for run in runs])
-        if columns.allow_constant_action or column.value is not None or np.ptp(values) > 0:
-            continue
-        raise LogError(
-            f"the action {channel.name!r} is {values[0]:g}{channel.unit_text} in all {len(values)} "
-            "samples, expected one that changes; check the column, or if it is a run without "
-            "input, such as a free decay, set allow_constant_action: true (on the command line "
-            "--columns.allow_constant_action true)",
-            runs[0].path,
-            column=column.column,
-        )
+        values = np.concatenate([run.actions[:-1, index] for run in runs] or [np.zeros(0)])
+        if column.value is None and values.size and np.ptp(values) == 0:
+            says = (
+                f"{channel.name} is {values[0]:g}{channel.unit_text} in all {len(values)} samples: "
+                "if it was not held there, check the column. What it does cannot be told from a "
+                "constant push."
+            )
+            findings.append(Finding("constant", channel.name, says, "warning"))
+    return findings
 
 
 def _check_numbers(

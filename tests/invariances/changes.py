@@ -86,7 +86,6 @@ def other_units(log: Log, folder: Path) -> Log:
         },
         actions={channel.name: _column(channel) for channel in actions},
         gap=1e9,
-        allow_constant_action=True,
     )
     files = []
     for number, run in enumerate(log.runs):

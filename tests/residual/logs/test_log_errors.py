@@ -188,15 +188,18 @@ def test_pickled_arrays_are_not_loaded(tmp_path):
     assert "cannot be read as NPZ" in error(path)
 
 
-def test_constant_action(csv, tmp_path):
+def test_an_input_that_never_changes_is_told(csv, tmp_path):
     path = csv(voltage=np.zeros(200))
-    message = error(path)
-    assert "column 'voltage': the action 'voltage' is 0 V in all 199 samples" in message
-    assert "allow_constant_action: true" in message
-    assert len(read(path, allow_constant_action=True).trajectories) == 1
-    # One free decay among runs with input is no reason to stop.
+
+    def told(data):
+        return [finding.says for finding in data.findings if finding.kind == "constant"]
+
+    (says,) = told(read(path))
+    assert says.startswith("voltage is 0 V in all 199 samples: if it was not held there")
+    assert not told(read(path, actions={"voltage": Column(value=0.0)}))
+    # One free decay among runs with input is nothing to tell.
     other = write(tmp_path / "other.csv", swing())
-    assert len(read_logs([path, other], STATES, ACTIONS).trajectories) == 2
+    assert not told(read_logs([path, other], STATES, ACTIONS))
     assert len(read(path, channels=(STATES, ())).trajectories) == 1
 
 
