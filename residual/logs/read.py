@@ -127,7 +127,7 @@ def _constant_actions(
                 "if it was not held there, check the column. What it does cannot be told from a "
                 "constant push."
             )
-            findings.append(Finding("constant", channel.name, says, "warning"))
+            findings.append(Finding("constant", channel.name, says, severity="warning"))
     return findings
 
 
