@@ -15,7 +15,8 @@ class Heartbeat:
     """Tells on stderr what is being done, the time since the start and what is left of a budget.
 
     Args:
-        budget: Seconds of processor time, as the search counts them.
+        budget: Seconds of processor time, as the search counts them; what it found may take as
+            long to confirm.
     """
 
     def __init__(self, budget: float) -> None:
@@ -42,8 +43,10 @@ class Heartbeat:
     def _say(self, text: str) -> None:
         self._spoke = time.perf_counter()
         spent = self._spoke - self._begin
-        left = max(self._budget - (time.process_time() - self._used), 0.0)
-        print(f"{spent:6.1f} s, {left:.0f} s left  {text}", file=sys.stderr, flush=True)
+        used = time.process_time() - self._used
+        left, more = self._budget - used, max(2 * self._budget - used, 0.0)
+        ahead = f"{left:.0f} s left" if left > 0 else f"{more:.0f} s to confirm"
+        print(f"{spent:6.1f} s, {ahead}  {text}", file=sys.stderr, flush=True)
 
     def _beat(self) -> None:
         while not self._over.wait(0.25 * QUIET):

@@ -106,7 +106,8 @@ def in_plain_form(search: Search, key: Key, claims: Sequence[Claim]) -> Key | No
     """The set with a plainer form of an effect whose own numbers these data do not tell, if any.
 
     A law of which a strength may be zero, or a number lies at its bound, is no better than one of
-    its family with fewer numbers that does as well.
+    its family with fewer numbers that does as well; nor is any law than a plainer one that
+    forecasts no worse and fits as well.
     """
     for claim in claims:
         own = search.candidates[claim.number]
@@ -122,7 +123,14 @@ def in_plain_form(search: Search, key: Key, claims: Sequence[Claim]) -> Key | No
             and search.candidates[other].label in claim.form
             and not excluded(search, key, rival, claim.number, adequate=False, alike=True)
         ]
-        if forms and not told:
+        if told:
+            forms = [
+                rival
+                for rival in forms
+                if search.error(rival) <= search.error(key)
+                and score(search, rival) <= score(search, key) + tie(search, key, rival)
+            ]
+        if forms:
             return min(forms, key=lambda rival: (search.numbers(rival), search.error(rival)))
     return None
 

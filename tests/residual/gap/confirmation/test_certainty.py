@@ -78,6 +78,17 @@ def test_a_plainer_form_stands_where_a_laws_own_numbers_are_not_told(number, key
     assert in_plain_form(toy, (1,), [dataclasses.replace(law, form=())]) is None
 
 
+@pytest.mark.parametrize(("merit", "key"), [(101.0, (2,)), (150.0, None)])
+def test_a_plainer_form_that_forecasts_better_and_fits_as_well_stands_at_once(merit, key):
+    """Friction by direction, the same in both, stood where dry friction erred less."""
+    toy = Toy({(1,): 0.3, (2,): 0.29}, merits={(): 1e3, (1,): 100.0, (2,): merit})
+    toy.fitter.samples.seen, toy.fitter.samples.measured = np.zeros((80, 1)), [0]
+    toy.numbers = lambda key: 2 if key == (1,) else len(key)
+    numbers = {"change": Number(0.1, 0.05, 0.15, "N m")}
+    law = claim(1, numbers=numbers, form=("coulomb_friction@pivot",))
+    assert in_plain_form(toy, (1,), [law]) == key
+
+
 def test_a_plainer_form_that_errs_far_more_does_not():
     """With a load beside it Coulomb friction is friction by direction; alone it is far behind."""
     toy = Toy({(1,): 0.01, (2,): 0.4, (2, 3): 0.01})
