@@ -16,7 +16,6 @@ from typing import Any, NoReturn
 
 import jsonargparse
 import yaml
-from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from simgap_files import safe_yaml
 from sims.loading import in_file, not_found
@@ -30,19 +29,13 @@ from studies.running.classes import (
     unfinished,
     without_replaced,
 )
+from studies.running.counted import check_number, check_numbers
 from studies.running.ending import DEBUG, DEBUG_VARIABLE, TRUST, typed
 from studies.running.spelling import spelled
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 # How jsonargparse begins a list of all classes that it knows.
 _LISTED = ", known subclasses: "
-# What numbers of these types are, in words.
-_NUMBERS: dict[Any, str] = {
-    PositiveFloat: "a number above 0",
-    NonNegativeFloat: "a number, 0 or more",
-    PositiveInt: "a whole number, 1 or more",
-}
-
 
 # Files of settings that were given, by path with their option, to say where something is wrong.
 _READ: dict[str, tuple[str, Any]] = {}
@@ -91,12 +84,16 @@ class Parser(jsonargparse.ArgumentParser):
                 if not equals:
                     value = "".join(given[i + 1 : i + 2])
                 _check_given(name, value)
-                _check_number(name, value, kinds.get(name))
+                check_number(name, value, kinds.get(name))
                 if name in SIMULATORS and equals:
                     given[i] = f"{name}={_simulator(value)}"
                 elif name in SIMULATORS and i + 1 < len(given):
                     given[i + 1] = _simulator(given[i + 1])
-            contents = [inside for option, inside in _READ.values() if option == "config"]
+            configs = {
+                path: inside for path, (option, inside) in _READ.items() if option == "config"
+            }
+            check_numbers(configs, kinds)
+            contents = list(configs.values())
             self._without_usual([*map(class_of_word, given), *contents])
             return super().parse_args(given, *rest, **options)
         except ValueError as error:
@@ -267,22 +264,6 @@ def _check_given(name: str, value: str) -> None:
         path = Path(value).is_dir() or (IMPORT_PATH.fullmatch(value) and not Path(value).exists())
         if lacking := in_file(value) or (not_found(value) if path else ""):
             raise ValueError(f"{name}: {lacking}")
-
-
-def _check_number(name: str, value: str, kind: Any) -> None:
-    """Refuse what is no number, or beyond its bounds, before the parser says so in many words.
-
-    Raises:
-        ValueError: The message names the option and what was expected.
-    """
-    kinds = typing.get_args(kind) or (kind,)
-    number = next((one for one in kinds if one in _NUMBERS), None)
-    if number is None or (type(None) in kinds and value in ("null", "None")):
-        return
-    try:
-        number(value)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} {value}: expected {_NUMBERS[number]}") from None
 
 
 def _settings(source: str | Path) -> dict[str, Any] | None:

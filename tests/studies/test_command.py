@@ -165,7 +165,7 @@ def test_output_is_checked_before_anything_is_computed(name, output, says, capsy
 
 WRONG = {
     "bad.yaml": b"seed: 0\nsimulator: [", "latin.yaml": b"seed: 0 # \xe9",
-    "bytes.yaml": b"\x00" * 9,
+    "bytes.yaml": b"\x00" * 9, "words.yaml": b"minutes: two",
 }  # fmt: skip
 SIMULATOR = ("--simulator", "sims.pendulum_equation.PendulumEquation")
 SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
@@ -195,6 +195,7 @@ SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
         ("learn", (*SYSTEM, "--ddpg.hiden", "9"), "--ddpg.hiden 9; did you mean --ddpg.hidden?"),
         ("find_gap", (*SIMULATOR, "--minuts", "3"), "--minuts 3; did you mean --minutes?"),
         ("find_gap", (*SIMULATOR, "--horizon", "0"), "--horizon 0: expected a number above 0"),
+        ("find_gap", ("--config", "words.yaml"), "words.yaml: minutes two: expected a number abov"),
         ("find_gap", (*SIMULATOR, "--jobs=two"), "--jobs two: expected a whole number, 1 or more"),
     ],
 )  # fmt: skip
