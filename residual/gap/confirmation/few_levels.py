@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from residual.gap.data.at_rest import STILL
 from residual.gap.search.sets import Key, Search
-from sims.effects.actuator import StaticActuatorEffect
+from sims.effects.actuator import ActuatorBias, StaticActuatorEffect
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
 
@@ -25,7 +25,9 @@ def by_few_levels(search: Search, key: Key, number: int) -> bool:
 
     A gain and a dead zone are then as good as a gain and a square: only what happens between
     levels, where clocks and lags count, parts them. A law of one number needs no such rule, as
-    others are tried in its place, nor does a curve by points, which stands for any of them.
+    others are tried in its place, unless it adds to one of two directions what it takes from the
+    other: a push is a gain that differs by direction then. Nor does a curve by points, which
+    stands for any law.
 
     Args:
         search: With the fitted set.
@@ -38,14 +40,16 @@ def by_few_levels(search: Search, key: Key, number: int) -> bool:
     for name in _inputs(search, number):
         together = [n for n in key if name in _inputs(search, n)]
         numbers = sum(knob.strength for n in together for knob in search.candidates[n].knobs)
-        if numbers < 2:
-            continue
         column = [c.name for c in search.simulator.action_channels].index(name)
         given = search.fitter.samples.actions[:, column]
         added = fit.model.added(fit.theta)
         if all(_odd(added[key.index(n)], given) for n in together):
             given = np.abs(given)
             given = given[given > STILL * given.max(initial=0.0)]
+        elif given.min() < 0 < given.max():
+            numbers = max(numbers, 2)
+        if numbers < 2:
+            continue
         count = resting_levels(given)
         if count is not None and count <= numbers:
             return True
@@ -73,5 +77,6 @@ def _inputs(search: Search, number: int) -> set[str]:
 def _odd(effect: Effect, given: Array) -> bool:
     """Whether an effect does the same to commands of both directions."""
     if not isinstance(effect, StaticActuatorEffect):
-        return True  # a parameter that moves as a gain does
+        # A push that moves as a bias does, or a parameter that moves as a gain does.
+        return effect.family != ActuatorBias.family
     return bool(np.allclose(effect.shape(-given), -np.asarray(effect.shape(given))))

@@ -54,6 +54,35 @@ def test_a_dead_zone_and_a_gain_need_three_levels(duties, sure):
         assert {law.effect for law in laws} == {"actuator_gain", "dead_zone"}
 
 
+class Wheel(FirstOrderSystem):
+    """A wheel that a motor turns both ways."""
+
+    dt = DT
+    state_channels = (Channel("speed", "rad/s", "rate", scale=5.0),)
+    action_channels = (Channel("duty", "1", "input", low=-1.0, high=1.0),)
+    parameters = {}
+
+    def derivative(self, x, u, p):
+        return (20.0 * u - x) / LAG
+
+
+@pytest.mark.parametrize(("duties", "sure"), [((-0.3, 0.3), False), ((-0.3, 0.0, 0.3), True)])
+def test_a_push_is_a_gain_that_differs_by_direction_where_the_input_has_two_levels(duties, sure):
+    rng = np.random.default_rng(4)
+    duty, speed, seen = np.repeat(rng.permutation(8 * duties), 25), 0.0, []
+    for u in duty:
+        seen.append(speed)
+        goal = 20.0 * u + 0.4
+        speed = goal + (speed - goal) * np.exp(-DT / LAG)
+    seen = np.array(seen) + 0.05 * rng.standard_normal(len(seen))
+    run = Trajectory("run", DT * np.arange(len(seen)), seen[:, None], duty[:-1, None])
+    found = find_gap(Wheel(), [run])
+    pushes = ("constant_load", "actuator_bias", "sensor_offset")
+    (push,) = (v for v in found.verdicts if v.effect in pushes and v.parameters)
+    assert (push.kind == "confirmed") == sure
+    assert ("levels" in push.doubts) == (not sure)
+
+
 @settings(max_examples=40, deadline=None)
 @given(
     places=st.sets(st.integers(0, 9), min_size=1, max_size=5),
