@@ -123,9 +123,8 @@ def _constant_actions(
         values = np.concatenate([run.actions[:-1, index] for run in runs] or [np.zeros(0)])
         if column.value is None and values.size and np.ptp(values) == 0:
             says = (
-                f"{channel.name} is {values[0]:g}{channel.unit_text} in all {len(values)} samples: "
-                "if it was not held there, check the column. What it does cannot be told from a "
-                "constant push."
+                f"It is {values[0]:g}{channel.unit_text} in all {len(values)} samples: if it was "
+                "not held there, check the column. What it does cannot be told from a constant push."
             )
             findings.append(Finding("constant", channel.name, says, severity="warning"))
     return findings

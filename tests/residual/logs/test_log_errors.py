@@ -195,7 +195,7 @@ def test_an_input_that_never_changes_is_told(csv, tmp_path):
         return [finding.says for finding in data.findings if finding.kind == "constant"]
 
     (says,) = told(read(path))
-    assert says.startswith("voltage is 0 V in all 199 samples: if it was not held there")
+    assert says.startswith("It is 0 V in all 199 samples: if it was not held there")
     assert not told(read(path, actions={"voltage": Column(value=0.0)}))
     # One free decay among runs with input is nothing to tell.
     other = write(tmp_path / "other.csv", swing())
