@@ -124,7 +124,7 @@ def _constant_actions(
         if column.value is None and values.size and np.ptp(values) == 0:
             says = (
                 f"It is {values[0]:g}{channel.unit_text} in all {len(values)} samples: if it was "
-                "not held there, check the column. What it does cannot be told from a constant push."
+                "not held there, check the column. What it does is like a constant push."
             )
             findings.append(Finding("constant", channel.name, says, severity="warning"))
     return findings
