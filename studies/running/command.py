@@ -34,6 +34,8 @@ from studies.running.ending import DEBUG, DEBUG_VARIABLE, TRUST, typed
 from studies.running.spelling import spelled
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+#: Why settings of earlier versions are no more.
+GONE = {"allow_constant_action": "leave it out, an input that never changes is read and told"}
 # How jsonargparse begins a list of all classes that it knows.
 _LISTED = ", known subclasses: "
 
@@ -166,6 +168,8 @@ class Parser(jsonargparse.ArgumentParser):
         for word in self._words:
             name = word.partition("=")[0]
             if name.startswith("--") and name not in known and name in message:
+                if why := GONE.get(name.rpartition(".")[2]):
+                    return f"; {why}"
                 near = difflib.get_close_matches(name, known, 1)
                 return f"; did you mean {near[0]}?" if near else ""
         return ""
@@ -194,6 +198,8 @@ def _not_among(given: Any, known: Sequence[str]) -> str:
     """What is to be said of the first setting that is not known, if there is one."""
     for name in given if isinstance(given, Mapping) and known else ():
         if name not in known:
+            if why := GONE.get(name):
+                return f"no setting {name!r}: {why}"
             near = difflib.get_close_matches(str(name), known, 1)
             hint = f"did you mean {near[0]!r}?" if near else f"there is {', '.join(known)}"
             return f"no setting {name!r}, {hint}"

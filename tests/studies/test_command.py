@@ -166,6 +166,7 @@ def test_output_is_checked_before_anything_is_computed(name, output, says, capsy
 WRONG = {
     "bad.yaml": b"seed: 0\nsimulator: [", "latin.yaml": b"seed: 0 # \xe9",
     "bytes.yaml": b"\x00" * 9, "words.yaml": b"minutes: two",
+    "gone.yaml": b"allow_constant_action: true",
 }  # fmt: skip
 SIMULATOR = ("--simulator", "sims.pendulum_equation.PendulumEquation")
 SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
@@ -195,6 +196,8 @@ SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
         ("learn", (*SYSTEM, "--ddpg.hiden", "9"), "--ddpg.hiden 9; did you mean --ddpg.hidden?"),
         ("find_gap", (*SIMULATOR, "--minuts", "3"), "--minuts 3; did you mean --minutes?"),
         ("find_gap", (*SIMULATOR, "--horizon", "0"), "--horizon 0: expected a number above 0"),
+        ("find_gap", (*SIMULATOR, "--columns.allow_constant_action", "true"), "; leave it out, an"),
+        ("find_gap", (*SIMULATOR, "--columns", "gone.yaml"), "allow_constant_action': leave it o"),
         ("find_gap", ("--config", "words.yaml"), "words.yaml: minutes two: expected a number abov"),
         ("find_gap", (*SIMULATOR, "--jobs=two"), "--jobs two: expected a whole number, 1 or more"),
     ],
