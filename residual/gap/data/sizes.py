@@ -16,9 +16,9 @@ from sims.simulator import UNDECLARED, Channel
 
 Array = NDArray[np.float64]
 
-#: Times the size that a channel declares, or part of it, from which on another unit is asked after,
-#: and how near to that size values have to be in it.
-FAR, NEAR = 50.0, 4.0
+#: Times the size that a channel declares, or part of it, from which on another unit is asked after
+#: (a radian has twice as many degrees), and how near to that size values have to be in it.
+FAR, NEAR = 30.0, 4.0
 #: Temperature in K that no column of a simulator with a warmer parameter stays below; 0 degC in K;
 #: what rooms and weather are between, in degC.
 COLD, ZERO, OUTSIDE = 200.0, 273.15, (-10.0, 50.0)
