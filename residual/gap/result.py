@@ -24,7 +24,7 @@ Kind = Literal[
 Doubt = Literal[
     "not_needed", "unsteady", "creeps", "drift", "one_way", "law", "numerics", "at_bound",
     "clock", "within_step", "swapped", "conventions", "cut_off", "extreme", "orders", "levels",
-    "records", "set_aside", "no_help", "sensor", "no_time", "may_be_zero", "size_open",
+    "loop", "records", "set_aside", "no_help", "sensor", "no_time", "may_be_zero", "size_open",
     "share_may_be_zero", "calibration", "within", "slight", "few_blocks", "rivals",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.

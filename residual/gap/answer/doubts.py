@@ -30,6 +30,8 @@ DOUBTS: dict[Doubt, str] = {
     "several or something has no name",
     "levels": "its input rests at no more levels than its laws have numbers, so that other laws "
     "fit as well: log more levels",
+    "loop": "every input follows what was measured, so that other laws in proportion to either fit "
+    "as well: log while the goal changes",
     "records": "an effect with its own size in each record does better, or may be what this one "
     "stands for",
     "set_aside": "the corrected simulator is worse on the records that were set aside",
@@ -84,6 +86,7 @@ def doubts(
         "extreme": claim.extreme,
         "orders": claim.orders,
         "levels": claim.few_levels,
+        "loop": claim.in_a_loop,
         "records": claim.unlike,
         "set_aside": claim.refuted,
         "no_help": claim.helpless,

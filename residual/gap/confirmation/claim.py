@@ -52,6 +52,7 @@ class Claim:
         orders: Whether it repeats along a turn, and is one of several that do, or beside a
             remainder: together they fit whatever follows the position.
         few_levels: Whether its input rests at as few levels as the laws of it have numbers.
+        in_a_loop: Whether its input follows what was measured, so that others fit as well.
         unlike: Whether it may stand for one effect in a size of its own in each record.
         refuted: Whether the corrected simulator forecasts records that were set aside worse.
         helpless: Whether it, or all that was found, forecasts them no better, though they show more
@@ -90,6 +91,7 @@ class Claim:
     extreme: bool = False
     orders: bool = False
     few_levels: bool = False
+    in_a_loop: bool = False
     unlike: bool = False
     refuted: bool = False
     helpless: bool = False
@@ -128,6 +130,7 @@ class Claim:
             self.extreme,
             self.orders,
             self.few_levels,
+            self.in_a_loop,
             self.unlike,
             self.refuted,
             self.helpless,
