@@ -161,7 +161,7 @@ class Gap:
         share: Part of the nominal simulator's squared error that has a name.
         blocks, folds: Blocks of data, and groups of them that were left out in turn.
         no_better: Blocks in which the corrected simulator forecasts no better than the nominal one.
-        drowned: Whether noise alone makes forecasts of every channel nearly as bad as its mean is.
+        drowned: Whether noise alone makes forecasts of every channel no better than its mean is.
     """
 
     channel: str

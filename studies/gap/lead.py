@@ -101,7 +101,7 @@ def _named_share(result: GapResult, tolerance: float | None) -> str:
     if "unexplained" in kinds and cannot_tell(result) and gap.drowned:
         return (
             f"Noise hides whether there is a gap: the {ahead(gap)} is {before}, and noise alone "
-            f"makes {floor}, about as much as it varies."
+            f"makes {floor}, as much as all that moves."
         )
     if "unexplained" in kinds and cannot_tell(result):
         return (

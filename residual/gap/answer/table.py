@@ -25,9 +25,6 @@ BESIDE = "parameters within their tolerance"
 NEARLY = 0.97
 #: Forecasts drawn for pictures.
 PICTURES = 6
-#: Error of forecasts by noise alone over the standard deviation of a channel, from which on they
-#: tell next to nothing.
-DROWNED = 0.8
 #: Squared error of a block over that of noise alone, up to which it is as good as can be.
 AS_GOOD_AS_NOISE = 2.0
 
@@ -89,10 +86,9 @@ def gap(
 
 
 def drowned(seen: Array, floor: Array) -> bool:
-    """Whether of all that was measured, (n, m), noise hides what moves, by its squared errors of
-    forecasts, (B, m)."""
-    by_noise = np.sqrt(np.nanmean(floor, axis=0))
-    return bool((by_noise > DROWNED * np.nanstd(seen, axis=0)).all())
+    """Whether of all that was measured, (n, m), forecasts are no better by noise alone, their
+    squared errors (B, m), than the mean is."""
+    return bool((np.nanmean(floor, axis=0) > np.nanvar(seen, axis=0)).all())
 
 
 def lost(search: Search, table: Gap) -> list[str]:
