@@ -98,12 +98,12 @@ def _named_share(result: GapResult, tolerance: float | None) -> str:
         share = f"{capitalized(percent(gap.share.value))} of the gap is {_what(result)}"
         return f"{share}{_by_channel(result)}.{_but_worse_apart(result)}"
     floor = quantity_text(gap.noise_floor.value, gap.unit)
-    if "unexplained" in kinds and cannot_tell(result) and gap.drowned:
-        return (
-            f"Noise hides whether there is a gap: the {ahead(gap)} is {before}, and noise alone "
-            f"makes {floor}, as much as all that moves."
-        )
     if "unexplained" in kinds and cannot_tell(result):
+        if gap.drowned:
+            return (
+                f"Noise hides whether there is a gap: the {ahead(gap)} is {before}, and noise "
+                f"alone makes {floor}, as much as all that moves."
+            )
         return (
             f"Too few data to tell whether there is a gap: the {ahead(gap)} is {before}, noise "
             f"alone makes {floor}."

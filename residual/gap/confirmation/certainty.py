@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from residual.gap.confirmation.claim import Claim, other_than
 from residual.gap.confirmation.constancy import creeps, far_apart, on_the_way, whole_size
 from residual.gap.confirmation.drift import Drift
-from residual.gap.confirmation.feedback import in_a_loop
+from residual.gap.confirmation.feedback import affine, fed_back
 from residual.gap.confirmation.few_levels import by_few_levels
 from residual.gap.confirmation.following import by_another_law
 from residual.gap.confirmation.numerics import STEADY, in_the_limit, survives
@@ -54,7 +54,7 @@ def claims(
     half = 1.96 * deviations(fit, search.fitter.blocks)
     limits = in_the_limit(fit.theta, numerics)
     found, drift, other_law = [], Drift(search), by_another_law(search, key, adequate)
-    apart = parted(search, key)
+    apart, loop = parted(search, key), fed_back(search.fitter.samples)
     for place, number in enumerate(key):
         own = [int(j) for j in np.flatnonzero(fit.model.owner == place)]
         label = search.candidates[number].label
@@ -98,7 +98,7 @@ def claims(
                 extreme=key in search.extreme,
                 orders=of_many_orders(search, key, number, adequate),
                 few_levels=by_few_levels(search, key, number),
-                in_a_loop=in_a_loop(search, number),
+                in_a_loop=loop and affine(search, number),
             )
         )
     return sorted(found, key=lambda claim: -claim.share[0])

@@ -19,21 +19,19 @@ from sims.effects.sensor import ScaledSensor
 
 Array = NDArray[np.float64]
 
-#: Laws in proportion to a state or an input, and the family of constants.
+#: Laws in proportion to a state or an input.
 LINEAR = ActuatorGain | LinearSpring | ProportionalLoss | ScaledSensor | ViscousFriction
-PUSH = (ActuatorBias.family,)
 #: Part of an input's standard deviation that an affine law of the states misses at the most.
 MISSED = 0.05
 #: Values from which on an input is more than switched, and rows for every number of the law.
 SWITCHED, ROWS = 5, 10
 
 
-def in_a_loop(search: Search, number: int) -> bool:
+def affine(search: Search, number: int) -> bool:
     """Whether an effect is in proportion to a state or an input, or a constant, or moves exactly as
-    one that is, and no input has a change of its own."""
-    alike = [search.candidates[number], *search.twins_of(number)]
-    affine = any(isinstance(c.effect, LINEAR) or c.effect.family in PUSH for c in alike)
-    return affine and fed_back(search.fitter.samples)
+    one that is."""
+    effects = [one.effect for one in (search.candidates[number], *search.twins_of(number))]
+    return any(isinstance(e, LINEAR) or e.family == ActuatorBias.family for e in effects)
 
 
 def fed_back(samples: Samples) -> bool:

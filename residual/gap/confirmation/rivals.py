@@ -75,17 +75,16 @@ def excluded(
     more = search.numbers(rival) > search.numbers(key)
     if more and not alike and search.tried[rival].merit >= search.tried[key].merit:
         return True
+    group = where_it_matters(search, key, number)
     if adequate:
         if search.simulator.has_contacts and search.error(key) >= BETTER * search.error(rival):
             return False
-        group = where_it_matters(search, key, number)
         if ratio(search, rival, key, group) <= CLEARLY and settled(search, group):
             return False
         behind = score(search, rival) - score(search, key)
         return behind > tie(search, key, rival) and not _by_numerics(search, key, rival, behind)
     if no_match(search, rival, key):
         return True
-    group = where_it_matters(search, key, number)
     own, its = (search.validated[k] for k in (key, rival))
     worse = error_ratio(search, its.squares, own.squares, group)
     if worse > HOPELESS:
