@@ -137,14 +137,19 @@ class Course:
 
 
 def _believable(search: Search, course: Course, ends: Changing) -> bool:
-    """Whether both ends are values that a parameter, or the factor of a gain, may well have."""
+    """Whether both ends are values that a parameter, or the factor of a gain, may well have, and
+    not one and the same bound."""
     effect, usual, nominal = course.one.effect, 1.0, ends.nominal
     if isinstance(effect, ParameterChange):
         usual = size(search, effect.parameter)
     signed = isinstance(effect, ParameterChange) and ends.unit not in ANY_ZERO
-    return not usual or all(
-        abs(end - nominal) <= FACTOR * usual and not (signed and end * nominal < 0)
-        for end in (ends.begin, ends.end)
+    differ = ends.begin != ends.end
+    return differ and (
+        not usual
+        or all(
+            abs(end - nominal) <= FACTOR * usual and not (signed and end * nominal < 0)
+            for end in (ends.begin, ends.end)
+        )
     )
 
 

@@ -44,7 +44,7 @@ DOUBTS: dict[Doubt, str] = {
     "size_open": "it may be more than ten times as large as what fits best",
     "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
     "calibration": "parameters that are a few percent off would do nearly as well",
-    "within": "it may be off by no more than the few percent that are allowed to every parameter",
+    "within": "its interval reaches into the few percent that are allowed to every parameter",
     "slight": "without it errors are less than 1.5 times as large, and what has no name may favour "
     "it by as much",
     "few_blocks": "what has no name is much more than noise, and there are too few blocks of data "

@@ -34,6 +34,7 @@ def out_of_proportion(answer: Answer) -> list[str]:
     def does_as_much(one: Key) -> bool:
         return (
             len(one) == 1
+            and search.candidates[one[0]].effect.enters == "parameter"
             and one in search.validated
             and search.numbers(one) <= max(search.numbers(key), 1)
             and search.error(one) <= most

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 #: Times the size that a channel declares, or part of it, from which on another unit is asked after
 #: (a radian has twice as many degrees), and how near to that size values have to be in it.
 FAR, NEAR = 30.0, 4.0
+#: Size over the bound of an input that is its bound.
+ROUNDED = 1.05
 #: Temperature in K that no column of a simulator with a warmer parameter stays below; 0 degC in K;
 #: what rooms and weather are between, in degC.
 COLD, ZERO, OUTSIDE = 200.0, 273.15, (-10.0, 50.0)
@@ -32,12 +34,12 @@ def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[
         times = size / declared
         if not times > 0.0 or 1 / FAR < times < FAR:
             continue
-        units = other_units(channel.unit)
+        units, most = other_units(channel.unit), _most(channel) / declared
         near = [
-            *(f"`unit: {n}`" for n, unit in units if _near(times * unit.factor)),
+            *(f"`unit: {n}`" for n, unit in units if 1 / NEAR <= times * unit.factor <= most),
             *(f"`unit: {channel.unit}` in place of {n}" if channel.name in converted
               else f"`scale: {1 / unit.factor:g}`"
-              for n, unit in units if _near(times / unit.factor)),
+              for n, unit in units if 1 / NEAR <= times / unit.factor <= most),
         ]  # fmt: skip
         if near:
             says = (
@@ -123,5 +125,8 @@ def _known(runs: Sequence[Array]) -> Array:
     return values[np.isfinite(values)]
 
 
-def _near(times: float) -> bool:
-    return 1 / NEAR <= times <= NEAR
+def _most(channel: Channel) -> float:
+    """Largest size that a channel may have in another unit: an input none beyond its bounds."""
+    bounds = [abs(bound) for bound in (channel.low, channel.high) if np.isfinite(bound)]
+    declared = channel.scale if channel.scale != UNDECLARED else max(bounds, default=0.0)
+    return ROUNDED * max(bounds) if channel.kind == "input" and bounds else NEAR * declared

@@ -60,3 +60,5 @@ def test_a_gain_may_turn_round_but_not_be_a_hundred_times_larger():
     course = SimpleNamespace(one=SimpleNamespace(effect=ActuatorGain("push")))
     assert _believable(None, course, Changing("actuator_gain@push", -0.5, 0.5, 0.0, "1", 0.8))
     assert not _believable(None, course, Changing("actuator_gain@push", 0.0, 99.0, 0.0, "1", 0.8))
+    # Both ends at one bound change nothing.
+    assert not _believable(None, course, Changing("actuator_gain@push", 0.5, 0.5, 0.0, "1", 0.8))

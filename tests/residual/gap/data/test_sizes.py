@@ -39,6 +39,26 @@ def test_a_command_that_was_converted_once_too_often_is_asked_after():
         assert "where 40 deg/s are declared" in says
 
 
+class Oven(FirstOrderSystem):
+    """An oven that is heated by up to its full power."""
+
+    dt = 1.0
+    state_channels = (Channel("above", "K", "other", scale=20.0),)
+    action_channels = (Channel("power", "1", "input", low=0.0, high=100.0),)
+
+    def derivative(self, x, u, p):
+        return (0.5 * u - x) / 50.0
+
+
+@pytest.mark.parametrize(("most", "asked"), [(0.7, True), (1.5, False)])
+def test_an_input_that_would_be_beyond_its_bounds_is_in_no_other_unit(most, asked):
+    power = np.repeat(np.linspace(0.0, most, 20), 15)[:, None]
+    states = Oven().rollout(np.array([10.0]), power)
+    run = Trajectory("run", np.arange(301.0), states, power)
+    told = [one.where for one in findings(Oven(), [run]) if one.kind == "size"]
+    assert ("power" in told) is asked
+
+
 def test_times_of_a_calendar_are_told_with_their_date():
     assert moment(12.25) == "12.25 s"
     assert moment(1585250253.569) == "1585250253.57 s (2020-03-26 19:17:33.5 UTC)"
