@@ -25,6 +25,7 @@ from typing import Any
 from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
+from residual.gap.clock import usual_minutes
 from residual.gap.data.own_period import own_period
 from residual.gap.find import hosting
 from residual.logs import LogData, LogFormat, read_logs
@@ -62,7 +63,8 @@ class GapStudy:
         parameter_tolerance: How well the parameters of the simulator are known, as a share of
             each: an effect is certain only if they cannot stand in for it within that, and its
             interval allows for them; 0 takes them for exact.
-        minutes: Budget of processor time; what has not been tried by then is left out.
+        minutes: Budget of processor time, by default 2, and 6 for what strikes the ground; what has
+            not been tried by then is left out.
     """
 
     simulator: Simulator
@@ -71,7 +73,7 @@ class GapStudy:
     hold: str | dict[str, str] = "auto"
     horizon: PositiveFloat | None = None
     parameter_tolerance: NonNegativeFloat = 0.03
-    minutes: PositiveFloat = 2.0
+    minutes: PositiveFloat | None = None
 
 
 def build_parser() -> Parser:
@@ -114,6 +116,7 @@ def run(
     output: str | Path,
     jobs: int = 1,
     progress: Callable[[str], None] | None = None,
+    budget: Callable[[float], None] = lambda _: None,
 ) -> GapResult:
     """Read logs, find the gap and write everything into ``output``; as the command does.
 
@@ -123,6 +126,7 @@ def run(
         output: Folder for the report and the numbers.
         jobs: Processes, for a simulator that is slow.
         progress: Called with a line of text now and then.
+        budget: Called with the seconds of processor time that searching may take.
 
     Returns:
         What was found.
@@ -153,12 +157,19 @@ def run(
     rows = sum(len(run.times) for run in data.trajectories)
     count = len(data.trajectories)
     tell(f"{count} {'trajectory' if count == 1 else 'trajectories'}, {rows} samples")
-    findings = [*data.findings, *(held.findings if held else ())]
+    aside = [
+        dataclasses.replace(one, where=f"records set aside: {one.where}")
+        for one in (held.findings if held else ())
+    ]
+    findings = [*data.findings, *aside]
     for line in found_in_data(findings):
         tell(f"data: {line}")
     tell("checking the integration step")
     for line in advice(simulator, data.trajectories):
         tell(line)
+    moved = simulator.for_motion([run.states for run in data.trajectories])
+    minutes = study.minutes or usual_minutes(moved)
+    budget(60 * minutes)
     result = find_gap(
         simulator,
         data,
@@ -170,7 +181,7 @@ def run(
         measured_input=[name for name, kind in hold.items() if kind == "linear"],
         horizon=study.horizon,
         parameter_tolerance=study.parameter_tolerance,
-        minutes=study.minutes,
+        minutes=minutes,
         n_jobs=jobs,
         progress=tell,
     )
@@ -232,8 +243,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     settings = parser.plain(given)
     output, jobs = Path(settings.pop("output")), settings.pop("jobs")
     settings.pop("config", None)
-    with Heartbeat(60 * settings["minutes"]) as tell:
-        result = run(settings, output, jobs, tell)
+    with Heartbeat() as tell:
+        result = run(settings, output, jobs, tell, tell.until)
     print(f"\n{summary(result, settings['tolerance'])}\n\nreport:              {output / REPORT}")
     print(f"corrected simulator: {output / CORRECTED}")
     if strange := needs_trust(settings["simulator"]):

@@ -7,6 +7,11 @@ import math
 import time
 from collections.abc import Callable, Iterator
 
+from sims.host import HostSimulator
+
+#: Minutes of the budget if nobody says how many, and of what strikes the ground: a fit takes ten
+#: times as long there.
+USUAL, AT_IMPACTS = 2.0, 6.0
 #: Part of the time budget that the first search may take.
 SEARCHING = 0.5
 #: Part of it that is kept for weighing and confirming what later searches find, and times what that
@@ -21,6 +26,11 @@ ENOUGH = 0.9
 OFTEN = 2.0
 
 
+def usual_minutes(simulator: HostSimulator) -> float:
+    """Minutes of the budget if nobody says how many."""
+    return AT_IMPACTS if simulator.has_contacts else USUAL
+
+
 class OutOfTime(Exception):
     """A later search was not weighed and confirmed in time."""
 
@@ -28,7 +38,7 @@ class OutOfTime(Exception):
 class Clock:
     """Processor time that is left, and seconds by step."""
 
-    def __init__(self, minutes: float) -> None:
+    def __init__(self, minutes: float = USUAL) -> None:
         self._budget = 60 * minutes
         self._weighing = self._confirming = 0.0
         self._worth_it, self._given_up = False, math.inf
@@ -36,8 +46,9 @@ class Clock:
         self.laps: dict[str, float] = {}
         self._last = time.perf_counter()
 
-    def begin(self) -> None:
+    def begin(self, minutes: float | None = None) -> None:
         """Count from now on: a log of a million rows is read in what time that takes."""
+        self._budget = self._budget if minutes is None else 60 * minutes
         begin = time.process_time()
         self.search_until = self._first_until = begin + self._budget * SEARCHING
         self.over = begin + self._budget

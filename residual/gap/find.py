@@ -18,7 +18,7 @@ from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.out_of_proportion import out_of_proportion
 from residual.gap.answer.records import stands_for, unlike
 from residual.gap.answer.table import lost
-from residual.gap.clock import Clock
+from residual.gap.clock import Clock, usual_minutes
 from residual.gap.confirmation.numerics import times_better
 from residual.gap.confirmation.swapped import swapped
 from residual.gap.fitting.contract import Fitter
@@ -63,7 +63,7 @@ def find_gap(
     measured_input: bool | Collection[str] = False,
     horizon: float | None = None,
     parameter_tolerance: float = KNOWN,
-    minutes: float = 2.0,
+    minutes: float | None = None,
     n_jobs: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> GapResult:
@@ -92,7 +92,8 @@ def find_gap(
             allows for them. 0 takes them for exact, so that intervals are of the data alone.
         minutes: Budget of processor time once the log is read, so that a busy machine finds the
             same: the search for further explanations ends in time. Confirming may take as long
-            again, and a choice on more windows what it takes.
+            again, and a choice on more windows what it takes. By default 2, and 6 for what strikes
+            the ground.
         n_jobs: Processes for a simulator that steps row by row.
         progress: Called with a line of text now and then.
 
@@ -110,7 +111,7 @@ def find_gap(
     declared = {channel.name: channel.scale for channel in simulator.physical_channels}
     _refuse_settings(horizon, parameter_tolerance, minutes)
     runs, set_aside = trajectories_of(trajectories), trajectories_of(held_out)
-    clock = Clock(minutes)
+    clock = Clock()
     tell = progress or (lambda _: None)
     log = look(simulator, runs, set_aside, horizon, tell)
     tell("looking for effects that move alike")
@@ -121,7 +122,7 @@ def find_gap(
         clock.lap("read")
 
         log, prepared = settle(simulator, log, tell)
-        clock.begin()
+        clock.begin(minutes or usual_minutes(simulator))
         converted = frozenset[str]().union(*(run.converted for run in log.runs))
         conventions = otherwise(simulator, prepared.fitter, converted)
         conventions = conventions or without_sign(simulator, prepared.fitter)
@@ -212,7 +213,7 @@ def _refuse_settings(horizon: Any, parameter_tolerance: Any, minutes: Any) -> No
     """
     for name, value, most, what in (
         ("horizon", 1.0 if horizon is None else horizon, np.inf, "seconds above 0"),
-        ("minutes", minutes, np.inf, "minutes above 0"),
+        ("minutes", 1.0 if minutes is None else minutes, np.inf, "minutes above 0"),
         ("parameter_tolerance", parameter_tolerance, 1.0, "a share up to 1, as 0.03 for 3 %"),
     ):
         number = isinstance(value, Real) and not isinstance(value, bool)

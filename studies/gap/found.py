@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from residual import gap
+from residual.gap.clock import usual_minutes
 from residual.logs import LogData
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
@@ -74,7 +75,7 @@ def find_gap(
     trajectories: Trajectory | Iterable[Trajectory] | LogData,
     *,
     effects: Iterable[Effect | str | Mapping[str, Any]] | None = None,
-    minutes: float = 2.0,
+    minutes: float | None = None,
     progress: Callable[[str], None] | None = None,
     **options: Any,
 ) -> FoundGap:
@@ -86,7 +87,7 @@ def find_gap(
         effects: What may be missing, as objects or as on the command line: ``"library"``,
             ``"viscous_friction"``, ``"delay@voltage"``, ``"mass"``, the import path of a class of
             your own; by default all that the simulator can host.
-        minutes: Budget of processor time.
+        minutes: Budget of processor time, by default 2, and 6 for what strikes the ground.
         progress: Called with a line of text now and then; by default a bar on stderr or in the
             notebook shows them.
         options: ``held_out`` and more, see ``residual.gap.find_gap``; errors as there.
@@ -98,7 +99,7 @@ def find_gap(
     if progress is not None:
         found = gap.find_gap(simulator, trajectories, progress=progress, **options)
     else:
-        begin, budget = time.process_time(), round(60 * minutes)
+        begin, budget = time.process_time(), round(60 * (minutes or usual_minutes(simulator)))
         with Bars().task("find_gap", budget) as tell:
 
             def show(line: str) -> None:

@@ -54,14 +54,17 @@ def test_a_share_is_rounded_where_that_hides_nothing(share, text):
 def test_a_sign_of_life_comes_while_nothing_is_said(monkeypatch, capsys):
     monkeypatch.setattr(progress, "QUIET", 0.04)
     lines = []
-    with progress.Heartbeat(60) as tell:
+    with progress.Heartbeat() as tell:
+        tell("reading")
+        tell.until(60)
         tell("mass: 3 % of the error")
         end = time.monotonic() + 10
         while len(lines) < 3 and time.monotonic() < end:
             time.sleep(0.01)
             lines += capsys.readouterr().err.splitlines()
     assert len(lines) >= 3
-    assert all(re.match(r" *\d+\.\d s, \d+ s left  ", line) for line in lines)
+    assert re.match(r" *\d+\.\d s  reading", lines[0])
+    assert all(re.match(r" *\d+\.\d s, \d+ s left  ", line) for line in lines[1:])
     assert lines[-1].endswith("still working; last: mass: 3 % of the error")
 
 

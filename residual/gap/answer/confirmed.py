@@ -11,7 +11,7 @@ import numpy as np
 from residual.gap.answer.verdicts import nameable
 from residual.gap.confirmation.certainty import claims
 from residual.gap.confirmation.claim import Claim
-from residual.gap.confirmation.numerics import other_numerics, with_enough_substeps
+from residual.gap.confirmation.numerics import by_profile, other_numerics, with_enough_substeps
 from residual.gap.confirmation.rivals import in_plain_form
 from residual.gap.confirmation.size import may_vanish
 from residual.gap.confirmation.tolerance import allow_for_parameters
@@ -100,6 +100,7 @@ def confirm(
         add_exchanged(search, key, 0 if time.process_time() > until else most)
 
     while True:
+        by_profile(search, key)
         fit = search.tried[key]
         slack = search.fitter.tie(search.tried[()]) if found.adequate else OTHER_HOLD * fit.merit
         numerics = other_numerics(search, key, slack) if key else []

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from residual.gap.data.lost_rows import untimed_changes
 from residual.gap.data.samples import Samples
 from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.validation import validate
 from residual.gap.model.model import Model
 from residual.gap.preparation.numerics import FINE, held_otherwise
 from residual.gap.search.sets import Key, Search
@@ -96,6 +97,14 @@ def in_spreads(samples: Samples, squares: Array) -> float:
     """Squared errors (B, m) in units of the spread of each channel, all averaged."""
     spread = np.nanvar(samples.seen[:, samples.measured], axis=0)
     return float(np.nanmean(squares / np.maximum(spread, 1e-300)))
+
+
+def by_profile(search: Search, key: Key) -> None:
+    """Give a set the numbers and the spread that the profile of the loss tells, where fits hang on
+    luck in finding start states."""
+    fit = search.fitter.profiled(search.tried[key])
+    if fit is not search.tried[key]:
+        search.tried[key], search.validated[key] = fit, validate(search.fitter, fit)
 
 
 def at_half_step(search: Search, key: Key) -> Fit:

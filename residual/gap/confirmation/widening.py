@@ -46,9 +46,11 @@ def widened(
         key: The chosen set.
         claims: Of its members.
         beside: The set fitted with all parameters free within their tolerance.
-        adequate: Whether only noise is left. Data that leave a remainder are not believed what
-            they say of parameters, so all may be off by their tolerance then.
+        adequate: Whether only noise is left. Data that leave a remainder, and those of what strikes
+            the ground, are not believed what they say of parameters, so all may be off by their
+            tolerance then.
     """
+    adequate = adequate and not search.simulator.has_contacts
     sure = {claim.number for claim in claims if claim.sure or vital(search, key, claim)}
     if adequate:
         middle, half = beside.theta, 1.96 * deviations(beside, search.fitter.blocks)
@@ -224,7 +226,7 @@ def by_parameters(fit: Fit, count: int) -> Array:
 
     Errors of the parameters are taken to be independent.
     """
-    rows = np.sqrt(fit.weights)[:, None, None] * fit.by_knob
+    rows = fit.told.by_knob
     own, others = rows[..., :count], rows[..., count:]
     scale = np.sqrt(np.maximum((own**2).sum(axis=(0, 1)), 1e-300))
     own = own / scale

@@ -30,6 +30,21 @@ UNCONVERGED = 1.001
 
 
 @dataclasses.dataclass(frozen=True)
+class Told:
+    """What tells of the numbers of a model, linear about its fit.
+
+    Attributes:
+        residual: Residuals, weighed, (W, R).
+        by_knob: Their derivative by the numbers, its sign turned, (W, R, p).
+        taken: Numbers of each window that these were fitted with beside.
+    """
+
+    residual: Array
+    by_knob: Array
+    taken: int
+
+
+@dataclasses.dataclass(frozen=True)
 class Fit:
     """A model fitted to windows, each with its own free start state.
 
@@ -43,6 +58,8 @@ class Fit:
         basis: Orthonormal basis of what start states can imitate, (W, R, f).
         converged: Whether the last step no longer lowered the loss.
         inner: What the fitter itself needs to go on from here.
+        beyond: Where more than the windows tells of the numbers: that and they together.
+        spread: Standard deviation of the numbers by the profile of the loss, (p,), if asked for.
     """
 
     model: Model
@@ -54,6 +71,16 @@ class Fit:
     basis: Array
     converged: bool
     inner: Any
+    beyond: Told | None = None
+    spread: Array | None = None
+
+    @property
+    def told(self) -> Told:
+        """What tells of the numbers."""
+        if self.beyond is not None:
+            return self.beyond
+        root = np.sqrt(self.weights)[:, None]
+        return Told(self.projected * root, self.by_knob * root[..., None], self.basis.shape[2])
 
     @property
     def merit(self) -> float:
@@ -129,6 +156,9 @@ class Fitter(Protocol):
             theta: First guess of the numbers, (p,).
             near: A fit whose start states are worth starting from.
         """
+
+    def profiled(self, fit: Fit) -> Fit:
+        """A fit with numbers and their spread by the profile of the loss, if it needs one."""
 
     def resumed(self, model: Model, theta: Array, near: Fit) -> Fit:
         """The same from where a fit ended, of which ``model`` is an extension."""

@@ -45,6 +45,12 @@ def bounded(fit: Fit, j: int, half: float, numerics: Sequence[Array]) -> Number:
 
 
 def deviations(fit: Fit, blocks: Blocks) -> Array:
+    """Standard deviation of the numbers, (p,), by slopes and by the profile of the loss."""
+    by_slopes = _by_slopes(fit, blocks)
+    return by_slopes if fit.spread is None else np.maximum(by_slopes, fit.spread)
+
+
+def _by_slopes(fit: Fit, blocks: Blocks) -> Array:
     """Standard deviation of the numbers, (p,): the larger of two.
 
     One is Gauss-Newton's with start states projected out, times the residual variance; the other
@@ -61,15 +67,14 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
     p = len(fit.theta)
     if not p:
         return np.zeros(0)
-    root = np.sqrt(fit.weights)[:, None]
-    rows, residual = fit.by_knob * root[..., None], fit.projected * root
+    rows, residual = fit.told.by_knob, fit.told.residual
     scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
     unit = rows / scale
     # Of a number that moves nothing, no more is known than what is known for certain.
     known = np.maximum(np.array([knob.known for knob in fit.model.knobs]) * scale, 1e-6)
     each, prior = np.einsum("wri,wrj->wij", unit, unit), np.diag(known**-2)
     matrix = each.sum(axis=0)
-    freedom = int((np.abs(residual) > 0).sum()) - fit.basis.shape[2] * len(residual)
+    freedom = int((np.abs(residual) > 0).sum()) - fit.told.taken * len(residual)
     variance = 1.0
     for _ in range(2):
         inverse = np.linalg.pinv(matrix + variance * prior, rcond=1e-12)

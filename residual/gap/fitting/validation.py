@@ -48,9 +48,9 @@ def validate(fitter: Fitter, fit: Fit) -> Validated:
 
 def without_folds(fit: Fit, blocks: Blocks) -> Array:
     """Numbers fitted without each fold, (K, p): one Gauss-Newton step from those of all."""
-    weights = fit.weights
-    matrices = np.einsum("wri,wrj,w->wij", fit.by_knob, fit.by_knob, weights)
-    rights = np.einsum("wri,wr,w->wi", fit.by_knob, fit.projected, weights)
+    rows, residual = fit.told.by_knob, fit.told.residual
+    matrices = np.einsum("wri,wrj->wij", rows, rows)
+    rights = np.einsum("wri,wr->wi", rows, residual)
     model, theta = fit.model, fit.theta
     found = np.repeat(theta[None], blocks.folds, axis=0)
     if not len(theta) or blocks.folds < 2:

@@ -35,8 +35,8 @@ FOOTNOTE = 1.1
 WELL = 1.5
 #: Times that channels are weighed anew by what the best set leaves of them.
 ROUNDS = 3
-#: Change of a weight that is worth another search.
-WORTH = 1.3
+#: Change of a weight that is worth another search, and where a search takes long.
+WORTH, WORTH_LONG = 1.3, 1.6
 #: Effects tried in place of each chosen one, and rounds of that.
 RIVALS, EXCHANGES = 10, 3
 #: Effects tried in place of each at the least.
@@ -148,8 +148,8 @@ def explain(
             every_two(search)
         best = near_best(search)
         fresh, floor = weigh(fitter, search.tried[best[0]])
-        ratio = fresh.sigma / fitter.sigma
-        alike = (ratio > 1 / WORTH).all() and (ratio < WORTH).all()
+        ratio, worth = fresh.sigma / fitter.sigma, WORTH_LONG if simulator.has_contacts else WORTH
+        alike = (ratio > 1 / worth).all() and (ratio < worth).all()
         if alike and fresh.samples.substeps <= fitter.samples.substeps:
             break
         seeds = {key: search.own(key) for key in best if key}

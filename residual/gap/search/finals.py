@@ -17,15 +17,15 @@ from residual.gap.search.choice import Choice
 from residual.gap.search.explain import Explanation
 from residual.gap.search.reasons import reasons
 from residual.gap.search.sets import Key, Search
-from residual.gap.search.significance import score, significant, tie
+from residual.gap.search.significance import ASTRAY, score, significant, tie
 
 #: Sets that meet, the chosen one among them.
 FINALISTS = 3
 
 
 def finalists(found: Explanation) -> list[Key]:
-    """The chosen set, and those of as few numbers that fit as well within chance, the ones that
-    forecast best first."""
+    """The chosen set, and those of as few numbers that fit as well within chance and do not
+    forecast far worse, the ones that forecast best first."""
     search, key = found.search, found.key
     own = score(search, key)
     near = [
@@ -34,6 +34,7 @@ def finalists(found: Explanation) -> list[Key]:
         if other not in ((), key)
         and search.numbers(other) <= search.numbers(key)
         and score(search, other) - own <= tie(search, key, other)
+        and search.error(other) <= ASTRAY * search.error(key)
     ]
     return [key, *sorted(near, key=search.error)[: FINALISTS - 1]]
 

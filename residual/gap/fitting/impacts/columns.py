@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,11 +11,13 @@ from numpy.typing import NDArray
 from residual.gap.fitting.impacts.single_shooting import (
     StartFit,
     WindowData,
+    foretold,
     job,
     run,
     shown,
     whitened,
 )
+from residual.gap.fitting.impacts.start_states import begun_beside, descend
 from residual.gap.model.candidates import Candidate
 from residual.gap.model.model import Model
 
@@ -26,18 +29,40 @@ GENTLE = 0.3
 #: Step of a finite difference by a strength, as a share of a usual one. Narrow ones see the kinks
 #: of impacts, and steps of Gauss and Newton by such derivatives are far too short.
 WIDE = 0.5
+#: Steps of start states beside a changed number.
+SOME = 4
 
 
-def chosen_changes(
-    model: Model, theta: Array, data: WindowData, fitted: StartFit, width: float = WIDE
-) -> Array:
-    """Derivative of the whitened output by the unknowns of the model, (W, R, p).
+@dataclasses.dataclass(frozen=True)
+class Slopes:
+    """Derivatives by the numbers of a model.
+
+    Attributes:
+        window: Of the whitened output of every window, its start state as it is, (W, R, p).
+        ahead: Of the residual of what follows it, start states fitted anew, with its sign turned as
+            that of an output, (W, R', p).
+    """
+
+    window: Array
+    ahead: Array
+
+
+def slopes(
+    model: Model,
+    theta: Array,
+    data: WindowData,
+    fitted: StartFit,
+    ahead: Array,
+    width: float = WIDE,
+) -> Slopes:
+    """Derivative by the unknowns of the model.
 
     Args:
         model: The fitted simulator with effects.
         theta: Their numbers, (p,).
         data: The windows.
         fitted: The fit to them.
+        ahead: Residual of what follows them, (W, R').
         width: Step of the finite differences, as a share of usual ones.
     """
     widths = width * model.step
@@ -49,7 +74,18 @@ def chosen_changes(
         whitened(data, (shown(one, path, measured)[0] - fitted.shown) / step)
         for one, path, step in zip(jobs, run(jobs), steps, strict=True)
     ]
-    return np.stack(columns, axis=2) if columns else np.zeros((*fitted.residual.shape, 0))
+    if not columns:
+        return Slopes(np.zeros((*fitted.residual.shape, 0)), np.zeros((*ahead.shape, 0)))
+    window = np.stack(columns, axis=2)
+    if data.ahead is None:
+        return Slopes(window, np.zeros((*ahead.shape, len(steps))))
+    changed = []
+    for j, t in enumerate(thetas):
+        begin = begun_beside(model, t, data, fitted, window[..., j] * steps[j])
+        starts = descend(model, t, data, begin, SOME).starts
+        there = data.ahead.residual(data, foretold(model, t, data, starts, data.ahead.steps))
+        changed.append((ahead - there) / steps[j])
+    return Slopes(window, np.stack(changed, axis=2))
 
 
 def candidate_changes(

@@ -10,29 +10,16 @@ from numpy.typing import NDArray
 
 from residual.gap.data.blocks import Blocks
 from residual.gap.data.samples import Recorded, Samples
-from residual.gap.fitting.contract import Fit, Fitter, Foretold, Left
-from residual.gap.fitting.impacts.columns import candidate_changes, chosen_changes
+from residual.gap.fitting.contract import Fit, Fitter, Foretold, Left, Told
+from residual.gap.fitting.impacts.ahead import inside, rows_ahead
+from residual.gap.fitting.impacts.columns import candidate_changes, slopes
 from residual.gap.fitting.impacts.known_states import sharpened
 from residual.gap.fitting.impacts.noise import with_noise
-from residual.gap.fitting.impacts.refine import (
-    Refined,
-    grown,
-    has_short_parts,
-    improved,
-    level,
-    refine,
-)
+from residual.gap.fitting.impacts.profile import by_profile
+from residual.gap.fitting.impacts.refine import Refined, grown, improved, level, settle
 from residual.gap.fitting.impacts.robust import weights
-from residual.gap.fitting.impacts.single_shooting import (
-    Job,
-    StartFit,
-    WindowData,
-    begun,
-    descend,
-    job,
-    run,
-    shown,
-)
+from residual.gap.fitting.impacts.single_shooting import StartFit, WindowData, foretold
+from residual.gap.fitting.impacts.start_states import begun, descend
 from residual.gap.fitting.impacts.windows import lay_out
 from residual.gap.fitting.noise import Noise
 from residual.gap.fitting.screening import Signatures
@@ -48,8 +35,9 @@ Array = NDArray[np.float64]
 MATERIAL = 0.02
 #: Share of it by which a rival must be worse to be excluded.
 TIED = 0.01
-#: Steps of the strengths on whole windows.
-STEPS = 2
+#: Steps of strengths, of few of them, of states that are known, and of many and of a model that was
+#: fitted before.
+STEPS, KNOWN, MANY = 4, 2, 4
 #: A forecast's squared error counts up to so many times the upper quartile of the nominal one.
 LOST = 4.0
 
@@ -64,6 +52,7 @@ class ImpactFitter:
         horizon: Forecast length in rows, beyond the window.
         scale: Usual size of every physical state, (n_p,).
         limit: Largest squared error that a forecast counts with, (m,).
+        known: The nominal simulator fitted to these windows, if it was.
     """
 
     data: WindowData
@@ -71,6 +60,7 @@ class ImpactFitter:
     horizon: int
     scale: Array
     limit: Array
+    known: StartFit | None = None
 
     @property
     def samples(self) -> Samples:
@@ -105,19 +95,31 @@ class ImpactFitter:
         """See ``Fitter.fit``."""
         data = self.data
         theta = np.clip(theta, model.low, model.high)
-        if near is not None and len(near.theta):
-            found = refine(model, theta, data, near.inner.fitted, STEPS)
+        again = near is not None and len(near.theta) == len(theta)
+        turns = 1 if again or len(theta) >= MANY else STEPS
+        turns = turns if data.ahead is not None else KNOWN
+        if near is None:
+            found = improved(self._begun(model, theta), data, turns)
         else:
-            # Short parts of the windows say how strong; what long ones proposed overshoots.
-            zero = [c.linear & (not c.rough and c.bold is None) for c in model.chosen]
-            theta = np.where(np.concatenate([*zero, []]) > 0, 0.0, theta)
-            found = improved(_first(model, theta, data, near), data, STEPS)
+            inner = near.inner.fitted
+            every = [
+                improved(settle(model, start, data, inner.starts, 1, inner.by_start), data, turns)
+                for start in (_starts(model, theta) if not len(near.theta) else [theta])
+            ]
+            found = min(every, key=lambda one: one.total)
         if data.known.all():
-            found = sharpened(found, data, self.scale, STEPS)
+            found = sharpened(found, data, self.scale, turns)
         if near is None:
             return self._as_fit(found, found.loss)
         found, gain = level(found, near.inner, data)
         return self._as_fit(found, near.loss - gain)
+
+    def _begun(self, model: Model, theta: Array) -> Refined:
+        """Start states from nothing, or of the nominal simulator from where they were found."""
+        data, fitted = self.data, None if len(theta) else self.known
+        if fitted is None:
+            return grown(model, theta, data, data.guess)
+        return settle(model, theta, data, fitted.starts, 1, fitted.by_start)
 
     def as_fit(self, model: Model, theta: Array, fitted: StartFit) -> Fit:
         """A model whose start states have been found."""
@@ -125,15 +127,37 @@ class ImpactFitter:
         return self._as_fit(found, found.loss)
 
     def _as_fit(self, found: Refined, loss: Array) -> Fit:
-        fitted = found.fitted
+        data, fitted = self.data, found.fitted
         basis, _ = np.linalg.qr(fitted.by_start)
         inner = basis.transpose(0, 2, 1)
-        changes = chosen_changes(found.model, found.theta, self.data, fitted)
+        changes = found.slopes
+        if changes is None or data.ahead is None:
+            changes = slopes(found.model, found.theta, data, fitted, found.ahead)
+        window = changes.window - basis @ (inner @ changes.window)
+        projected = fitted.residual - (basis @ (inner @ fitted.residual[..., None]))[..., 0]
+        weight = weights(fitted.costs, data.freedom)
+        told = None
+        if data.ahead is not None:
+            own, beyond = (np.sqrt(w) for w in (weight, weights(found.costs_ahead, data.freedom)))
+            told = Told(
+                np.concatenate([projected * own[:, None], found.ahead * beyond[:, None]], axis=1),
+                np.concatenate(
+                    [window * own[:, None, None], changes.ahead * beyond[:, None, None]], axis=1
+                ),
+                basis.shape[2],
+            )
         return Fit(
-            found.model, found.theta, loss, weights(fitted.costs, self.data.freedom),
-            fitted.residual - (basis @ (inner @ fitted.residual[..., None]))[..., 0],
-            changes - basis @ (inner @ changes), basis, True, found,
-        )  # fmt: skip
+            found.model, found.theta, loss, weight, projected, window, basis, True, found, told
+        )
+
+    def profiled(self, fit: Fit) -> Fit:
+        """See ``Fitter.profiled``; states that are known leave nothing to luck."""
+        if self.data.ahead is None or fit.spread is not None or not len(fit.theta):
+            return fit
+        found, spread = by_profile(fit.inner, self.data, self.blocks.block)
+        found, gain = level(found, fit.inner, self.data)
+        found = dataclasses.replace(found, slopes=fit.inner.slopes)
+        return dataclasses.replace(self._as_fit(found, fit.loss - gain), spread=spread)
 
     def resumed(self, model: Model, theta: Array, near: Fit) -> Fit:
         """See ``Fitter.resumed``."""
@@ -145,48 +169,28 @@ class ImpactFitter:
 
     def foretell(self, model: Model, thetas: Array, which: NDArray[np.int64], fit: Fit) -> Foretold:
         """See ``Fitter.foretell``: from the end of every window on, in the same run."""
-        rows = self._ahead()
+        rows = rows_ahead(self.data, self.horizon)
         seen = self.samples.seen[rows][..., self.samples.measured]
         found = np.full(seen.shape, np.nan)
         for number in np.unique(which):
             own = np.flatnonzero(which == number)
-            theta = thetas[number]
-            part = self.data.take(own)
-            near = fit.inner.fitted.take(own)
+            theta, part, near = thetas[number], self.data.take(own), fit.inner.fitted.take(own)
             starts = near.starts
             if len(theta):
                 here = begun(model, theta, part, starts, near.by_start)
                 starts = descend(model, theta, part, here).starts
-            one = job(model, theta, part, starts[None])
-            inputs = model.inputs(self.samples, theta[None])[0]
-            whole = Job(
-                one.host, one.starts, inputs[rows[own, :-1]], self.samples.durations[rows[own, :-1]]
-            )
-            found[own] = shown(whole, run([whole])[0], self.samples.measured)[0]
-        square = np.where(self._inside(rows), np.minimum((seen - found) ** 2, self.limit), np.nan)
+            found[own] = foretold(model, theta, part, starts, self.horizon)
+        there = inside(self.data, rows)
+        square = np.where(there, np.minimum((seen - found) ** 2, self.limit), np.nan)
         size = self.data.windows.index.shape[1]
         middle = size + self.horizon // 2
         return Foretold(_mean(square[:, size:]), _mean(square[:, size:middle]), found[:, :size])
 
-    def _ahead(self) -> NDArray[np.int64]:
-        """Rows of every window and of its forecast, (W, L + horizon)."""
-        index = self.data.windows.index
-        rows = index[:, :1] + np.arange(index.shape[1] + self.horizon)
-        return np.minimum(rows, len(self.samples) - 1)
-
-    def _inside(self, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Which of them belong to the window's run, (W, L + horizon, 1)."""
-        ends = np.array([self.samples.runs[r][1] for r in self.data.windows.run])
-        index = self.data.windows.index[:, :1] + np.arange(rows.shape[1])
-        return (index < ends[:, None])[..., None]
-
     def redrawn(self, fit: Fit, sigma: Array, rng: np.random.Generator) -> ImpactFitter:
         """See ``Fitter.redrawn``; forecasts overlap, so each window becomes a run of its own."""
-        rows, samples = self._ahead(), self.samples
-        one = job(fit.model, fit.theta, self.data, fit.inner.fitted.starts[None])
-        inputs = fit.model.inputs(samples, fit.theta[None])[0]
-        whole = Job(one.host, one.starts, inputs[rows[:, :-1]], samples.durations[rows[:, :-1]])
-        clean = shown(whole, run([whole])[0], samples.measured)[0]
+        rows, samples = rows_ahead(self.data, self.horizon), self.samples
+        starts = fit.inner.fitted.starts
+        clean = foretold(fit.model, fit.theta, self.data, starts, self.horizon)
         count, length = rows.shape
         flat = rows.ravel()
         seen = np.full((count * length, samples.seen.shape[1]), np.nan)
@@ -206,7 +210,9 @@ class ImpactFitter:
         size = self.data.windows.index.shape[1]
         cut = [(k, int(a), int(a) + size) for k, a in enumerate(begins)]
         exact = bool(self.data.known.all())
-        data = with_noise(lay_out(fit.model.simulator, drawn, cut, exact), self.sigma, self.scale)
+        laid = lay_out(fit.model.simulator, drawn, cut, exact)
+        data = with_noise(laid, self.sigma, self.scale)
+        data = dataclasses.replace(data, ahead=self.data.ahead)
         blocks = dataclasses.replace(self.blocks, windows=data.windows)
         return dataclasses.replace(self, data=data, blocks=blocks)
 
@@ -259,11 +265,15 @@ class ImpactFitter:
         )
 
 
-def _first(model: Model, theta: Array, data: WindowData, near: Fit | None) -> Refined:
-    """A first fit of strengths and start states; the nominal one, while nothing acts yet."""
-    if near is None or theta.any() or has_short_parts(data):
-        return grown(model, theta, data, data.guess)
-    return dataclasses.replace(near.inner, model=model, theta=theta)
+def _starts(model: Model, theta: Array) -> list[Array]:
+    """Where numbers begin beside nothing: at zero, since what the screen proposes overshoots; and
+    what is bold from there, too."""
+    linear = [c.linear & (not c.rough) for c in model.chosen]
+    bold = [c.linear & (not c.rough and c.bold is not None) for c in model.chosen]
+    zero, also = (np.concatenate([*some, []]) > 0 for some in (linear, bold))
+    return [np.where(zero, 0.0, theta)] + (
+        [np.where(zero & ~also, 0.0, theta)] if also.any() else []
+    )
 
 
 def _mean(values: Array) -> Array:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from residual.gap.data.samples import Samples
 from residual.gap.fitting.impacts.refine import grown
 from residual.gap.fitting.impacts.robust import weights
-from residual.gap.fitting.impacts.single_shooting import StartFit, WindowData, fit_starts
+from residual.gap.fitting.impacts.single_shooting import StartFit, WindowData
+from residual.gap.fitting.impacts.start_states import fit_starts
 from residual.gap.model.model import Model
 
 Array = NDArray[np.float64]

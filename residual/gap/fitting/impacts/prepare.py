@@ -6,13 +6,16 @@ import dataclasses
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from residual.gap.data.blocks import blocks, drive
 from residual.gap.data.samples import Samples
 from residual.gap.data.windows import Windows
 from residual.gap.fitting.contract import Fit, Fitter
+from residual.gap.fitting.impacts.ahead import Ahead, units
 from residual.gap.fitting.impacts.fitter import LOST, ImpactFitter
 from residual.gap.fitting.impacts.noise import quieten, spread, with_noise
+from residual.gap.fitting.impacts.single_shooting import StartFit, WindowData, foretold
 from residual.gap.fitting.impacts.windows import lay_out, pieces, scales, steps_for
 from residual.gap.fitting.noise import Noise
 from residual.gap.model import paths
@@ -20,6 +23,8 @@ from residual.gap.model.candidates import Candidate
 from residual.gap.model.model import Model
 from residual.trajectories import Trajectory
 from sims.host import HostSimulator
+
+Array = NDArray[np.float64]
 
 #: Windows that effects are searched on, each of which costs a simulation for every state and every
 #: effect; and those that decide between sets which these leave open.
@@ -53,13 +58,28 @@ def impact_fitter(
     data = lay_out(simulator, samples, grouped.windows.pieces, exact)
     data, fitted = quieten(model, none, data, scale)
     ahead = max(1, round(horizon / samples.step))
+    if not exact:
+        data = dataclasses.replace(data, ahead=_ahead(model, none, data, fitted, ahead))
     free = np.full(len(data.sigma), np.inf)
     fitter = ImpactFitter(data, grouped, ahead, scale, free)
     nominal = fitter.as_fit(model, none, fitted)
     every = np.zeros(len(data), np.int64)
     squares = fitter.foretell(model, none[None], every, nominal).squares
     limit = LOST * np.nanquantile(squares, 0.75, axis=0)
-    return dataclasses.replace(fitter, limit=limit), Noise(*spread(data, nominal.inner.fitted))
+    return dataclasses.replace(fitter, limit=limit, known=fitted), Noise(
+        *spread(data, nominal.inner.fitted)
+    )
+
+
+def _ahead(model: Model, theta: Array, data: WindowData, fitted: StartFit, steps: int) -> Ahead:
+    """How forecasts of so many rows count, from fitted windows."""
+    starts = fitted.starts
+    shown = foretold(model, theta, data, starts, steps)
+    moved = np.zeros((*shown.shape, starts.shape[1]))
+    for i in np.flatnonzero(~data.known):
+        there = starts + data.moves[i] * np.eye(starts.shape[1])[i]
+        moved[..., i] = (foretold(model, theta, data, there, steps) - shown) / data.moves[i]
+    return Ahead(units(data, shown, fitted.by_start, np.nan_to_num(moved)))
 
 
 def more_windows(

@@ -51,10 +51,15 @@ class Quadratic:
             low,
         )  # fmt: skip
 
-    def take(self, which: NDArray[np.int64]) -> Quadratic:
-        """Some windows, or some more than once."""
+    def beside(self, residual: Array, columns: Array) -> Quadratic:
+        """The same with as many further windows (W, R), (W, R, k), that have no start states."""
+        turned = columns.transpose(0, 2, 1)
         return dataclasses.replace(
-            self, a=self.a[which], b=self.b[which], c=self.c[which], freedom=self.freedom[which]
+            self,
+            a=np.concatenate([self.a, turned @ columns]),
+            b=np.concatenate([self.b, (turned @ residual[..., None])[..., 0]]),
+            c=np.append(self.c, (residual**2).sum(axis=1)),
+            freedom=np.append(self.freedom, self.freedom),
         )
 
     def costs(self, coefficients: Array) -> Array:

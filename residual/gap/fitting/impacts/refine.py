@@ -7,18 +7,20 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.fitting.impacts.columns import WIDE, chosen_changes
+from residual.gap.fitting.impacts.columns import SOME, WIDE, Slopes, slopes
 from residual.gap.fitting.impacts.quadratic import Quadratic, minimise
 from residual.gap.fitting.impacts.robust import losses
 from residual.gap.fitting.impacts.single_shooting import (
     StartFit,
     WindowData,
+    foretold,
+)
+from residual.gap.fitting.impacts.start_states import (
     begun,
+    begun_beside,
     descend,
     fit_starts,
     renewed,
-    residual,
-    simulate,
 )
 from residual.gap.model.model import Model
 
@@ -28,6 +30,8 @@ Array = NDArray[np.float64]
 SHORTEST, LONGER = 7, 1.5
 #: Share by which the loss must fall for another step.
 SETTLED = 3e-3
+#: Share by which a step must lower the loss for a longer one to be tried.
+WORTH_MORE = 0.03
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,41 +42,66 @@ class Refined:
         model: Simulator with the effects.
         theta: Their numbers, (p,).
         fitted: The windows, fitted by their best start states.
-        loss: Robust loss of every window, (W,).
+        ahead: Residual of what was foretold from these, (W, R'); empty if that is not asked for.
+        freedom: Measured values less free states of every window, (W,).
+        slopes: Derivative by the numbers, there or a step before; None if there was no step.
     """
 
     model: Model
     theta: Array
     fitted: StartFit
-    loss: Array
+    ahead: Array
+    freedom: Array
+    slopes: Slopes | None = None
 
     @classmethod
     def of(cls, model: Model, theta: Array, fitted: StartFit, data: WindowData) -> Refined:
         """A model whose start states have been found."""
-        return cls(model, theta, fitted, losses(fitted.costs, data.freedom))
+        return cls(model, theta, fitted, _ahead(model, theta, data, fitted), data.freedom)
 
-    def tried_from(self, starts: Array, slope: Array, data: WindowData) -> Refined:
-        """The same strengths, with every window begun elsewhere where that is better.
-
-        Args:
-            starts: Other start states, (W, n_p).
-            slope: Derivative by them, (W, R, n_p).
-            data: The windows.
-        """
+    def tried_from(self, other: StartFit, data: WindowData) -> Refined:
+        """The same strengths, with every window begun as in another fit where that is better."""
         model, theta = self.model, self.theta
-        found = descend(model, theta, data, begun(model, theta, data, starts, slope))
-        loss = losses(found.costs, data.freedom)
-        won = np.flatnonzero(loss < self.loss)
+        begin = begun(model, theta, data, other.starts, other.by_start)
+        found = descend(model, theta, data, begin, SOME)
+        won = np.flatnonzero(found.costs < self.fitted.costs)
         if not len(won):
             return self
-        better = renewed(model, theta, data.take(won), found.take(won))
-        fitted = self.fitted.with_windows(won, better)
-        return dataclasses.replace(self, fitted=fitted, loss=np.minimum(loss, self.loss))
+        part, ahead = data.take(won), self.ahead.copy()
+        better = renewed(model, theta, part, found.take(won))
+        ahead[won] = _ahead(model, theta, part, better)
+        return dataclasses.replace(self, fitted=self.fitted.with_windows(won, better), ahead=ahead)
+
+    def with_better(self, other: Refined) -> Refined:
+        """The same strengths, with the windows that another fit of them has begun better."""
+        won = np.flatnonzero(other.fitted.costs < self.fitted.costs)
+        fitted = self.fitted.with_windows(won, other.fitted.take(won))
+        ahead = self.ahead.copy()
+        ahead[won] = other.ahead[won]
+        return dataclasses.replace(self, fitted=fitted, ahead=ahead)
+
+    @property
+    def loss(self) -> Array:
+        """Robust loss of every window and of what follows it, (W,)."""
+        own = losses(self.fitted.costs, self.freedom)
+        return own + losses(self.costs_ahead, self.freedom)
+
+    @property
+    def costs_ahead(self) -> Array:
+        """Squared residual of what follows every window, (W,)."""
+        return (self.ahead**2).sum(axis=1)
 
     @property
     def total(self) -> float:
         """Sum of the losses."""
         return float(self.loss.sum())
+
+
+def _ahead(model: Model, theta: Array, data: WindowData, fitted: StartFit) -> Array:
+    if data.ahead is None:
+        return np.zeros((len(data), 0))
+    shown = foretold(model, theta, data, fitted.starts, data.ahead.steps)
+    return data.ahead.residual(data, shown)
 
 
 def settle(
@@ -85,11 +114,6 @@ def settle(
 ) -> Refined:
     """Start states alone, the strengths as they are; see ``fit_starts``."""
     return Refined.of(model, theta, fit_starts(model, theta, data, starts, turns, slope), data)
-
-
-def has_short_parts(data: WindowData) -> bool:
-    """Whether windows are long enough to be followed in part before they are followed whole."""
-    return bool(data.windows.index.shape[1] > SHORTEST)
 
 
 def grown(model: Model, theta: Array, data: WindowData, starts: Array) -> Refined:
@@ -114,18 +138,6 @@ def grown(model: Model, theta: Array, data: WindowData, starts: Array) -> Refine
     return settle(model, theta, data, starts, 2)
 
 
-def refine(model: Model, theta: Array, data: WindowData, near: StartFit, turns: int) -> Refined:
-    """Strengths and start states from those of a similar model, in turns, each from a fresh
-    derivative of both.
-
-    Args:
-        theta: First guess of the strengths, (p,).
-        near: The windows as fitted by a similar model.
-        turns: At most so many.
-    """
-    return improved(settle(model, theta, data, near.starts, 1, near.by_start), data, turns)
-
-
 def improved(best: Refined, data: WindowData, turns: int, width: float = WIDE) -> Refined:
     """At most so many steps of a fit, while the loss falls by more than a share."""
     for _ in range(turns if len(best.theta) else 0):
@@ -134,6 +146,8 @@ def improved(best: Refined, data: WindowData, turns: int, width: float = WIDE) -
         if gain > 0:
             fitted = renewed(fresh.model, fresh.theta, data, fresh.fitted)
             best = dataclasses.replace(fresh, fitted=fitted)
+        else:
+            best = dataclasses.replace(best, slopes=fresh.slopes)
         if gain < SETTLED * best.total:
             break
     return best
@@ -145,31 +159,22 @@ def level(one: Refined, other: Refined, data: WindowData) -> tuple[Refined, Arra
     A start state is found by search, and to go on searching lowers the loss of any model. So the
     other one tries the start states of this one, too, before losses are compared.
     """
-    one = one.tried_from(other.fitted.starts, other.fitted.by_start, data)
-    mine = one.fitted
-    begin = begun(other.model, other.theta, data, mine.starts, mine.by_start)
-    again = descend(other.model, other.theta, data, begin)
-    loss = np.minimum(other.loss, losses(again.costs, data.freedom))
-    return one, loss - one.loss
+    one = one.tried_from(other.fitted, data)
+    return one, other.tried_from(one.fitted, data).loss - one.loss
 
 
-def quadratic(found: Refined, data: WindowData, changes: Array) -> Quadratic:
-    """The windows as quadratic functions of changes (W, R, p) by the strengths."""
-    fitted = found.fitted
-    return Quadratic.of(
-        fitted.by_start,
-        fitted.residual,
-        changes,
-        data.freedom,
-        found.model.low - found.theta,
-    )
+def quadratic(found: Refined, data: WindowData, changes: Slopes) -> Quadratic:
+    """The windows and what follows them as quadratic functions of changes of the strengths."""
+    fitted, low = found.fitted, found.model.low - found.theta
+    own = Quadratic.of(fitted.by_start, fitted.residual, changes.window, data.freedom, low)
+    return own if data.ahead is None else own.beside(found.ahead, changes.ahead)
 
 
-def newton(found: Refined, data: WindowData, changes: Array | None = None) -> Array:
+def newton(found: Refined, data: WindowData, changes: Slopes | None = None) -> Array:
     """Full step of the strengths by the quadratic model, within their bounds, (p,)."""
     model = found.model
     if changes is None:
-        changes = chosen_changes(model, found.theta, data, found.fitted)
+        changes = slopes(model, found.theta, data, found.fitted, found.ahead)
     _, (change,) = minimise(quadratic(found, data, changes), [tuple(range(len(model)))])
     return np.clip(found.theta + change, model.low, model.high) - found.theta
 
@@ -182,30 +187,21 @@ def step(best: Refined, data: WindowData, width: float = WIDE) -> Refined:
     is doubled while it does.
     """
     model, fitted = best.model, best.fitted
-    changes = chosen_changes(model, best.theta, data, fitted, width)
+    changes = slopes(model, best.theta, data, fitted, best.ahead, width)
     full = newton(best, data, changes)
-    inverse = np.linalg.pinv(fitted.by_start, rcond=1e-8)
 
     def at(share: float) -> Refined:
         theta = np.clip(best.theta + share * full, model.low, model.high)
-        target = fitted.residual - changes @ (theta - best.theta)
-        moved = fitted.starts + (inverse @ target[..., None])[..., 0]
-        outputs = simulate(model, theta, data, np.stack([fitted.starts, moved]))
-        stay, move = (
-            StartFit(starts, output, residual(data, starts, output), fitted.by_start)
-            for starts, output in zip((fitted.starts, moved), outputs, strict=True)
-        )
-        # An impact may spoil the linear start of one window without spoiling the step.
-        moves = np.flatnonzero(move.costs <= stay.costs)
-        start = stay.with_windows(moves, move.take(moves))
-        return Refined.of(model, theta, descend(model, theta, data, start), data)
+        begin = begun_beside(model, theta, data, fitted, changes.window @ (theta - best.theta))
+        return Refined.of(model, theta, descend(model, theta, data, begin), data)
 
     reached = at(1.0)
-    shares = (2.0, 4.0, 8.0) if reached.total < best.total else (0.4, 0.15)
-    for share in shares:
+    gain = best.total - reached.total
+    shares = (2.0, 4.0, 8.0) if gain > 0 else (0.4, 0.15)
+    for share in shares if gain < 0 or gain > WORTH_MORE * best.total else ():
         trial = at(share)
         better = trial.total < reached.total
         reached = trial if better else reached
         if better != (share > 1):
             break
-    return reached
+    return dataclasses.replace(reached, slopes=changes)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from residual.gap.data.samples import Samples
 from residual.gap.data.windows import Windows
+from residual.gap.fitting.impacts.ahead import Ahead, rows_ahead
 from residual.gap.model.model import Model
 from residual.gap.model.workers import each, integrate_rows
 from sims.host import HostSimulator
@@ -23,8 +24,6 @@ Array = NDArray[np.float64]
 
 #: Rows of one piece of work for a process.
 PIECE = 200
-#: Steps of start states between two full derivatives.
-TRIES = 10
 #: Doubt about a start state that is known.
 KNOWN = 1e-12
 
@@ -41,6 +40,7 @@ class WindowData:
         doubt: How far off the guess of an unmeasured state may be, (n_p,); infinite for a
             measured one, ``KNOWN`` for one that is exactly as measured.
         moves: By how much each state is moved to see its influence, (n_p,).
+        ahead: How forecasts past their ends count; None if these are not asked for.
     """
 
     samples: Samples
@@ -49,6 +49,7 @@ class WindowData:
     guess: Array
     doubt: Array
     moves: Array
+    ahead: Ahead | None = None
 
     def __len__(self) -> int:
         return len(self.windows)
@@ -76,10 +77,10 @@ class WindowData:
         return dataclasses.replace(self, windows=part, guess=self.guess[which])
 
     def until(self, size: int) -> WindowData:
-        """The first so many samples of every window."""
+        """The first so many samples of every window, and nothing past them."""
         windows = self.windows
         part = Windows(windows.index[:, :size], windows.inside[:, :size], windows.run)
-        return dataclasses.replace(self, windows=part)
+        return dataclasses.replace(self, windows=part, ahead=None)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -183,6 +184,15 @@ def simulate(model: Model, theta: Array, data: WindowData, starts: Array) -> Arr
     return shown(one, run([one])[0], data.samples.measured)
 
 
+def foretold(model: Model, theta: Array, data: WindowData, starts: Array, steps: int) -> Array:
+    """The same along windows and so many rows beyond, from (W, n_p), (W, L + steps, m)."""
+    rows = rows_ahead(data, steps)[:, :-1]
+    one = job(model, theta, data, starts[None])
+    inputs = model.inputs(data.samples, theta[None])[0]
+    whole = Job(one.host, one.starts, inputs[rows], data.samples.durations[rows])
+    return shown(whole, run([whole])[0], data.samples.measured)[0]
+
+
 def residual(data: WindowData, starts: Array, shown: Array) -> Array:
     """Whitened residual, zero where nothing was measured, and the doubts below it, (W, R)."""
     gap = (data.seen - shown) / data.sigma
@@ -196,99 +206,3 @@ def whitened(data: WindowData, change: Array) -> Array:
     flat = np.where(valid, change / data.sigma, 0.0).reshape(len(data), -1)
     flat = np.clip(flat, -1e7, 1e7)
     return np.concatenate([flat, np.zeros((len(data), len(data.doubt)))], axis=1)
-
-
-def by_start(model: Model, theta: Array, data: WindowData, starts: Array, base: Array) -> Array:
-    """Derivative of the whitened output by the start states, (W, R, n_p)."""
-    channels = model.simulator.physical_channels
-    moved = [i for i, c in enumerate(channels) if not (c.invariant or data.known[i])]
-    steps = data.moves
-    variants = starts[None] + np.zeros((len(moved), 1, 1))
-    for row, i in enumerate(moved):
-        variants[row, :, i] += steps[i]
-    outputs = simulate(model, theta, data, variants) if moved else variants
-    found = np.zeros((len(data), base[0].size + len(steps), len(steps)))
-    for row, i in enumerate(moved):
-        found[:, :, i] = whitened(data, (outputs[row] - base) / steps[i])
-    measured = data.samples.measured
-    for i, channel in enumerate(channels):
-        if channel.invariant and not data.known[i]:
-            # The motion is the same from there, only that much further.
-            found[:, :, i] = whitened(data, np.where(measured == i, 1.0, 0.0) + 0.0 * base)
-        found[:, base[0].size + i, i] = 1.0 / data.doubt[i]
-    return found
-
-
-def begun(
-    model: Model, theta: Array, data: WindowData, starts: Array, slope: Array | None = None
-) -> StartFit:
-    """Windows as they are from start states, with a derivative from nearby if there is one."""
-    base = simulate(model, theta, data, starts[None])[0]
-    if slope is None:
-        slope = by_start(model, theta, data, starts, base)
-    return StartFit(starts, base, residual(data, starts, base), slope)
-
-
-def fit_starts(
-    model: Model, theta: Array, data: WindowData, starts: Array, turns: int,
-    slope: Array | None = None,
-) -> StartFit:  # fmt: skip
-    """Least squares for the start state of every window (Levenberg and Marquardt).
-
-    Between two full derivatives, steps of Broyden's method go on with a corrected one: they cost
-    a simulation each instead of one for every state.
-
-    Args:
-        turns: Rounds of steps, with a full derivative after each.
-        slope: Derivative by the start states from nearby, to start with.
-    """
-    found = begun(model, theta, data, starts, slope)
-    for _ in range(turns):
-        found = renewed(model, theta, data, descend(model, theta, data, found))
-    return found
-
-
-def renewed(model: Model, theta: Array, data: WindowData, found: StartFit) -> StartFit:
-    """A fit with the derivative where it has arrived."""
-    slope = by_start(model, theta, data, found.starts, found.shown)
-    return dataclasses.replace(found, by_start=slope)
-
-
-def descend(model: Model, theta: Array, data: WindowData, found: StartFit) -> StartFit:
-    """Some steps of every window by the derivative it has, corrected as they go."""
-    if data.known.all():
-        return found
-    starts, base, now = found.starts.copy(), found.shown.copy(), found.residual.copy()
-    local, damping = found.by_start, np.full(len(data), 1e-3)
-    busy = np.ones(len(data), bool)
-    for _ in range(TRIES):
-        rows = np.flatnonzero(busy)
-        if not len(rows):
-            break
-        part = data.take(rows)
-        step = _step(local[rows], now[rows], damping[rows])
-        there = starts[rows] + step
-        output = simulate(model, theta, part, there[None])[0]
-        trial = residual(part, there, output)
-        old, new = (now[rows] ** 2).sum(1), (trial**2).sum(1)
-        # Broyden's correction of the derivative along the step that was made.
-        surprise = now[rows] - trial - (local[rows] @ step[..., None])[..., 0]
-        size = np.maximum((step**2 / data.moves**2).sum(1), 1e-12)
-        local = local.copy()
-        local[rows] += surprise[:, :, None] * (step / data.moves**2 / size[:, None])[:, None]
-        good = new < old
-        damping[rows] = np.where(good, 0.3 * damping[rows], 10 * damping[rows])
-        won = rows[good]
-        starts[won], now[won], base[won] = there[good], trial[good], output[good]
-        busy[rows] = ~good | (old - new > 0.02 * old + 0.1)
-    return StartFit(starts, base, now, found.by_start)
-
-
-def _step(slope: Array, now: Array, damping: Array) -> Array:
-    """Damped Gauss-Newton steps, (W, n_p)."""
-    normal = slope.transpose(0, 2, 1) @ slope
-    size = np.sqrt(np.maximum(np.einsum("wii->wi", normal), 1e-12))
-    scaled = normal / (size[:, :, None] * size[:, None, :])
-    scaled = scaled + (damping[:, None, None] + 1e-9) * np.eye(slope.shape[2])
-    right = (slope.transpose(0, 2, 1) @ now[..., None])[..., 0] / size
-    return np.linalg.solve(scaled, right[..., None])[..., 0] / size

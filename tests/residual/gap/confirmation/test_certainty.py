@@ -18,6 +18,7 @@ from residual.gap.confirmation.certainty import (
 from residual.gap.confirmation.rivals import in_plain_form
 from residual.gap.confirmation.widening import vital
 from residual.gap.data.samples import Samples
+from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.intervals import at_bound, bounded, deviations
 from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
@@ -50,9 +51,9 @@ def test_a_number_that_is_known_beforehand_costs_no_freedom():
 
     def fit(count, known):
         knobs = [SimpleNamespace(known=k) for k in (np.inf, *known)]
-        return SimpleNamespace(
-            model=SimpleNamespace(knobs=knobs), theta=np.zeros(count), weights=np.ones(blocks),
-            by_knob=by_knob[..., :count], projected=projected, basis=np.zeros((blocks, rows, 1)),
+        return Fit(
+            SimpleNamespace(knobs=knobs), np.zeros(count), np.ones(blocks), np.ones(blocks),
+            projected, by_knob[..., :count], np.zeros((blocks, rows, 1)), True, None,
         )  # fmt: skip
 
     windows = type("Few", (), {"block": np.arange(blocks), "__len__": lambda self: blocks})()

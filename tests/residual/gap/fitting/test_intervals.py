@@ -1,10 +1,12 @@
 """When a fitted number has no interval."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.intervals import bounded, deviations, ended
 
 
@@ -16,6 +18,14 @@ def fitted(value, slopes):
         theta=np.array([value]),
         by_knob=np.full((3, 5, 1), slopes),
     )
+
+
+def found(knobs, theta, rows, left):
+    """A linear fit of windows without start states, (W, R, p) and (W, R)."""
+    model = SimpleNamespace(knobs=knobs)
+    none = np.zeros((*left.shape, 0))
+    losses = (left**2).sum(axis=1)
+    return Fit(model, theta, losses, np.ones(len(left)), left, rows, none, True, None)
 
 
 @pytest.mark.parametrize(
@@ -41,14 +51,9 @@ def test_what_is_known_beforehand_is_known_however_large_residuals_are():
     known, noise = 0.1, 30.0
     effect = rng.standard_normal((30, 20))
     parameter = effect + 0.01 * rng.standard_normal((30, 20))
-    fit = SimpleNamespace(
-        model=SimpleNamespace(knobs=[SimpleNamespace(known=k) for k in (np.inf, known)]),
-        theta=np.ones(2),
-        by_knob=np.stack([effect, parameter], axis=2),
-        projected=noise * rng.standard_normal((30, 20)),
-        weights=np.ones(30),
-        basis=np.zeros((30, 20, 0)),
-    )
+    knobs = [SimpleNamespace(known=k) for k in (np.inf, known)]
+    rows = np.stack([effect, parameter], axis=2)
+    fit = found(knobs, np.ones(2), rows, noise * rng.standard_normal((30, 20)))
     own = noise / np.linalg.norm(effect)
     assert deviations(fit, Ten())[1] < 2 * known
     assert deviations(fit, Ten())[0] < 2 * np.hypot(own, known)
@@ -63,14 +68,9 @@ def slopes_by_block(rng, amplitudes, together, numbers=1):
     seen += rng.standard_normal(seen.shape)
     theta = np.linalg.lstsq(rows.reshape(-1, numbers), seen.ravel())[0]
     shape = (3 * blocks, 20)
-    return SimpleNamespace(
-        model=SimpleNamespace(knobs=[SimpleNamespace(known=np.inf)] * numbers),
-        theta=theta,
-        by_knob=rows.reshape(*shape, numbers),
-        projected=(seen - rows @ theta).reshape(shape),
-        weights=np.ones(shape[0]),
-        basis=np.zeros((*shape, 0)),
-    )
+    left = (seen - rows @ theta).reshape(shape)
+    knobs = [SimpleNamespace(known=np.inf)] * numbers
+    return found(knobs, theta, rows.reshape(*shape, numbers), left)
 
 
 @pytest.mark.parametrize("numbers", [1, 5])
@@ -95,3 +95,10 @@ def test_an_interval_is_as_if_one_block_after_the_other_were_left_out():
     spread = np.sqrt(0.9 * (np.array(without) ** 2).sum(axis=0))
     told = deviations(fit, Ten())
     assert (spread < told).all() and (told < 1.3 * spread).all()
+
+
+def test_an_interval_is_no_narrower_than_the_profile_of_the_loss_tells():
+    fit = slopes_by_block(np.random.default_rng(0), np.ones(10), 0.0, numbers=2)
+    own = deviations(fit, Ten())
+    wide = dataclasses.replace(fit, spread=np.array([2.0, 0.1]) * own)
+    np.testing.assert_allclose(deviations(wide, Ten()), [2.0, 1.0] * own)
