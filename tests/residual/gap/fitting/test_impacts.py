@@ -9,6 +9,7 @@ from residual.gap import find_gap
 from residual.gap.data.examine import examine
 from residual.gap.fitting.impacts import prepare as windows
 from residual.gap.fitting.impacts.prepare import impact_fitter
+from residual.gap.fitting.intervals import deviations
 from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
 from residual.gap.preparation import prepare
@@ -70,6 +71,27 @@ def ball(folder, lighter):
     states[:, 1] = np.nan
     assert simulator.for_motion([states]).has_contacts
     return simulator, [Trajectory("run", times, states, push)]
+
+
+def test_forecasts_tell_a_size_and_the_profile_how_well_it_is_known(tmp_path):
+    simulator, runs = ball(tmp_path, 1.5)
+    runs = examine(simulator, runs).trajectories
+    simulator = simulator.for_motion([run.states for run in runs])
+    fitter, _ = impact_fitter(simulator, runs, usual_horizon(simulator, runs), most=20)
+    effect = chosen_effects(simulator, ["gravity z"])
+    (gravity,) = candidates(simulator, effect, fitter.samples)
+    before = fitter.fit(Model(simulator), np.zeros(0))
+    model = Model(simulator, [gravity])
+    # Whatever strength is proposed.
+    for proposed in (-3.0, 6.0):
+        fit = fitter.fit(model, np.array([proposed]), before)
+        assert fit.theta[0] == pytest.approx(1.5, abs=0.05)
+        assert fit.merit < 0.8 * before.merit
+    known = fitter.profiled(fit)
+    half = 1.96 * deviations(known, fitter.blocks)[0]
+    assert abs(known.theta[0] - 1.5) <= half < 0.1
+    # What is known by its profile stays.
+    assert fitter.profiled(known) is known
 
 
 @pytest.mark.parametrize(("lighter", "kind"), [(0.0, "no_gap"), (1.5, "unexplained")])
