@@ -7,6 +7,8 @@ its losses says what it has to say of the size, luck included.
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t
@@ -57,7 +59,8 @@ def by_profile(
             to = origin + way * np.clip(least, line.min(), line.max())
             to = np.clip(to, found.model.low, found.model.high)
             best = min(fits, key=lambda fit: abs(fit.theta[number] - to[number])).fitted
-            found = settle(found.model, to, data, best.starts, 1, best.by_start)
+            fresh = settle(found.model, to, data, best.starts, 1, best.by_start)
+            found = dataclasses.replace(fresh, slopes=found.slopes)
             if wide == 1.0 and abs(least - middle) <= WITHIN * reach:
                 break
     return found, spread
@@ -72,6 +75,8 @@ def lowest(line: Array, lost: Array, blocks: NDArray[np.int64]) -> tuple[float, 
         lost: Losses of every window there, (G, W).
         blocks: Which block each of them is in, (W,).
     """
+    if len(np.unique(line)) < 3:  # it cannot go on past its bounds
+        return float(line[lost.sum(axis=1).argmin()]), np.inf
     square, slope, _ = np.polyfit(line, lost, 2)
     of_block = [blocks == b for b in np.unique(blocks)]
     a, b = (

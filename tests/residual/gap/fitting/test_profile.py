@@ -47,3 +47,6 @@ def test_a_loss_without_a_least_value_tells_no_size():
     place, spread = lowest(LINE, lost, np.arange(6))
     assert spread == np.inf
     assert place in (LINE[0], LINE[-1])
+    # Nor does one of which two sizes can be seen, as between narrow bounds.
+    pair = np.array([0.0, 0.1, 0.1])
+    assert lowest(pair, pair[:, None] + np.zeros((3, 6)), np.arange(6)) == (0.0, np.inf)
