@@ -100,6 +100,7 @@ class Toy:
                 seen=np.zeros((4 * blocks, 1)),
             ),
             tie=lambda nominal: 0.05,
+            profiled=lambda fit: fit,
             chance=lambda one, other: 0.0,
         )
 
