@@ -27,7 +27,7 @@ def test_what_cannot_be_right_without_the_others_goes_too(monkeypatch):
         tried=dict.fromkeys([(), (0,), (0, 1), (0, 1, 2)], fit),
         refused={(0, 1): "outdoor would have 0.05 of its strength"},
         candidates=[SimpleNamespace(label=name) for name in ("load", "gain", "loss")],
-        fitter=SimpleNamespace(blocks=range(8), tie=lambda nominal: 0.0),
+        fitter=SimpleNamespace(blocks=range(8), tie=lambda nominal: 0.0, profiled=lambda fit: fit),
         merged=lambda key, _, drop: (tuple(k for k in key if k not in drop), None),
         add=lambda fits: None,
         usable=lambda: [],
