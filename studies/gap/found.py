@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from residual import gap
 from residual.gap.clock import usual_minutes
+from residual.gap.find import hosting
 from residual.logs import LogData
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
@@ -99,7 +100,8 @@ def find_gap(
     if progress is not None:
         found = gap.find_gap(simulator, trajectories, progress=progress, **options)
     else:
-        begin, budget = time.process_time(), round(60 * (minutes or usual_minutes(simulator)))
+        budget = round(60 * (minutes or usual_minutes(hosting(simulator))))
+        begin = time.process_time()
         with Bars().task("find_gap", budget) as tell:
 
             def show(line: str) -> None:

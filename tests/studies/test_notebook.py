@@ -58,3 +58,8 @@ def test_progress_is_shown_unless_it_is_told_to_somebody(capfd):
     assert told and "find_gap" not in capfd.readouterr().err
     simgap.find_gap(PendulumEquation(), runs(), effects=["mass"])
     assert "find_gap" in capfd.readouterr().err
+
+
+def test_what_is_no_simulator_is_told_before_there_is_a_budget():
+    with pytest.raises(ValueError, match="expected a Simulator"):
+        simgap.find_gap(object(), [])

@@ -143,13 +143,11 @@ def _believable(search: Search, course: Course, ends: Changing) -> bool:
     if isinstance(effect, ParameterChange):
         usual = size(search, effect.parameter)
     signed = isinstance(effect, ParameterChange) and ends.unit not in ANY_ZERO
-    differ = ends.begin != ends.end
-    return differ and (
-        not usual
-        or all(
-            abs(end - nominal) <= FACTOR * usual and not (signed and end * nominal < 0)
-            for end in (ends.begin, ends.end)
-        )
+    if ends.begin == ends.end:
+        return False
+    return not usual or all(
+        abs(end - nominal) <= FACTOR * usual and not (signed and end * nominal < 0)
+        for end in (ends.begin, ends.end)
     )
 
 

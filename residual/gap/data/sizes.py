@@ -34,7 +34,7 @@ def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[
         times = size / declared
         if not times > 0.0 or 1 / FAR < times < FAR:
             continue
-        units, most = other_units(channel.unit), _most(channel) / declared
+        units, most = other_units(channel.unit), _most(channel, declared)
         near = [
             *(f"`unit: {n}`" for n, unit in units if 1 / NEAR <= times * unit.factor <= most),
             *(f"`unit: {channel.unit}` in place of {n}" if channel.name in converted
@@ -111,8 +111,9 @@ def _sizes(
             low, high = np.quantile(_known(runs), [0.05, 0.95])
             yield channel, float(high - low), channel.scale
     for column, channel in enumerate(simulator.action_channels):
-        bounds = [abs(bound) for bound in (channel.low, channel.high) if np.isfinite(bound)]
-        declared = channel.scale if channel.scale != UNDECLARED else max(bounds, default=0.0)
+        declared = channel.scale
+        if declared == UNDECLARED:
+            declared = max(_bounds(channel), default=0.0)
         size = float(
             np.abs(_known([run.actions[:, column] for run in trajectories])).max(initial=0.0)
         )
@@ -125,8 +126,13 @@ def _known(runs: Sequence[Array]) -> Array:
     return values[np.isfinite(values)]
 
 
-def _most(channel: Channel) -> float:
-    """Largest size that a channel may have in another unit: an input none beyond its bounds."""
-    bounds = [abs(bound) for bound in (channel.low, channel.high) if np.isfinite(bound)]
-    declared = channel.scale if channel.scale != UNDECLARED else max(bounds, default=0.0)
-    return ROUNDED * max(bounds) if channel.kind == "input" and bounds else NEAR * declared
+def _bounds(channel: Channel) -> list[float]:
+    """Sizes of the bounds that a channel has."""
+    return [abs(bound) for bound in (channel.low, channel.high) if np.isfinite(bound)]
+
+
+def _most(channel: Channel, declared: float) -> float:
+    """How many times the declared size a channel may have in another unit: an input no more than
+    its bounds."""
+    bounds = _bounds(channel)
+    return ROUNDED * max(bounds) / declared if channel.kind == "input" and bounds else NEAR

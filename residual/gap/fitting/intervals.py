@@ -67,14 +67,15 @@ def _by_slopes(fit: Fit, blocks: Blocks) -> Array:
     p = len(fit.theta)
     if not p:
         return np.zeros(0)
-    rows, residual = fit.told.by_knob, fit.told.residual
+    told = fit.told
+    rows, residual = told.by_knob, told.residual
     scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
     unit = rows / scale
     # Of a number that moves nothing, no more is known than what is known for certain.
     known = np.maximum(np.array([knob.known for knob in fit.model.knobs]) * scale, 1e-6)
     each, prior = np.einsum("wri,wrj->wij", unit, unit), np.diag(known**-2)
     matrix = each.sum(axis=0)
-    freedom = int((np.abs(residual) > 0).sum()) - fit.told.taken * len(residual)
+    freedom = int((np.abs(residual) > 0).sum()) - told.taken * len(residual)
     variance = 1.0
     for _ in range(2):
         inverse = np.linalg.pinv(matrix + variance * prior, rcond=1e-12)

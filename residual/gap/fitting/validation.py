@@ -48,9 +48,9 @@ def validate(fitter: Fitter, fit: Fit) -> Validated:
 
 def without_folds(fit: Fit, blocks: Blocks) -> Array:
     """Numbers fitted without each fold, (K, p): one Gauss-Newton step from those of all."""
-    rows, residual = fit.told.by_knob, fit.told.residual
-    matrices = np.einsum("wri,wrj->wij", rows, rows)
-    rights = np.einsum("wri,wr->wi", rows, residual)
+    told = fit.told
+    matrices = np.einsum("wri,wrj->wij", told.by_knob, told.by_knob)
+    rights = np.einsum("wri,wr->wi", told.by_knob, told.residual)
     model, theta = fit.model, fit.theta
     found = np.repeat(theta[None], blocks.folds, axis=0)
     if not len(theta) or blocks.folds < 2:

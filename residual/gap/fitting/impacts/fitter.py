@@ -269,11 +269,10 @@ def _starts(model: Model, theta: Array) -> list[Array]:
     """Where numbers begin beside nothing: at zero, since what the screen proposes overshoots; and
     what is bold from there, too."""
     linear = [c.linear & (not c.rough) for c in model.chosen]
-    bold = [c.linear & (not c.rough and c.bold is not None) for c in model.chosen]
+    bold = [np.full(len(c.linear), c.bold is not None) for c in model.chosen]
     zero, also = (np.concatenate([*some, []]) > 0 for some in (linear, bold))
-    return [np.where(zero, 0.0, theta)] + (
-        [np.where(zero & ~also, 0.0, theta)] if also.any() else []
-    )
+    at_zero, boldly = np.where(zero, 0.0, theta), np.where(zero & ~also, 0.0, theta)
+    return [at_zero, boldly] if (zero & also).any() else [at_zero]
 
 
 def _mean(values: Array) -> Array:
