@@ -10,7 +10,7 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from residual.calibration import NINETY_PERCENT
 from residual.corrected import CorrectedSimulator
@@ -190,7 +190,7 @@ def interval_over_rollouts(
         whole = 0.5 * np.log(above.sum(axis=0) / below.sum(axis=0))
         without = 0.5 * np.log((above.sum(axis=0) - above) / (below.sum(axis=0) - below))
         spread = np.sqrt((count - 1) * without.var(axis=0))
-        reach = stats.t.ppf(0.975, count - 1) * spread
+        reach = stdtrit(count - 1, 0.975) * spread
         low, high = np.exp(whole - reach), np.exp(np.minimum(whole + reach, 700.0))
     return {
         name: (float(low[i]), float(high[i]))

@@ -36,7 +36,6 @@ from sims.chosen import LIBRARY, chosen_effects
 from sims.host import HostSimulator
 from sims.simulator import Hold, Simulator
 from sims.trust import needs_trust
-from studies.gap.files import CORRECTED, REPORT, write_gap
 from studies.gap.progress import Heartbeat
 from studies.gap.summary import found_in_data, summary
 from studies.running.command import Parser
@@ -148,6 +147,8 @@ def run(
     hold = holds(simulator, study.hold)
     effects = chosen_effects(simulator, chosen.effects)
     check_output(output)
+    from studies.gap.files import write_gap  # pictures: a second to load, for no wrong word
+
     logs, held_out = matching(chosen.logs), matching(chosen.held_out or [])
     # A pattern may match other files another day.
     config |= {"logs": logs, "held_out": held_out or plain["held_out"]}
@@ -245,6 +246,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     settings.pop("config", None)
     with Heartbeat() as tell:
         result = run(settings, output, jobs, tell, tell.until)
+    from studies.gap.files import CORRECTED, REPORT
+
     print(f"\n{summary(result, settings['tolerance'])}\n\nreport:              {output / REPORT}")
     print(f"corrected simulator: {output / CORRECTED}")
     if strange := needs_trust(settings["simulator"]):

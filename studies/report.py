@@ -17,7 +17,7 @@ from pathlib import Path
 from jinja2 import UndefinedError
 
 from simgap_files.atomic import read_sealed
-from studies.learning import command
+from studies.learnt.run_report import rebuild
 from studies.running.command import Parser
 from studies.running.ending import fail, guarded
 from studies.running.trials import PLAN
@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         module = importlib.import_module(f"studies.{study_of(folder)}")
         # Other studies than those of a gap have a function of their own.
         if hasattr(module, "STUDY"):
-            command.rebuild(folder)
+            rebuild(folder)
         else:
             module.rebuild(folder)
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, OSError,

@@ -36,6 +36,17 @@ def test_the_import_alone_is_light(tmp_path):
     assert run(["-c", code], tmp_path).stdout.strip() == "False"
 
 
+def test_a_wrong_word_waits_for_no_pictures_and_no_networks(tmp_path):
+    code = (
+        "import importlib, sys; slow = {'torch', 'matplotlib', 'jinja2'}\n"
+        "for name in ('find_gap', 'learn', 'make_log', 'log_info'):\n"
+        "    importlib.import_module(f'studies.{name}')\n"
+        "    assert not slow & set(sys.modules), name"
+    )
+    done = run(["-c", code], tmp_path)
+    assert not done.stderr
+
+
 #: Of which the studies' own tests and those of the tutorials start processes.
 STARTED = ("learn", "find-gap", "make-log")
 
@@ -57,7 +68,7 @@ def test_every_command_tells_its_options(command, tmp_path, monkeypatch, capsys)
 
 @pytest.mark.parametrize("command", [["simgap", "learn"], ["studies.learn"]], ids=" ".join)
 def test_an_interrupt_while_a_command_loads_is_one_line(tmp_path, command):
-    (tmp_path / "torch.py").write_text("raise KeyboardInterrupt\n")
+    (tmp_path / "sklearn.py").write_text("raise KeyboardInterrupt\n")
     done = run(["-m", *command, "--help"], tmp_path)
     assert done.returncode == -signal.SIGINT  # what shells tell as 130
     assert done.stderr == "\nstopped; nothing had begun\n"

@@ -7,7 +7,6 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -44,6 +43,8 @@ def seconds_of(texts: Sequence[str]) -> Array | None:
         return _since_midnight(texts)
     else:
         return None
+    import pandas as pd  # half a second to load, for logs with dates
+
     with contextlib.suppress(ValueError):
         dates = pd.to_datetime(given, format=layout, utc=True).tz_localize(None).to_numpy()
         seconds = dates.astype("datetime64[ns]").astype(np.int64) * 1e-9

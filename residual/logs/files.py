@@ -6,14 +6,16 @@ import csv
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyarrow.parquet
 from numpy.typing import NDArray
 
 from residual.logs.table import LogError, Table, shortened
 from simgap_files.npz import check_unpacked, read_npz
+
+if TYPE_CHECKING:
+    import pyarrow.parquet
 
 TEXT, PARQUET, NPZ = (".csv", ".txt", ".tsv", ".dat", ".log"), (".parquet", ".pq"), (".npz",)
 
@@ -197,6 +199,8 @@ def _read_arrays(path: Path, data: bytes, suffix: str) -> Table:
 
 
 def _parquet(data: bytes) -> list[tuple[str | int, NDArray[Any]]]:
+    import pyarrow.parquet
+
     opened = pyarrow.parquet.ParquetFile(io.BytesIO(data), page_checksum_verification=True)
     check_parquet(opened, len(data))
     table = opened.read()

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet
 
 from residual.logs.files import check_parquet
 from residual.logs.table import LogError, Table, shortened
@@ -30,6 +29,8 @@ def read_lerobot(path: Path) -> Table:
     Raises:
         LogError: The folder holds no such data set, or a file of it is broken.
     """
+    import pyarrow.parquet
+
     try:
         info = json.loads((path / INFO).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from residual.logs.table import LogError, Table
 
@@ -25,6 +24,8 @@ def table_of(data: Any, number: int) -> Table:
     Raises:
         LogError: It is neither, or lengths differ.
     """
+    import pandas as pd
+
     path = Path(f"log {number} in memory")
     columns: dict[str | int, Any] = {}
     if isinstance(data, pd.DataFrame):

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from residual.trajectories import Trajectory
 from simgap_files.atomic import atomic_write_text
@@ -26,6 +25,8 @@ def write_log(
         states: Channels of its states.
         actions: Channels of its actions.
     """
+    import pandas as pd  # half a second to load, for who writes logs
+
     measured = np.asarray(np.isfinite(run.states).any(axis=0))
     seen = [channel.name for channel, there in zip(states, measured, strict=True) if there]
     # The last command is never applied; a log holds it all the same.

@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from sims.effects.base import Effect
 
@@ -106,6 +105,8 @@ def _basis(points: int) -> NDArray[np.float64]:
     Returns:
         shape (points, 4, pieces): by power of the way into a piece between two points.
     """
+    from scipy.interpolate import CubicSpline  # half a second to load, for few
+
     spline = CubicSpline(np.arange(points), np.eye(points), bc_type="not-a-knot")
     return np.ascontiguousarray(spline.c[::-1].transpose(2, 0, 1))
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from simgap_files.atomic import atomic_write_text, read_sealed, remove_partial_files, write_sealed
+from simgap_files.atomic import atomic_write_text, remove_partial_files, write_sealed
 from studies.learning.output import keep_only, refuse_other_run
 from studies.learning.study import Study
 from studies.learning.trial import (
@@ -24,18 +24,12 @@ from studies.learning.trial import (
     run_trial,
     trial_label,
 )
-from studies.learnt.films import write_films
-from studies.learnt.report import read_episodes, write_report
-from studies.learnt.tables import write_tables
 from studies.running.ending import check_output, fail, guarded
 from studies.running.grids import expand_grid
 from studies.running.progress import Bars, Curves, Several
 from studies.running.trials import (
     Execution,
-    Failures,
-    read_trials,
     run_trials,
-    tell_failures,
     trial_folder,
 )
 
@@ -94,6 +88,10 @@ def run_single(
     study: Study, settings: dict[str, Any], output: Path, kept: Path, execution: Execution
 ) -> None:
     """One trial in this process with progress bars, a table on the terminal and a report."""
+    # Pictures take a second to load, for which no wrong word waits.
+    from studies.learnt.films import write_films
+    from studies.learnt.run_report import report_single
+
     begin = time.perf_counter()
     remove_partial_files(output)
     curves = [Curves(execution.tensorboard / output.name)] if execution.tensorboard else []
@@ -107,13 +105,6 @@ def run_single(
     report_single(results, output)
 
 
-def report_single(results: dict[str, Any], folder: Path) -> None:
-    """Table and report of one trial from what it left in its folder."""
-    films = {path.stem: path for path in sorted((folder / "films").glob("*.gif"))}
-    table = write_report([results], folder, read_episodes(results, folder), films)
-    print(f"\n{table}\n\nreport: {folder / 'report.html'}")
-
-
 def run_grid(
     study: Study,
     settings: dict[str, Any],
@@ -123,6 +114,8 @@ def run_grid(
     execution: Execution,
 ) -> None:
     """Many trials, a table over all of them and a report."""
+    from studies.learnt.run_report import report_grid
+
     blocks = [{ALIASES.get(name, name): block[name] for name in block} for block in grid]
     configs = [resolve(study, config) for config in expand_grid(settings, blocks)]
     trials = {trial_folder(output, trial_label(config), config): config for config in configs}
@@ -133,34 +126,3 @@ def run_grid(
     failures = report_grid(output)
     if failures:
         raise SystemExit(1)
-
-
-def report_grid(folder: Path) -> Failures:
-    """Tables and report of a grid from the trials in its folder; returns the failed ones."""
-    results, failures = read_trials(folder)
-    if results:
-        write_tables(results, folder)
-        table = write_report(results, folder, failures=failures)
-        print(f"\n{table}\n\nreport: {folder / 'report.html'}")
-    tell_failures(failures)
-    return failures
-
-
-def rebuild(folder: Path) -> None:
-    """Tables, figures and report of a finished or unfinished run, without computing trials.
-
-    Raises:
-        FileNotFoundError: Nothing in the folder is finished.
-        ValueError: An earlier version wrote it.
-    """
-    path = folder / "results.json"
-    single = read_sealed(path) if path.exists() else {}
-    found = [single] if "policies" in single else read_trials(folder)[0]
-    if not found:
-        raise FileNotFoundError(f"{folder}: no trial in it is finished")
-    if "about" not in found[0]:
-        raise ValueError(f"{folder} is of an earlier version: give its command again")
-    if found[0] is single:
-        report_single(single, folder)
-    else:
-        report_grid(folder)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import threadpoolctl
-import torch
 from jsonargparse.typing import NonNegativeFloat
 
 from policy.learner import other_name
@@ -106,6 +105,8 @@ def run_trial(
         What ``results.json`` holds (docs/results.md).
     """
     # One thread is fastest at these sizes and leaves the other cores to other trials.
+    import torch  # seconds to load
+
     torch.set_num_threads(1)
     threadpoolctl.threadpool_limits(1)
     trial = instantiate(study, config)

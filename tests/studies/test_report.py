@@ -9,7 +9,7 @@ import pytest
 import quick_gap
 
 from studies import report
-from studies.learning.command import rebuild
+from studies.learnt.run_report import rebuild
 from studies.report import main, study_of
 
 TINY = (

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.smooth import SmoothFitter
@@ -156,5 +156,5 @@ def clear_number(fit: Fit, block: NDArray[np.int64], more: Array, chance: float)
     sandwich = float((inverse @ meat @ inverse)[-1, -1])
     plain = float((left**2).sum() / max((left != 0).sum() - len(step), 1) * inverse[-1, -1])
     number, error = float(step[-1]), np.sqrt(max(sandwich, plain, 0.0))
-    clear = abs(number) > error * t.ppf(1 - chance / 2, freedom)
+    clear = abs(number) > error * stdtrit(freedom, 1 - chance / 2)
     return number / float(scale[-1]) if clear else 0.0

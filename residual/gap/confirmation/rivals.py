@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.numerics import at_half_step
@@ -94,7 +94,7 @@ def excluded(
     if alike:
         blocks = len(search.fitter.blocks)
         behind, error = search.currency.difference(its.squares, own.squares, group)
-        by_chance = behind <= t.ppf(CHANCE, max(blocks - 1, 1)) * error
+        by_chance = behind <= stdtrit(max(blocks - 1, 1), CHANCE) * error
         halfway = error_ratio(search, its.half, own.half, group)
         return blocks >= FEW and not by_chance and halfway > 1.0
     longer = [search.from_longer_leads(k) for k in (rival, key)]

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from residual.gap.data.samples import Samples
 from residual.gap.data.windows import Windows, carry
@@ -141,10 +141,10 @@ def remainder(
     single = (matrix.T @ residual) ** 2 / np.maximum((matrix**2).sum(axis=0), 1e-300)
     driven = driven_states(model)
     best = _plainest(single, names * len(driven))
-    chance = float(chi2.sf(gain / variance, rank))
+    chance = float(chdtrc(max(rank, 1), gain / variance))
     channel = model.simulator.physical_channels[driven[best // len(names)]].name
     where = f"{names[best % len(names)]}, acting on {channel}"
-    alone = float(chi2.sf(single[best] / variance, 1)) * len(single)
+    alone = float(chdtrc(1, single[best] / variance)) * len(single)
     tells = alone < RARE or single[best] > LARGE * float(residual @ residual)
     return Remainder(
         ratio, spread, limit, gain, rank, chance, where if tells else "",

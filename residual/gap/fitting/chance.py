@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from residual.gap.fitting.screening import Signatures
 
 #: Score difference beyond which a rival is excluded. If the rival is true and the two predictions
 #: are d standard errors apart, the difference is normal with mean -d^2 and deviation 2 d, and it
 #: exceeds z^2 with the largest probability at d = z: that of a normal beyond z, here 1e-3.
-TIE = float(norm.isf(1e-3)) ** 2
+TIE = float(ndtri(1e-3)) ** 2
 #: Smallest part of the noise energy worth a name; it binds in long logs, where chance alone would
 #: let effects in that change the residual by a thousandth.
 SHARE = 0.004

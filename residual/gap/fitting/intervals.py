@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from residual.gap.data.blocks import Blocks
 from residual.gap.fitting.contract import Fit
@@ -123,4 +123,4 @@ def _telling(inverse: Array, own: Array) -> Array:
 
 def _student(blocks: Array) -> Array:
     """Student's 95 % quantile over the normal one."""
-    return np.asarray(t.ppf(0.975, np.maximum(blocks - 1, FEWEST)) / 1.96)
+    return np.asarray(stdtrit(np.maximum(blocks - 1, FEWEST), 0.975) / 1.96)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete, lfilter
 
 from residual.gap.data.samples import Samples
 from sims.effects.flexible import FlexiblePart
@@ -14,6 +13,8 @@ Array = NDArray[np.float64]
 
 def filled(samples: Samples, state: Array, time: float) -> Array:
     """What a store holds that follows a state (n,), in every run first in balance with it."""
+    from scipy.signal import lfilter  # a second to load, for few
+
     found = np.empty_like(state)
     for start, stop in samples.runs:
         away = state[start:stop] - state[start]
@@ -39,6 +40,8 @@ def swung(samples: Samples, rate: Array, pulled: Array, part: FlexiblePart, with
     Returns:
         shape (n, 2).
     """
+    from scipy.signal import cont2discrete, lfilter
+
     swing, gives = 2 * np.pi * float(part.frequency), 1.0 + float(part.ratio)
     held, driven = (1.0, gives) if without else (1.0 / gives, 1.0)
     below = [1.0, 2 * held * float(part.damping) * swing, held * swing**2]

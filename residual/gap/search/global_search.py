@@ -18,7 +18,6 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
-from scipy.stats import qmc
 
 from residual.gap.data.standstill import may_stick
 from residual.gap.fitting.contract import Fit, Fitter
@@ -144,6 +143,8 @@ def begins_elsewhere(
     space = _Space(model, fit.theta, free)
     low, high = space.low, space.high
     begin, about = space.point(fit.theta), ABOUT * (high - low)
+    from scipy.stats import qmc  # a second to load, for few
+
     random = np.random.default_rng(seed)
     members = qmc.scale(qmc.LatinHypercube(free, rng=random).random(POPULATION * free), low, high)
     near = begin + about * random.standard_normal((len(members) // 2, free))

@@ -11,7 +11,7 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from residual.gap.fitting.impacts.refine import Refined, settle
 from residual.gap.fitting.impacts.robust import weights
@@ -88,7 +88,7 @@ def lowest(line: Array, lost: Array, blocks: NDArray[np.int64]) -> tuple[float, 
     count = len(of_block)
     without = -(b.sum() - b) / (2 * rest)
     variance = (count - 1) / count * ((without - without.mean()) ** 2).sum()
-    times = t.ppf(0.975, max(count - 1, 1)) / 1.96
+    times = stdtrit(max(count - 1, 1), 0.975) / 1.96
     return float(-b.sum() / (2 * a.sum())), float(np.sqrt(variance) * times)
 
 
