@@ -58,7 +58,9 @@ class Inquiry:
         pool = ready.pool([*there, *less])
         pool = [candidate for candidate in pool if candidate.label not in free]
         others = {label: e for label, e in self.offered.by_label.items() if label not in free}
-        twins = exact_twins(simulator, ready.fitter.samples, self.offered.groups, others)
+        twins = exact_twins(simulator, samples, self.offered.groups, others)
+        # What several make together is tried in place of them.
+        twins |= {one.label: [one] for one in candidates(simulator, self.offered.losses, samples)}
         lead = 0.0 if simulator.has_contacts else ready.horizon * LEAD / (1 - LEAD)
         begun = f" begun from {lead:.3g} s before" if lead else ""
         ahead = f"forecasts over {ready.horizon:.3g} s{begun}"

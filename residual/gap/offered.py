@@ -34,6 +34,7 @@ class Offered:
         parts: Flexible parts, for where nothing of the library swings as the log does.
         further: Rarer effects, for where one of them takes much of what is left.
         asked: Curves by points that a user asks for.
+        losses: That parameters, gains and loads make together, for where one stands for several.
     """
 
     by_label: Mapping[str, Effect]
@@ -45,6 +46,7 @@ class Offered:
     parts: Sequence[FlexiblePart]
     further: Sequence[Effect]
     asked: Sequence[Curve] = ()
+    losses: Sequence[Effect] = ()
 
     @classmethod
     def of(
@@ -97,11 +99,12 @@ class Offered:
             if whole and str(one) not in there and not recorded.intersection(_inputs(one))
         ]
         curves = tuple(curve for curve in curves if curve not in asked)
-        offered = beyond_parameters(log.simulator, offered)
+        named, offered = offered, beyond_parameters(log.simulator, offered)
+        losses = [effect for effect in named if effect not in offered]
         groups, sets = aliases(log.simulator, offered, log.runs)
         kept, less = representatives(log.simulator, offered, groups)
         by_label = {str(effect): effect for effect in offered}
-        return cls(by_label, kept, less, groups, sets, curves, parts, further, asked)
+        return cls(by_label, kept, less, groups, sets, curves, parts, further, asked, losses)
 
 
 def _inputs(effect: Effect) -> tuple[str, ...]:

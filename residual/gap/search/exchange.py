@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.fitting.screening import Gain, gains, pair_gains
+from residual.gap.search.in_one import add_in_one
 from residual.gap.search.parted import add_parted
 from residual.gap.search.redundant import doubles
 from residual.gap.search.sets import Key, Search, all_but
@@ -53,6 +54,7 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
     """
     add_without_each(search, key)
     add_parted(search, key)
+    add_in_one(search, key)
     for gone in key:
         rest = all_but(key, gone)
         if rest not in search.tried:

@@ -44,8 +44,10 @@ class Search:
     """Rival sets of effects fitted to the windows of one fitter.
 
     Attributes:
-        candidates: What may be missing, by number; those from ``screened`` on are twins only.
-        twins: Exact twins of candidates by label, that are tried where those would be absurd.
+        candidates: What may be missing, by number; those from ``screened`` on are twins only, or
+            losses that several of them make together.
+        twins: Exact twins of candidates by label, tried where those would be absurd; such a loss
+            by its own label.
         beside: Candidates that are free beside every set, the empty one included, and that no set
             is charged for: parameters within their tolerance.
         nominal: The simulator as it was given; ``before``: its forecasts.
@@ -245,13 +247,10 @@ class Search:
 
     def _forget(self, key: Key) -> None:
         """Forget what was worked out from an earlier fit of a set."""
-        self.unfit.discard(key)
-        self.refused.pop(key, None)
-        self.nearly.discard(key)
-        self.extreme.discard(key)
-        self.halved.pop(key, None)
-        self._from_longer_leads.pop(key, None)
-        self._signatures.pop(key, None)
+        for sets in (self.unfit, self.nearly, self.extreme):
+            sets.discard(key)
+        for known in (self.refused, self.halved, self._from_longer_leads, self._signatures):
+            known.pop(key, None)
 
     def add_twin(self, key: Key, gone: int, twin: Candidate) -> None:
         """Fit a set with an exact twin of a member in its place."""
@@ -262,7 +261,8 @@ class Search:
 
     def twins_of(self, number: int) -> list[Candidate]:
         """Candidates that move exactly as one does."""
-        return list(self.twins.get(self.candidates[number].label, ()))
+        own = self.candidates[number]
+        return [one for one in self.twins.get(own.label, ()) if one.effect != own.effect]
 
     def stands_for(self, number: int) -> int:
         """The screened candidate that moves exactly as a twin does; itself if it is one."""
