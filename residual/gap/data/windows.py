@@ -172,4 +172,5 @@ def carry(
         for k in range(length - 1):
             response[:, k + 1] = steps[:, k] @ response[:, k]
             response[:, k + 1, :, f:] += local[:, k]
-    return np.clip(np.nan_to_num(response, nan=0.0), -1e12, 1e12)
+    np.nan_to_num(response, copy=False, nan=0.0)
+    return np.clip(response, -1e12, 1e12, out=response)

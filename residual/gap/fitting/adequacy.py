@@ -170,6 +170,10 @@ def _beyond_cap(fit: ShootingFit, places: int) -> Array:
 def _gain(matrix: Array, residual: Array) -> tuple[float, int]:
     """Fall of the cost with all columns, and their rank."""
     size = np.sqrt(np.maximum((matrix**2).sum(axis=0), 1e-300))
-    u, s, _ = np.linalg.svd(matrix / size, full_matrices=False)
-    keep = s > 1e-3 * s[0]
-    return float(((u[:, keep].T @ residual) ** 2).sum()), int(keep.sum())
+    matrix = matrix / size
+    # Squares of singular values: of columns of length one they are known down to 1e-15, and those
+    # below 1e-6 of the largest are not asked for.
+    squares, right = np.linalg.eigh(matrix.T @ matrix)
+    keep = squares > 1e-6 * squares[-1]
+    along = right[:, keep].T @ (matrix.T @ residual)
+    return float((along**2 / squares[keep]).sum()), int(keep.sum())

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 HARDLY = 0.9
 #: Error over that of the nominal simulator below which a drive is not asked for all its numbers.
 FOUND = 0.5
+#: Error of one effect for each joint over that of the best alone below which it is grown next.
+JOINTLY = 0.25
 #: Parameters that are tried as the third of them.
 THIRDS = 4
 
@@ -134,7 +136,9 @@ def grow(search: Search, key: Key) -> list[Key]:
             found += made
             if good >= wanted:
                 break
-    if not key:
+    at_once = [] if key else together(search, key, found)
+    found += at_once
+    if not (key or _settles(search, found, at_once)):
         # The joints of what walks and hops move, so that the screen sees what rubs there.
         if not search.simulator.has_contacts:
             found += boldly(search, parameters=False)
@@ -144,6 +148,13 @@ def grow(search: Search, key: Key) -> list[Key]:
         for without in (by_points(search), of_several_numbers(search)):
             found += several(search, pair_gains(around, search.effort.pairs, without=without))
     return list(dict.fromkeys(found))
+
+
+def _settles(search: Search, singles: list[Key], at_once: list[Key]) -> bool:
+    """Whether one effect for each joint leaves so much less than any alone that no more of those
+    are worth their time: what they may do beside it is asked from there on."""
+    alone = min((search.error(key) for key in singles if len(key) == 1), default=0.0)
+    return any(search.error(key) < JOINTLY * alone for key in at_once if search.sound(key))
 
 
 def partners(search: Search, keys: list[Key]) -> list[Key]:
