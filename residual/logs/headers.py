@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 
@@ -13,6 +14,15 @@ from sims.simulator import Channel
 
 TIME = Channel("time", "s", "other")
 
+#: Last words of names of times that say what they count in.
+_IN_NAME = {
+    **dict.fromkeys(("ms", "msec", "millis", "milliseconds"), "ms"),
+    **dict.fromkeys(("us", "usec", "micros", "microseconds"), "us"),
+    **dict.fromkeys(("ns", "nsec", "nanoseconds"), "ns"),
+    **dict.fromkeys(("min", "mins", "minute", "minutes"), "min"),
+    **dict.fromkeys(("h", "hr", "hrs", "hour", "hours"), "h"),
+    **dict.fromkeys(("day", "days"), "day"),
+}
 _WITH_UNIT = re.compile(r"(?P<name>.*\S)\s*(\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))")
 
 
@@ -34,7 +44,11 @@ def columns_of(
         LogError: A header has the name of a channel and another quantity's unit, or two have it.
     """
     if given:
-        return {name: named_column(column, name) for name, column in given.items()}
+        said = {name: named_column(column, name) for name, column in given.items()}
+        for channel in channels:
+            if channel.name in said:
+                findings += _unit_unsaid(table, said[channel.name], channel)
+        return said
     found = {channel.name: _named_like(table, channel, findings) for channel in channels}
     taken = {column.column for column in found.values() if column is not None}
     for channel in channels:
@@ -50,7 +64,9 @@ def time_column(table: Table, given: str | int | Column, findings: list[Finding]
         LogError: Nothing is named so, or two columns are.
     """
     if given != TIME.name:
-        return named_column(given, TIME.name)
+        said = named_column(given, TIME.name)
+        findings += _unit_unsaid(table, said, TIME)
+        return said
     found = _named_like(table, TIME, findings)
     found = found or _named_like(table, TIME, findings, spelt=str.casefold)
     if found is None:
@@ -107,6 +123,29 @@ def _named_like(
         says = f"Column {column.column!r} was converted to {channel.unit}."
         findings.append(Finding("unit", table.path.name, says))
     return _told(table, column, channel, findings)
+
+
+def _unit_unsaid(table: Table, column: Column, channel: Channel) -> list[Finding]:
+    """What is to be said of a column map without a unit where the header has another one.
+
+    Of times also if their name ends in one, as ``t_min`` does.
+    """
+    header = str(column.column)
+    if column.unit or (column.scale, column.offset) != (1.0, 0.0) or column.value is not None:
+        return []
+    match = _WITH_UNIT.fullmatch(header)
+    unit = (match["square"] or match["round"] or "").strip() if match else ""
+    if not match and channel is TIME:
+        unit = _IN_NAME.get(re.split(r"[\W_]+", header.strip())[-1].casefold(), "")
+    with contextlib.suppress(ValueError):
+        if find_unit(unit, channel.unit) != (1.0, 0.0):
+            says = (
+                f"Column {header!r} is read in {channel.unit}, since the column map names it "
+                f"and no unit: say `unit: {unit}` if it counts in {unit}, or "
+                f"`unit: {channel.unit}` if it does not."
+            )
+            return [Finding("unit", table.path.name, says, severity="warning")]
+    return []
 
 
 def _told(table: Table, column: Column, channel: Channel, findings: list[Finding]) -> Column:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 from residual.gap import GapResult
 from residual.gap.fitting.forecasts import own_channels
 from residual.gap.result import OFF, ChannelGap, Gap, Verdict
 from residual.trajectories import moment
 from studies.gap.answer import cannot_tell, rivals
+from studies.gap.beforehand import seen_first
 from studies.gap.records import beside_lead
 from studies.gap.words import (
     ahead,
@@ -31,6 +34,8 @@ LITTLE = 0.1
 #: Error on records set aside, over that of the nominal simulator, from which on a channel is worse
 #: that is not the main one.
 MUCH_WORSE = 1.1
+#: Part of the gap without a name that is told where it is no more than noise.
+REST = 0.1
 #: Difference between channels' shares from which on they are told one by one, so many at most.
 UNLIKE, FEW_CHANNELS = 0.2, 3
 
@@ -45,45 +50,7 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
         result: What was found.
         tolerance: Forecast error that does not matter.
     """
-    first = _conventions(result) or _cut_off(result)
-    return first + _named_share(result, tolerance) + beside_lead(result)
-
-
-def _conventions(result: GapResult) -> str:
-    other = result.conventions
-    if other is None:
-        return ""
-    changes = f"{' or '.join(other.changes)} in the column map"
-    errs = f"with {changes} the nominal simulator errs {_times(other.times)} times less"
-    why = {
-        "forecasts": errs,
-        "zero": errs,
-        "sign": f"what fits acts the other way, as with {changes}",
-        "scale": f"a channel is {other.times:.0f} times the scale that it declares, as without "
-        f"{changes}",
-        "row": f"with {' and '.join(other.changes)} a row earlier in the log, what is found errs "
-        f"{_times(other.times)} times less, as where rows hold the command that led to them",
-        "found": f"with {changes} what is found errs {_times(other.times)} times less",
-        "size": f"but for {other.changes[0]}, which never goes below zero in the log, the nominal "
-        f"simulator errs {_times(other.times)} times less, as where a sensor does not tell which "
-        "way",
-    }[other.reason]
-    return f"First see whether the log counts as the simulator does: {why}. If that is not it: "
-
-
-def _times(times: float) -> str:
-    """Two digits, without an exponent."""
-    return f"{float(f'{times:.2g}'):g}"
-
-
-def _cut_off(result: GapResult) -> str:
-    """What the simulator does not answer to, where something was found that may make up for it."""
-    if not result.cut_off or not result.effects:
-        return ""
-    return (
-        f"First see whether the simulator is meant to cut {listed(list(result.cut_off))} off where "
-        "it does (below): what was found may make up for it. If it is: "
-    )
+    return seen_first(result) + _named_share(result, tolerance) + beside_lead(result)
 
 
 def _named_share(result: GapResult, tolerance: float | None) -> str:
@@ -96,7 +63,8 @@ def _named_share(result: GapResult, tolerance: float | None) -> str:
     kinds = {verdict.kind for verdict in result.verdicts}
     if kinds & {"confirmed", "ambiguous", "calibrated"}:
         share = f"{capitalized(percent(gap.share.value))} of the gap is {_what(result)}"
-        return f"{share}{_by_channel(result)}.{_but_worse_apart(result)}"
+        told = f"{share}{_by_channel(result)}.{_noise_for_the_rest(gap, kinds)}"
+        return f"{told}{_but_worse_apart(result)}"
     floor = quantity_text(gap.noise_floor.value, gap.unit)
     if "unexplained" in kinds and cannot_tell(result):
         if gap.drowned:
@@ -111,6 +79,14 @@ def _named_share(result: GapResult, tolerance: float | None) -> str:
     if "unexplained" in kinds:
         return f"The gap has no name: the {ahead(gap)} is {before}{_in_one_stretch(result)}."
     return _no_gap(gap) + _but_off_apart(result)
+
+
+def _noise_for_the_rest(gap: Gap, kinds: Container[str]) -> str:
+    """What is to be said of the rest where nothing else is: forecasts never err less than noise."""
+    rest = 1 - gap.share.value
+    if "unexplained" in kinds or rest < REST:
+        return ""
+    return f" The other {percent(rest)} cannot be told from noise."
 
 
 def _in_one_stretch(result: GapResult) -> str:

@@ -108,6 +108,9 @@ def test_records_in_which_nothing_shows_are_not_said_to_speak_against_a_name():
     assert "not help" not in says
 
 
+OTHER = "The other 54 % cannot be told from noise."
+
+
 def boats(*errors):
     """A result about several quantities, each with these errors before and after."""
 
@@ -135,7 +138,7 @@ def boats(*errors):
     ],
 )
 def test_the_first_sentence_tells_channels_apart_where_they_differ(errors, told):
-    assert lead(boats(*errors)) == f"46 % of the gap is mass{told}"
+    assert lead(boats(*errors)) == f"46 % of the gap is mass{told} {OTHER}"
 
 
 @pytest.mark.parametrize(
@@ -159,7 +162,15 @@ def test_the_first_sentence_names_another_channel_that_records_set_aside_show_wo
     if says is None:
         assert "does not hold on the records set aside" in told and "it makes" not in told
     else:
-        assert told == f"46 % of the gap is mass.{says}"
+        assert told == f"46 % of the gap is mass. {OTHER}{says}"
+
+
+def test_all_of_the_gap_is_told_of():
+    """What has no verdict is noise; a rest that has one is told there."""
+    assert OTHER in lead(boats((1.0, 0.7)))
+    unexplained = dataclasses.replace(boats((1.0, 0.7)), verdicts=(MASS, rest(0.5)))
+    assert OTHER not in lead(unexplained)
+    assert OTHER not in lead(result(MASS, share=0.95))
 
 
 @pytest.mark.parametrize(("error", "said"), [(1.2, False), (2.0, True)])

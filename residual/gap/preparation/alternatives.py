@@ -17,7 +17,8 @@ from residual.gap.preparation.convention import (
     of_states,
     reversed_sign,
 )
-from residual.logs.units import Unit, other_units
+from residual.gap.preparation.other_units import in_another_unit, states_in_other_units
+from residual.logs.units import other_units
 from sims.host import HostSimulator
 from sims.simulator import UNDECLARED, Channel
 
@@ -51,20 +52,15 @@ def conventions(
             found.append(of_input(simulator, reversed_sign(action.name), place, -1.0))
         if 0 <= action.low < action.high < np.inf:
             found.append(_upside_down(simulator, place))
-        for name, unit in other_units(action.unit):
-            says = f"`unit: {name}` for {action.name} ({_beside_a_unit(unit)})"
-            found.append(of_input(simulator, says, place, unit.factor, unit.offset))
-        for says, unit in misread(action, converted):
+        for says, unit in in_another_unit(action, converted):
             found.append(of_input(simulator, says, place, unit.factor, unit.offset))
         found += _thousandfold(simulator, place)
         found += _as_a_share(simulator, place, samples.actions[:, place])
     found += _before_a_gear(simulator, samples)
     joints = measured_joints(simulator, samples)
     for seen in joints:
-        found += _turned(simulator, seen) + _in_other_units(simulator, seen)
-        for says, unit in misread(simulator.physical_channels[seen[0]], converted):
-            found.append(of_states(simulator, says, seen[:1], unit.factor, unit.offset))
-    found += _all_in_other_units(simulator, joints) + _exchanged(simulator, joints)
+        found += _turned(simulator, seen)
+    found += states_in_other_units(simulator, joints, converted) + _exchanged(simulator, joints)
     found += _counted_from_the_last(simulator, joints)
     return found + _of_the_clock(simulator, samples, joints)
 
@@ -187,44 +183,6 @@ def _turned(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
     return found
 
 
-def _in_other_units(simulator: HostSimulator, joint: Sequence[int]) -> list[Convention]:
-    """A position and its rate in units that go together."""
-    channels = [simulator.physical_channels[i] for i in joint]
-    found = []
-    for name, unit in other_units(channels[0].unit):
-        said = [f"`unit: {name}` for {channels[0].name}"]
-        for rate in channels[1:]:
-            alike = [n for n, u in other_units(rate.unit) if np.isclose(u.factor, unit.factor)]
-            said += [f"`unit: {one}` for {rate.name}" for one in alike]
-        if len(said) == len(channels):
-            says = f"{' and '.join(said)} ({_beside_a_unit(unit)})"
-            found.append(of_states(simulator, says, joint, unit.factor, unit.offset))
-    return found
-
-
-def _all_in_other_units(
-    simulator: HostSimulator, joints: Sequence[Sequence[int]]
-) -> list[Convention]:
-    """All states of one unit in another one: who logs one temperature in K logs them all so."""
-    alike: dict[tuple[str, ...], list[Sequence[int]]] = {}
-    for joint in joints:
-        units = tuple(simulator.physical_channels[i].unit for i in joint)
-        alike.setdefault(units, []).append(joint)
-    found = []
-    for group in alike.values():
-        each = [_in_other_units(simulator, joint) for joint in group]
-        for ones in zip(*each, strict=True) if len(group) > 1 else ():
-            states = np.vstack(
-                [
-                    np.prod([one.states[0] for one in ones], axis=0),
-                    np.sum([one.states[1] for one in ones], axis=0),
-                ]
-            )
-            says = " and ".join(one.says for one in ones)
-            found.append(dataclasses.replace(ones[0], says=says, states=states))
-    return found
-
-
 def _thousandfold(simulator: HostSimulator, place: int) -> list[Convention]:
     """An input a thousand times as large or as small, where no unit of it is known that could say
     so: tonnes of something, parts, counts."""
@@ -278,23 +236,3 @@ def _upside_down(simulator: HostSimulator, place: int) -> Convention:
     ends = action.low + action.high
     says = f"`scale: -1` and `offset: {ends:g}` for {action.name}"
     return of_input(simulator, says, place, -1.0, ends)
-
-
-def misread(channel: Channel, converted: Collection[str]) -> list[tuple[str, Unit]]:
-    """What undoes the conversion of a column from a unit that it is not in, in words and numbers;
-    but for what another unit does, too. Where nothing was converted, there is nothing to undo."""
-    others = other_units(channel.unit) if channel.name in converted else []
-    found = []
-    for name, unit in others:
-        back = Unit(1 / unit.factor, -unit.offset / unit.factor)
-        if not any(np.allclose(back, other) for _, other in others):
-            says = f"`unit: {channel.unit}` for {channel.name} (not {name})"
-            found.append((says, back))
-    return found
-
-
-def _beside_a_unit(unit: Unit) -> str:
-    """The same change of a column whose unit is stated already, and is not what it should be."""
-    lines = [f"`scale: {unit.factor:.6g}`"] if unit.factor != 1.0 else []
-    lines += [f"`offset: {unit.offset:.6g}`"] if unit.offset else []
-    return f"{' and '.join(lines)} if a unit is stated"

@@ -20,7 +20,7 @@ from residual.gap.data.samples import Samples
 from residual.gap.fitting.contract import Fitter
 from residual.gap.fitting.plausible import turned_round
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.preparation.alternatives import conventions, misread
+from residual.gap.preparation.alternatives import conventions
 from residual.gap.preparation.convention import (
     Convention,
     as_said,
@@ -28,6 +28,7 @@ from residual.gap.preparation.convention import (
     plainest,
     reversed_sign,
 )
+from residual.gap.preparation.other_units import misread
 from residual.gap.preparation.way import errors_of, mean_error
 from residual.logs.units import other_units
 from sims.effects.base import Effect
