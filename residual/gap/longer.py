@@ -32,11 +32,13 @@ LONGER = 1.25
 #: Windows of the longest forecasts, the most first; error over that by noise, over that of usual
 #: forecasts and over the spread of the channel, from which on a slow error shows though they are
 #: as few.
-FEWEST, PLAIN, GROWN, MATTERS = (2, 1), 5.0, 3.0, 0.1
+FEWEST, PLAIN, GROWN, MATTERS = (2, 1), 5.0, 3.0, 0.05
 #: Times that these are longer, at least, where something is named, and error over that by noise.
 LONGEST, BESIDE = 4.0, 3.0
 #: Part of such an error that may be left where what makes it is named.
 LESS = 0.7
+#: Error over that by noise below which noise is overstated.
+UNDER = 0.75
 #: Draws of noise: of what swings far a few say little.
 DRAWS = 16
 
@@ -152,16 +154,19 @@ def slow_error(log: Log, answer: Answer) -> tuple[float, str] | None:
     usual ones, and how that is said; None if there is none.
 
     What a sensor jumps by hides a slow error from short forecasts. Where records hold many of
-    these, it shows in their mean; and over long ones motion may be too unstable to tell.
+    these, it shows in their mean, unless they err by less than noise is said to make: that is too
+    much then, as of what is rounded in time. Over long ones motion may be too unstable to tell.
 
     Args:
         log: What was asked about, and how far its forecasts went.
         answer: In which nothing is named.
     """
     search = answer.found.search
-    if len(search.fitter.blocks) >= WINDOWS:
+    gap = summed_up(answer)
+    overstated = gap.before.value < UNDER * gap.noise_floor.value
+    if len(search.fitter.blocks) >= WINDOWS and not overstated:
         return None
-    if not (answer.found.nominal_left.adequate or within_noise(summed_up(answer))):
+    if not (answer.found.nominal_left.adequate or within_noise(gap)):
         return None
     usual = np.nanmean(search.before.squares, axis=0)
     for windows in FEWEST:
