@@ -58,6 +58,7 @@ class Changing:
         over: The channel that it follows; empty along the records.
         of_size: Whether it follows that channel's size.
         low, high, over_unit: The ends of that channel, or of its size.
+        instead: Whether it would do so in place of what was named, not beside it.
     """
 
     label: str
@@ -71,6 +72,7 @@ class Changing:
     high: float = 0.0
     over_unit: str = ""
     of_size: bool = False
+    instead: bool = False
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from residual.gap.answer.answer import summed_up, told
 from residual.gap.answer.apart import NOT_JUDGED, judged_apart
-from residual.gap.answer.changing import changing
+from residual.gap.answer.changing import changing, in_place
 from residual.gap.answer.confirmed import matters
 from residual.gap.answer.encoders import by_an_encoder
 from residual.gap.answer.late import nearly_in_sensors
@@ -169,6 +169,8 @@ def find_gap(
                     counted=conventions is not None or by_an_encoder(claim, log.rescaled),
                     cut_off=bool(log.cut_off),
                     unlike=stands_for(answer, claim, differ),
+                    drifts=claim.drifts or in_place(over_time, along_records=True),
+                    other_law=claim.other_law or in_place(over_time, along_records=False),
                     refuted=judged.refuted,
                     helpless=claim.number in judged.helpless,
                 )

@@ -34,7 +34,8 @@ def beside_lead(result: GapResult) -> str:
         begin, end, _ = _values(result.changing)
         name = effect_name(result.changing.label)
         along = _over(result.changing) or "along the records"
-        return f" The rest looks like {name} that changes {along}, from about {begin} to {end}."
+        what = "It all" if result.changing.instead else "The rest"
+        return f" {what} looks like {name} that changes {along}, from about {begin} to {end}."
     first = result.unlike[0]
     name, share = effect_name(first.label), percent(first.share)
     instead = ", and nothing else is added" if first.instead else ""
@@ -65,19 +66,21 @@ def notes(result: GapResult) -> list[str]:
 def on_the_way(changing: Changing) -> str:
     """What would take most of what is left off if it changed, a clause."""
     begin, end, nominal = _values(changing)
+    of = f"{percent(changing.taken)} of the squared residual off"
+    if changing.instead:
+        of += " in place of all that is named"
     if changing.over:
         low, high = (quantity_text(v, changing.over_unit) for v in (changing.low, changing.high))
         return (
             f"it looks as if {effect_name(changing.label)} changed {_over(changing)}, from about "
             f"{begin} at {minus(low)} to {end} at {minus(high)} ({nominal} in the simulator), "
-            f"which would take {percent(changing.taken)} of the squared residual off; it is not "
-            "added: if that may be so, let the simulator change it"
+            f"which would take {of}; it is not added: if that may be so, let the simulator "
+            "change it"
         )
     return (
         f"it looks as if {effect_name(changing.label)} went from about {begin} where records begin "
-        f"to {end} where they end ({nominal} in the simulator), which would take "
-        f"{percent(changing.taken)} of the squared residual off; no effect depends on time, so it "
-        "is not added: log it as an input, or let the simulator change it"
+        f"to {end} where they end ({nominal} in the simulator), which would take {of}; no effect "
+        "depends on time, so it is not added: log it as an input, or let the simulator change it"
     )
 
 

@@ -166,6 +166,8 @@ def number_text(number: Number, sign: bool = False) -> str:
 
 def span_text(span: Span) -> str:
     """A forecast error with its interval."""
+    if span.low == span.high:  # one block has no spread
+        return f"{span.value:.3g}"
     return f"{span.value:.3g} ({span.low:.3g} to {span.high:.3g})"
 
 

@@ -1,6 +1,7 @@
 """A parameter that changes along the records about its nominal value is told, and only then."""
 
 from types import SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -9,12 +10,45 @@ from trolley import Trolley, record
 from residual.gap import find_gap
 from residual.gap.answer.changing import _believable
 from residual.gap.beside import Changing
+from residual.trajectories import Trajectory
 from sims.effects import ActuatorGain, ParameterChange
+from sims.equations import EquationOfMotion
+from sims.simulator import Channel, Parameter
 from studies.gap.files import gap_record
 from studies.gap.summary import summary
 
 #: What may be missing.
 ASKED = ("mass", "stiffness", "damping", "coulomb_friction")
+
+
+class Copter(EquationOfMotion):
+    """A small copter that climbs and sinks."""
+
+    dt = 0.05
+    state_channels = (
+        Channel("height", "m", "position", scale=2.0),
+        Channel("climb", "m/s", "rate", rate_of="height", scale=1.0),
+    )
+    action_channels = (Channel("throttle", "1", "input", scale=0.5, low=0.0, high=1.0),)
+    parameters: ClassVar = {"thrust": Parameter(21.4, "N", "at full throttle", low=1.0)}
+
+    def acceleration(self, q, v, u, force, p):
+        return ((p.thrust * u[:, 0] + force[:, 0]) / 1.2 - 0.1 * v[:, 0] - 9.81)[:, None]
+
+
+def sagging(seed, rows=500, dt=0.05):
+    """A record whose thrust falls by 15 %, its height held by a controller."""
+    rng, state, seen, inputs = np.random.default_rng(seed), np.array([2.0, 0.0]), [], []
+    goals = np.repeat(rng.uniform(0.5, 3.5, rows // 25), 25)
+    for row, goal in enumerate(goals):
+        throttle = np.clip(0.55 + 0.2 * (goal - state[0]) - 0.2 * state[1], 0.0, 1.0)
+        seen.append(state + rng.normal(0, (2e-3, 1e-2)))
+        inputs.append(throttle)
+        thrust = 21.4 * (1 - 0.15 * row / rows)
+        for _ in range(20):
+            pull = thrust * throttle / 1.2 - 0.1 * state[1] - 9.81
+            state = state + dt / 20 * np.array([state[1] + dt / 40 * pull, pull])
+    return Trajectory(str(seed), dt * np.arange(rows), np.array(seen), np.array(inputs)[:-1, None])
 
 
 def ask(*records):
@@ -37,6 +71,20 @@ def test_a_spring_that_weakens_about_its_nominal_is_told_with_both_ends():
 def test_what_stays_the_same_changes_nothing(friction):
     """Also where something is missing, and named."""
     assert ask(*(record(seed, lambda _: 20.0, friction) for seed in (2, 3))).changing is None
+
+
+def test_what_laws_only_imitate_is_told_in_their_place():
+    """Thrust that sags, where a bent curve of the throttle takes some of it off."""
+    found = find_gap(
+        Copter(), [sagging(seed) for seed in (0, 1)], effects=("saturation", "linear_spring"),
+        minutes=1,
+    )  # fmt: skip
+    changes = found.changing
+    full = {"thrust": 0.0, "actuator_gain@throttle": 1.0}[changes.label]
+    assert changes.instead
+    assert (full + changes.end) / (full + changes.begin) == pytest.approx(0.85, abs=0.03)
+    assert not any(verdict.kind == "confirmed" for verdict in found.verdicts)
+    assert "in place of all that is named" in " ".join(summary(found).split())
 
 
 def test_what_is_different_in_the_middle_of_a_record_is_no_change_along_it():
