@@ -48,9 +48,12 @@ def brought(earlier: Search, key: Key, search: Search) -> Proposals:
 
 def add_what_it_lacked(earlier: Search, search: Search) -> None:
     """Fit what an earlier search chose, and what forecast best in it, with each effect that it
-    lacked beside: a search is made again for these, and may not end before it comes to them."""
+    lacked beside: a search is made again for these, and may not end before it comes to them.
+
+    Each is fitted alone, too: what stood for it may be far from it, and keep it there.
+    """
     fresh = _lacked(earlier, search)
-    chosen = dict.fromkeys((choose(earlier).key, earlier.best()))
+    chosen = dict.fromkeys((choose(earlier).key, earlier.best(), ()))
     own = [key for before in chosen for key in brought(earlier, before, search)]
     for key in own if fresh else ():
         if key not in search.tried:
@@ -58,7 +61,7 @@ def add_what_it_lacked(earlier: Search, search: Search) -> None:
         around = search.signatures(key)
         for gain in gains(around):
             number = around.variants[gain.variants[0]].candidate
-            if number in fresh:
+            if number in fresh and (key or not search.late):
                 more, theta = search.merged(key, [(number, gain.values[0])])
                 search.add({more: theta})
 
