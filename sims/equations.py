@@ -44,6 +44,8 @@ class _Equations(HostSimulator):
         cls = type(self)
         self.name = getattr(cls, "name", cls.__name__)
         self.dt = cls.dt if dt is None else dt
+        if not self.dt > 0:
+            raise ValueError(f"dt is {self.dt}, expected the control period in s, above zero")
         self.substeps = cls.substeps if substeps is None else substeps
         if problem := cannot_call(getattr(self, cls.written), *cls.takes):
             wanted = f"{cls.written}(self, {', '.join(cls.takes)})"

@@ -177,7 +177,7 @@ def not_found(source: str | Mapping[str, Any]) -> str:
                 return f"there is no class {path}; {hint}"
         except pydoc.ErrorDuringImport as error:
             # Parsers take these for a value of another kind; all else is told by whoever loads it.
-            if isinstance(error.value, ValueError | TypeError):
+            if isinstance(error.value, ValueError | TypeError | ImportError):
                 return f"{error.filename} cannot be imported: {error.value}"
     return ""
 

@@ -102,6 +102,11 @@ def check_layout(columns: LogFormat, states: Sequence[Channel], actions: Sequenc
                     f"the simulator has no {kind} channel {name!r}, it has "
                     f"{', '.join(map(repr, names)) or 'none'}{hint}"
                 )
+            if isinstance(column, Column) and not (np.isfinite(column.scale) and column.scale):
+                raise LogError(
+                    f"{kind} {name!r} has scale {column.scale!r}: that makes one value of all, "
+                    "expected a factor, such as 0.001 or -1"
+                )
             value = column.value if isinstance(column, Column) else None
             if value is not None and (kind == "state" or not np.isfinite(value)):
                 raise LogError(

@@ -85,6 +85,13 @@ def runs_of(
             )
     if not np.isfinite(times).any():
         raise LogError("no time at all, expected seconds", table.path, column=time.column)
+    if len(table) > 1 and np.nanmin(times) == np.nanmax(times):
+        raise LogError(
+            f"time is {np.nanmin(times):g} in every row, expected seconds that go on; say which "
+            "column holds them, or, if none does, period: and the seconds between samples",
+            table.path,
+            column=time.column,
+        )
     matrix = np.column_stack(seen)
     inputs_matrix = np.column_stack(acted) if acted else np.zeros((len(table), 0))
     converted = frozenset(

@@ -7,13 +7,17 @@ scikit-learn had the 60 iterations of a Gaussian process.
 
 from __future__ import annotations
 
+import pydoc
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from sims.simulator import Simulator
+
 SIMULATORS = ("--simulator", "--corrected")
 CLASSES = (*SIMULATORS, "--estimator")
+FILES = ("--columns", "--config")
 IMPORT_PATH = re.compile(r"\w+(\.\w+)+")
 
 
@@ -21,6 +25,17 @@ def class_of_word(word: str) -> dict[str, str]:
     """The option by which a word of the command line names a class, if it does."""
     name = word.partition("=")[0]
     return {name.removeprefix("--"): word} if name in CLASSES else {}
+
+
+def no_simulator(path: str) -> str:
+    """What is to be said of an import path that leads to a class which is no simulator."""
+    found = pydoc.locate(path)
+    if not isinstance(found, type) or issubclass(found, Simulator):
+        return ""
+    return (
+        f"{path} is no Simulator, expected a class that derives from sims.EquationOfMotion, "
+        "sims.FirstOrderSystem or sims.Simulator"
+    )
 
 
 def unfinished(words: Sequence[str], contents: Iterable[Any]) -> str:

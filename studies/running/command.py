@@ -23,9 +23,11 @@ from sims.model_files import located, model_settings, names_model
 from sims.trust import check_file, named_packages, trusting
 from studies.running.classes import (
     CLASSES,
+    FILES,
     IMPORT_PATH,
     SIMULATORS,
     class_of_word,
+    no_simulator,
     unfinished,
     without_replaced,
 )
@@ -266,10 +268,14 @@ def _check_given(name: str, value: str) -> None:
             _READ[value] = (name.removeprefix("--"), safe_yaml.read(value))
         except ValueError as error:
             raise ValueError(f"{name} {error}") from None
+    elif name in FILES and Path(value).is_dir():
+        raise ValueError(f"{name} {value} is a folder, expected a YAML file of settings")
     elif name in CLASSES:
         path = Path(value).is_dir() or (IMPORT_PATH.fullmatch(value) and not Path(value).exists())
         if lacking := in_file(value) or (not_found(value) if path else ""):
             raise ValueError(f"{name}: {lacking}")
+        if name in SIMULATORS and path and (other := no_simulator(value)):
+            raise ValueError(f"{name}: {other}")
 
 
 def _settings(source: str | Path) -> dict[str, Any] | None:

@@ -184,6 +184,8 @@ SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
         ("find_gap", ("--simulator", "no_such.X"), "there is no module 'no_such' for no_such"),
         ("find_gap", ("--simulator", "arm.py:Arm"), "is no import path; write arm.Arm"),
         ("find_gap", ("--simulator", "."), "--simulator: . is a folder; expected MODULE.CLASS"),
+        ("find_gap", ("--simulator", "sims.tasks.SwingUp"), "SwingUp is no Simulator, expec"),
+        ("find_gap", (*SIMULATOR, "--columns", "."), "--columns . is a folder, expected a YAML"),
         ("find_gap", ("--simulator", "a/arm.py"), "write arm.CLASS and start Python in a/"),
         ("find_gap", (*SIMULATOR, "--columns", "none.yaml"), "--columns none.yaml: there is no"),
         ("find_gap", (*SIMULATOR, "--logs", "none.csv"), "none.csv: there is no such file"),

@@ -85,6 +85,18 @@ def test_infinite_value(csv, word):
     assert "row 9, column 'angle': found an infinite value" in error(csv(change))
 
 
+def test_a_time_that_never_changes(tmp_path):
+    path = write(tmp_path / "log.npz", swing() | {"time": np.full(200, 3.0)})
+    assert "column 'time': time is 3 in every row, expected seconds that go on" in error(path)
+
+
+def test_a_scale_that_makes_one_value_of_all(tmp_path):
+    path = write(tmp_path / "log.npz", swing())
+    for scale in (0.0, np.nan):
+        with pytest.raises(LogError, match=r"state 'angle' has scale .*, expected a factor"):
+            read(path, states={"angle": Column("angle", scale=scale)})
+
+
 def test_column_without_any_value(tmp_path):
     path = write(tmp_path / "log.npz", swing() | {"rate": np.full(200, np.nan)})
     assert "column 'rate': no value at all for 'rate'" in error(path)
