@@ -76,6 +76,24 @@ class Changing:
 
 
 @dataclasses.dataclass(frozen=True)
+class Periodic:
+    """A force at one frequency that would take most of what is left off.
+
+    Attributes:
+        joint: Where it acts.
+        frequency: In Hz.
+        size, unit: Its amplitude, the median over records.
+        taken: Part of the squared residual that this would take off.
+    """
+
+    joint: str
+    frequency: float
+    size: float
+    unit: str
+    taken: float
+
+
+@dataclasses.dataclass(frozen=True)
 class Unlike:
     """An effect that every record wants in a size of its own.
 

@@ -16,6 +16,7 @@ from residual.gap.answer.confirmed import matters
 from residual.gap.answer.encoders import by_an_encoder
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.out_of_proportion import out_of_proportion
+from residual.gap.answer.periodic import periodic
 from residual.gap.answer.records import stands_for, unlike
 from residual.gap.answer.table import lost
 from residual.gap.clock import Clock, usual_minutes
@@ -153,6 +154,7 @@ def find_gap(
         ask = asked and conventions is None and not clock.late
         differ = unlike(answer) if ask else ()
         over_time = changing(answer, known.in_vain) if ask else None
+        repeats = periodic(answer) if ask else None
         clock.lap("confirm")
 
         table, judged = summed_up(answer), NOT_JUDGED
@@ -188,7 +190,8 @@ def find_gap(
     conventions = conventions or other_sign(simulator, result.effects)
     return replace(
         result, corrected=result.corrected.with_scales(declared), conventions=conventions,
-        cut_off=log.cut_off, unlike=differ, changing=over_time, nearly_late=late, lone=known.lone,
+        cut_off=log.cut_off, unlike=differ, changing=over_time, periodic=repeats,
+        nearly_late=late, lone=known.lone,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.beside import Blind, Changing, Conventions, Unlike
+from residual.gap.beside import Blind, Changing, Conventions, Periodic, Unlike
 from residual.gap.data.stretch import Stretch
 from residual.gap.fitting.where import Where
 from residual.logs.checks import Finding
@@ -261,7 +261,8 @@ class GapResult:
         cut_off: Channels that the simulator cuts off within what was recorded of them.
         unlike: Effects that would take much of what is left off with a size of their own in each
             record, best first.
-        changing: What would take most of what is left off if it changed along the records.
+        changing: What would take most of what is left off if it changed along the records;
+            ``periodic``: a force at one frequency that would.
         nearly_late: Labels of delays and lags of some inputs that late, or filtering, sensors would
             nearly imitate, since the other inputs hardly change in that time.
         lone: Where most of the error lies, if nothing explains it and it was not left out.
@@ -286,6 +287,7 @@ class GapResult:
     cut_off: tuple[str, ...] = ()
     unlike: tuple[Unlike, ...] = ()
     changing: Changing | None = None
+    periodic: Periodic | None = None
     nearly_late: tuple[str, ...] = ()
     lone: Stretch | None = None
 

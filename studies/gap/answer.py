@@ -24,7 +24,7 @@ from studies.gap.numbers import (
     times_of,
     values_of,
 )
-from studies.gap.records import on_the_way
+from studies.gap.records import on_the_way, repeating
 from studies.gap.words import (
     FOOTNOTE,
     KINDS,
@@ -180,7 +180,9 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
         )
     if result.changing:
         found.append(on_the_way(result.changing))
-    if verdict.follows:
+    if result.periodic:
+        found.append(repeating(result.periodic))
+    if verdict.follows and not result.periodic:
         found.append(f"it looks like something that follows {verdict.follows}")
     if verdict.alternatives:
         found.append(

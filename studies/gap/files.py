@@ -147,6 +147,7 @@ def gap_record(
         "conventions": dataclasses.asdict(result.conventions) if result.conventions else None,
         "unlike": [dataclasses.asdict(one) for one in result.unlike],
         "changing": dataclasses.asdict(result.changing) if result.changing else None,
+        "periodic": dataclasses.asdict(result.periodic) if result.periodic else None,
         "lone": dataclasses.asdict(result.lone) if result.lone else None,
         "verdicts": [dataclasses.asdict(verdict) for verdict in result.verdicts],
         "gap": dataclasses.asdict(result.gap),

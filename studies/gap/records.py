@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from residual.gap import GapResult
-from residual.gap.beside import Changing, Unlike
+from residual.gap.beside import Changing, Periodic, Unlike
 from studies.gap.words import (
     FOOTNOTE,
     capitalized,
@@ -81,6 +81,17 @@ def on_the_way(changing: Changing) -> str:
         f"it looks as if {effect_name(changing.label)} went from about {begin} where records begin "
         f"to {end} where they end ({nominal} in the simulator), which would take {of}; no effect "
         "depends on time, so it is not added: log it as an input, or let the simulator change it"
+    )
+
+
+def repeating(periodic: Periodic) -> str:
+    """What would take most of what is left off if it acted at one frequency, a clause."""
+    size = quantity_text(periodic.size, periodic.unit)
+    return (
+        f"it looks like something that repeats at {periodic.frequency:.3g} Hz and acts on "
+        f"{periodic.joint} with an amplitude of about {size}, which would take "
+        f"{percent(periodic.taken)} of the squared residual off: a vibration or a ripple that was "
+        "not logged; it is not added: log it as an input, or let the simulator make it"
     )
 
 

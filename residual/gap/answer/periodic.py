@@ -1,0 +1,132 @@
+"""A remainder that repeats at one frequency: a vibration, a ripple, a disturbance without a log.
+
+The spectrum of what single steps leave tells the frequency; whether a force on a joint that swings
+so, in every record from its own beginning, takes most of the remainder off, the windows do. What
+inputs do at that frequency, or at a fraction of it, is no disturbance: a drive that swings makes
+harmonics of whatever is missing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import percentile_filter
+
+from residual.gap.answer.confirmed import Answer
+from residual.gap.answer.left import NOTABLE
+from residual.gap.beside import Periodic
+from residual.gap.confirmation.drift import beside
+from residual.gap.data.samples import Samples
+from residual.gap.fitting.screening import beside_starts
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.model import paths
+from residual.gap.model.candidates import candidates
+from sims.effects.joint import ConstantLoad
+
+Array = NDArray[np.float64]
+
+#: Power over the median around it from which on a frequency stands out; by chance one bin in 3e7
+#: does.
+STANDS_OUT = 25.0
+#: Bins, as a share of all, over which that median is taken.
+AROUND = 0.05
+#: Part of what is left beyond noise that it may leave.
+HALF = 0.5
+#: Periods in the longest record, samples in a period, and samples of a record, at the least.
+PERIODS, PER_PERIOD, ROWS = 5, 3, 64
+#: Whole parts of the frequency at which inputs must not swing.
+FRACTIONS = (1, 2, 3, 4, 5)
+
+
+def periodic(answer: Answer) -> Periodic | None:
+    """The joint and frequency of a force that would take most of what is left off, if there is one.
+
+    Args:
+        answer: What was named.
+    """
+    found, search = answer.found, answer.found.search
+    fitter, fit = search.fitter, search.tried[answer.key]
+    if not isinstance(fitter, SmoothFitter) or answer.left.adequate:
+        return None
+    if answer.left.ratio < NOTABLE:
+        return None
+    samples, model = fitter.samples, fit.model
+    nodes = paths.measured(model, samples, fit.theta)
+    after = model.advance(samples, nodes[None], fit.theta[None])[0]
+    steps = np.append(nodes[1:] - after[:-1], np.zeros((1, nodes.shape[1])), axis=0)
+    names = [channel.name for channel in search.simulator.physical_channels]
+    by_noise = fitter.noise_alone(found.floor.sigma)
+    best, least = None, by_noise + HALF * (fit.merit - by_noise)
+    for joint in search.simulator.joints:
+        series = steps[:, names.index(joint.rate or joint.position)]
+        frequency = line(samples, series)
+        if frequency is None or _driven(samples, frequency):
+            continue
+        phase = 2 * np.pi * frequency * samples.times
+        waves = [
+            np.where(_of_run(samples, run), wave, 0.0)
+            for run in samples.runs
+            for wave in (np.cos(phase), np.sin(phase))
+        ]
+        (load,) = candidates(model.simulator, [ConstantLoad(joint.name)], samples)
+        by_load = beside_starts(fit, fitter.columns(fit, [load], np.stack(waves)))
+        fall = beside(fit, [by_load], fitter.cap)
+        if fall.loss < least:
+            sizes = float(load.trials[0].values[0, 0]) * fall.numbers.reshape(-1, 2)
+            size = float(np.median(np.hypot(*sizes.T)))
+            taken, unit = 1 - fall.loss / max(fit.merit, 1e-300), load.knobs[0].unit
+            best, least = Periodic(joint.name, frequency, size, unit, taken), fall.loss
+    return best
+
+
+def line(samples: Samples, series: Array) -> float | None:
+    """The frequency in Hz at which a series, (n,), stands out, if it does at one."""
+    power, step = _spectrum(samples, series)
+    if power is None:
+        return None
+    longest = max(stop - start for start, stop in samples.runs)
+    frequencies = np.fft.rfftfreq(2 * (len(power) - 1), step)
+    there = (frequencies * longest * step >= PERIODS) & (frequencies * PER_PERIOD * step <= 1)
+    clear = np.where(there, _over_median(power), 0.0)
+    place = int(np.argmax(clear))
+    return float(frequencies[place]) if clear[place] > STANDS_OUT else None
+
+
+def _driven(samples: Samples, frequency: float) -> bool:
+    """Whether an input swings at a frequency or at a fraction of it."""
+    for series in samples.actions.T:
+        power, step = _spectrum(samples, series)
+        if power is None:
+            continue
+        clear, width = _over_median(power), 2 * (len(power) - 1) * step
+        for part in FRACTIONS:
+            place = round(frequency / part * width)
+            if clear[max(place - 4, 0) : place + 5].max(initial=0.0) > STANDS_OUT:
+                return True
+    return False
+
+
+def _spectrum(samples: Samples, series: Array) -> tuple[Array | None, float]:
+    """Power of all records together, over frequencies that are as close as the longest allows, and
+    the sampling time; None where records are short."""
+    runs = [(start, stop) for start, stop in samples.runs if stop - start >= ROWS]
+    step = float(np.median(samples.durations))
+    if not runs or step <= 0:
+        return None, step
+    size = 2 ** int(np.ceil(np.log2(4 * max(stop - start for start, stop in runs))))
+    power = np.zeros(size // 2 + 1)
+    for start, stop in runs:
+        part = np.nan_to_num(series[start : stop - 1])
+        part = (part - part.mean()) * np.hanning(len(part))
+        power += np.abs(np.fft.rfft(part, size)) ** 2
+    return power, step
+
+
+def _over_median(power: Array) -> Array:
+    around = percentile_filter(power, 50, size=max(9, int(AROUND * len(power)) | 1), mode="nearest")
+    return power / np.maximum(around, 1e-300)
+
+
+def _of_run(samples: Samples, run: tuple[int, int]) -> NDArray[np.bool_]:
+    rows = np.arange(len(samples))
+    return (rows >= run[0]) & (rows < run[1])
