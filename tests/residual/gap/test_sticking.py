@@ -100,8 +100,11 @@ def test_forecasts_of_parts_tell_breakaway_from_twice_the_friction(breakaway, se
 
 @pytest.mark.parametrize(
     ("breakaway", "seed"),
-    [(90.0, 41), (110.0, 42), pytest.param(90.0, 43, marks=pytest.mark.long)],
-)
+    [
+        (90.0, 41), pytest.param(110.0, 42, marks=pytest.mark.long),
+        pytest.param(90.0, 43, marks=pytest.mark.long),
+    ],
+)  # fmt: skip
 def test_friction_that_slopes_miss_is_found(breakaway, seed):
     prepared, model = ready(breakaway, seed)
     fitter = prepared.fitter

@@ -26,7 +26,7 @@ class Fan(FirstOrderSystem):
         return ((p.slope * u[:, 0] - x[:, 0]) / p.time_constant)[:, None]
 
 
-@pytest.mark.parametrize("rows", [168, 280])
+@pytest.mark.parametrize("rows", [pytest.param(168, marks=pytest.mark.long), 280])
 def test_a_driver_that_ignores_small_duties_is_not_certainly_dry_friction(rows):
     """It was, in one of these: friction leaves less of the last row's speed."""
     rng = np.random.default_rng(5)

@@ -13,7 +13,7 @@ from residual.gap.readings import read as reading
 from residual.gap.readings import row_late
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorLag, Delay
-from studies.gap import lead
+from studies.gap.beforehand import seen_first
 
 ROWS, HOLD, STEP = 400, 10, 5.0
 #: What made up for rows that were read late, and what is there.
@@ -101,5 +101,5 @@ def test_what_is_late_by_a_row_again_was_not_logged_a_row_late(monkeypatch, kind
 
 def test_what_is_told_first_names_the_columns():
     row = Conventions(("duty",), 1.3, "row")
-    told_first = lead._conventions(SimpleNamespace(conventions=row))
+    told_first = seen_first(SimpleNamespace(conventions=row))
     assert "with duty a row earlier in the log, what is found errs 1.3 times less" in told_first
