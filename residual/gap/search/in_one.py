@@ -11,7 +11,7 @@ import itertools
 from residual.gap.search.sets import Key, Search
 from sims.effects.actuator import ActuatorGain
 from sims.effects.combinations import made_by
-from sims.effects.joint import ConstantLoad
+from sims.effects.joint import ConstantLoad, ProportionalLoss
 from sims.effects.parameter import ParameterChange
 
 #: Effects that may make a loss together.
@@ -29,7 +29,7 @@ def add_in_one(search: Search, key: Key) -> None:
     losses = [
         number
         for number in range(search.screened, len(search.candidates))
-        if search.candidates[number].label in search.twins
+        if isinstance(search.candidates[number].effect, ProportionalLoss)
     ]
     if len(members) < 2 or not losses:
         return
