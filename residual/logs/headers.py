@@ -98,10 +98,9 @@ def _named_like(
             continue
         if spelt(plain) == spelt(channel.name):
             return _told(table, Column(header), channel, findings)
-        match = _WITH_UNIT.fullmatch(plain)
-        if match and spelt(match["name"]) == spelt(channel.name):
-            unit = match["square"] if match["round"] is None else match["round"]
-            fits.append(Column(header, unit.strip()))
+        name, stated = _parted(plain)
+        if stated is not None and spelt(name) == spelt(channel.name):
+            fits.append(Column(header, stated))
     if not fits:
         return None
     if len(fits) > 1:
@@ -125,6 +124,15 @@ def _named_like(
     return _told(table, column, channel, findings)
 
 
+def _parted(header: str) -> tuple[str, str | None]:
+    """A header's name, and the unit in brackets behind it; None if there are none."""
+    match = _WITH_UNIT.fullmatch(header)
+    if match is None:
+        return header, None
+    unit = match["square"] if match["round"] is None else match["round"]
+    return match["name"], unit.strip()
+
+
 def _unit_unsaid(table: Table, column: Column, channel: Channel) -> list[Finding]:
     """What is to be said of a column map without a unit where the header has another one.
 
@@ -133,12 +141,11 @@ def _unit_unsaid(table: Table, column: Column, channel: Channel) -> list[Finding
     header = str(column.column)
     if column.unit or (column.scale, column.offset) != (1.0, 0.0) or column.value is not None:
         return []
-    match = _WITH_UNIT.fullmatch(header)
-    unit = (match["square"] or match["round"] or "").strip() if match else ""
-    if not match and channel is TIME:
+    _, unit = _parted(header)
+    if unit is None and channel is TIME:
         unit = _IN_NAME.get(re.split(r"[\W_]+", header.strip())[-1].casefold(), "")
     with contextlib.suppress(ValueError):
-        if find_unit(unit, channel.unit) != (1.0, 0.0):
+        if find_unit(unit or "", channel.unit) != (1.0, 0.0):
             says = (
                 f"Column {header!r} is read in {channel.unit}, since the column map names it "
                 f"and no unit: say `unit: {unit}` if it counts in {unit}, or "

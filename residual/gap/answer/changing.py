@@ -62,23 +62,28 @@ def changing(answer: Answer, in_vain: Collection[ParameterCurve] = ()) -> Changi
         answer: What was named.
         in_vain: Parameters that follow a channel, asked for in full and not named.
     """
-    search, by_noise = answer.found.search, 0.0
+    search = answer.found.search
     asked = {str(curve) for curve in in_vain}
-    left, told = search.tried[answer.key].merit, None
-    for key in dict.fromkeys([answer.key, ()]):
-        for course in courses_of(answer, key):
-            ends = course.told(search, search.tried[key])
-            if str(course.curve) in asked or not _believable(search, course, ends):
-                continue
-            instead = key != answer.key
-            if not instead or course.fall.loss - by_noise < HALF * (left - by_noise):
-                told = dataclasses.replace(ends, instead=instead)
-                left = course.fall.loss
-            break
-        if not (isinstance(search.fitter, SmoothFitter) and answer.left.ratio > PLAINLY):
-            break
+    told, left = _best(answer, answer.key, asked) or (None, search.tried[answer.key].merit)
+    much = isinstance(search.fitter, SmoothFitter) and answer.left.ratio > PLAINLY
+    alone = _best(answer, (), asked) if answer.key and much else None
+    if alone is not None:
+        assert isinstance(search.fitter, SmoothFitter)
         by_noise = search.fitter.noise_alone(answer.found.floor.sigma)
+        if alone[1] - by_noise < HALF * (left - by_noise):
+            return dataclasses.replace(alone[0], instead=True)
     return told
+
+
+def _best(answer: Answer, key: Key, asked: Collection[str]) -> tuple[Changing, float] | None:
+    """The first course beside a set that may be, but for curves that were asked for, and what it
+    leaves."""
+    search = answer.found.search
+    for course in courses_of(answer, key):
+        ends = course.told(search, search.tried[key])
+        if str(course.curve) not in asked and _believable(search, course, ends):
+            return ends, course.fall.loss
+    return None
 
 
 def in_place(changing: Changing | None, along_records: bool) -> bool:
