@@ -19,7 +19,7 @@ from residual.gap.fitting.intervals import deviations
 from residual.gap.model.candidates import candidates, one_way
 from residual.gap.preparation.prepare import prepare
 from residual.gap.search.explain import Explanation, explain
-from residual.gap.search.sets import Key
+from residual.gap.search.pool import Key
 from residual.gap.search.significance import pruned
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect

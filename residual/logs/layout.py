@@ -99,7 +99,7 @@ def check_layout(columns: LogFormat, states: Sequence[Channel], actions: Sequenc
                 near = difflib.get_close_matches(name, names, 1)
                 hint = f"; did you mean {near[0]!r}?" if near else ""
                 raise LogError(
-                    f"the simulator has no {kind} channel {name!r}, it has "
+                    f"columns.{kind}s: the simulator has no {kind} channel {name!r}, it has "
                     f"{', '.join(map(repr, names)) or 'none'}{hint}"
                 )
             if isinstance(column, Column) and not (np.isfinite(column.scale) and column.scale):

@@ -82,15 +82,22 @@ def bars(result: GapResult, folder: Path) -> Figure:
     )
     return Figure(
         shrinking(result, folder / "gap.png"),
-        f"The error falls from {gap.before.value:.3g} to {gap.after.value:.3g}"
-        f"{unit_text(gap.unit)}; noise "
-        f"alone gives {gap.noise_floor.value:.3g}.",
+        f"{_course(gap)}{unit_text(gap.unit)}; noise alone gives {gap.noise_floor.value:.3g}.",
         f"Root mean square error of {gap.channel} over {duration_text(gap.horizon_s)}, in "
         f"{CROSS_VALIDATED}: {gap.blocks} blocks of the records, dealt over {gap.folds} groups "
         "that are left out in turn; 95 % interval over blocks. **Noise floor**: what the corrected "
         f"simulator would reach on its own data plus noise.{in_vain}",
         heading="The gap, step by step",
     )
+
+
+def _course(gap: Gap) -> str:
+    """What becomes of the error, as far as the digits that are shown tell."""
+    before, after = f"{gap.before.value:.3g}", f"{gap.after.value:.3g}"
+    if before == after:
+        return f"The error stays at {after}"
+    course = "falls" if gap.after.value < gap.before.value else "rises"
+    return f"The error {course} from {before} to {after}"
 
 
 def curves(result: GapResult, folder: Path) -> list[Section]:

@@ -24,8 +24,9 @@ from residual.gap.fitting.forecasts import fitted_floor
 from residual.gap.result import Gap, GapResult, Verdict
 from residual.gap.search.comparisons import helps, material
 from residual.gap.search.explain import FOOTNOTE
+from residual.gap.search.pool import Key
 from residual.gap.search.redundant import doubles
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.sets import Search
 from residual.logs.checks import Finding
 
 #: Forecast error over that by noise alone up to which there may be no gap.

@@ -21,7 +21,8 @@ from residual.gap.model.model import Model
 from residual.gap.preparation.numerics import enough_for, own_substeps, stride_for
 from residual.gap.preparation.prepare import Prepared, prepare
 from residual.gap.result import Gap
-from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.pool import Key, all_but
+from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
 
 Array = NDArray[np.float64]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from residual.gap.result import Number, Span, Verdict
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 
 #: Part of what a parameter may change by that is a change: with 3 % either way, 0.1 % of its value.
 MOVED = 0.02

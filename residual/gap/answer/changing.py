@@ -31,7 +31,8 @@ from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.search.known import ANY_ZERO, size
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.effects.actuator import ActuatorGain
 from sims.effects.library import library
 from sims.effects.parameter import ParameterChange

@@ -24,7 +24,8 @@ from residual.gap.search.exchange import add_exchanged, add_without_each
 from residual.gap.search.explain import LEAST, Explanation
 from residual.gap.search.imitation import imitated
 from residual.gap.search.known import KNOWN
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.host import HostSimulator
 
 #: Effects tried in place of each that is left when one cannot be named: of few, and of more.

@@ -38,8 +38,8 @@ DOUBTS: dict[Doubt, str] = {
     "no_help": "it hardly helps on the records that were set aside, where it could",
     "sensor": "sensors are seldom wrong in their scale, or by a fifth of all that they showed, and "
     "what has no name yet may look so",
-    "no_time": "there was no time to ask whether parameters that are a few percent off would do as "
-    "well, give more --minutes",
+    "no_time": "there was no time to ask whether another effect, or parameters that are a few "
+    "percent off, would do as well, give more --minutes",
     "may_be_zero": "its interval holds zero, or nearly",
     "size_open": "it may be more than ten times as large as what fits best",
     "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from residual.gap.result import Rival
 from residual.gap.search.comparisons import material
 from residual.gap.search.explain import Explanation
+from residual.gap.search.pool import Key
 from residual.gap.search.reasons import reasons
-from residual.gap.search.sets import Key
 
 #: Sets that are listed.
 MOST = 40

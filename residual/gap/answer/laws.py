@@ -11,7 +11,8 @@ from residual.gap.answer.left import beside_noise
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.rivals import CLEARLY
 from residual.gap.search.earlier import brought
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.parameter_curve import ParameterCurve

@@ -14,7 +14,7 @@ from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.model.model import Model
-from residual.gap.search.sets import Key
+from residual.gap.search.pool import Key
 from sims.effects.base import Effect
 from sims.effects.flexible import FlexiblePart
 

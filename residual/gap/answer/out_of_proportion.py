@@ -7,7 +7,7 @@ import numpy as np
 from residual.gap.answer.confirmed import Answer
 from residual.gap.fitting.plausible import ratios, stands_still
 from residual.gap.search.comparisons import takes_off
-from residual.gap.search.sets import Key
+from residual.gap.search.pool import Key
 
 #: Error over that of what was named up to which a single number does as much.
 AS_MUCH = 1.1

@@ -21,7 +21,8 @@ from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts, constrained, flatten, trials
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.fitting.validation import by_block, validate
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.effects.actuator import StaticActuatorEffect
 from sims.effects.curve import Curve
 from sims.effects.joint import ConstantLoad

@@ -15,7 +15,8 @@ from residual.gap.fitting.forecasts import main_channel, span
 from residual.gap.fitting.smooth import LOST, SmoothFitter
 from residual.gap.fitting.validation import Validated, by_block
 from residual.gap.result import ChannelGap, Gap, Rollout, Span, Step
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 
 Array = NDArray[np.float64]
 

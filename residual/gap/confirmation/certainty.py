@@ -22,7 +22,8 @@ from residual.gap.fitting.intervals import bounded, deviations, ended
 from residual.gap.fitting.plausible import doubtful_sensor
 from residual.gap.search.comparisons import AT_ONE, no_match
 from residual.gap.search.parted import parted
-from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.pool import Key, all_but
+from residual.gap.search.sets import Search
 from residual.gap.search.significance import score, tie
 from sims.effects.joint import Cogging
 
@@ -98,6 +99,7 @@ def claims(
                 extreme=key in search.extreme,
                 orders=of_many_orders(search, key, number, adequate),
                 few_levels=by_few_levels(search, key, number),
+                unasked=(key, number) in search.unasked,
                 in_a_loop=loop and affine(search, number),
             )
         )

@@ -43,7 +43,7 @@ class Claim:
             are free within their tolerance.
         within: Whether it may be a parameter, gain or scale off by no more than its tolerance.
         slight: Whether they are without these, too: the parameters do nothing of its work.
-        unasked: Whether there was no time to ask that.
+        unasked: Whether there was no time to ask that, or for what may stand in its place.
         brief: Whether it is a time too short for the log's own clock.
         within_step: Whether it may be less than a step of the sensor whose zero it is.
         counted: Whether the log may count otherwise than the simulator does.

@@ -14,7 +14,8 @@ from scipy.special import stdtrit
 
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.effects.curve import Curve
 
 Array = NDArray[np.float64]

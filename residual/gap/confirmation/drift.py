@@ -20,7 +20,8 @@ from residual.gap.confirmation.push import pushed
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.shooting import capped
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from residual.gap.search.significance import price
 
 Array = NDArray[np.float64]

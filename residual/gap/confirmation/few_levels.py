@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.at_rest import STILL
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.effects.actuator import ActuatorBias, StaticActuatorEffect
 from sims.effects.base import Effect
 from sims.effects.curve import Curve

@@ -14,7 +14,8 @@ from residual.gap.confirmation.drift import beside
 from residual.gap.data.levels import levels
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.pool import Key, all_but
+from residual.gap.search.sets import Search
 from residual.gap.search.significance import tie
 from sims.effects.actuator import ActuatorGain
 from sims.effects.curve import Curve

@@ -14,7 +14,8 @@ from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.validation import validate
 from residual.gap.model.model import Model
 from residual.gap.preparation.numerics import FINE, held_otherwise
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from residual.gap.confirmation.push import pushed
 from residual.gap.fitting.screening import flatten
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.search.sets import SAME_MOTION, Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import SAME_MOTION, Search
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,8 @@ from residual.gap.data.at_rest import begins_on, rest
 from residual.gap.data.samples import in_order
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.smooth import SmoothFitter
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
 from sims.effects.actuator import ActuatorGain, ActuatorLag, Delay
 from sims.effects.parameter import ParameterChange

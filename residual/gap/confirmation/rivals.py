@@ -13,7 +13,8 @@ from residual.gap.confirmation.numerics import at_half_step
 from residual.gap.confirmation.settled import settled
 from residual.gap.search.comparisons import no_match
 from residual.gap.search.exchange import exchanged, split
-from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.pool import Key, all_but
+from residual.gap.search.sets import Search
 from residual.gap.search.significance import BETTER, score, tie
 
 Array = NDArray[np.float64]

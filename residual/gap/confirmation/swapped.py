@@ -6,7 +6,8 @@ import itertools
 
 import numpy as np
 
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.effects.actuator import ActuatorLag
 from sims.effects.parameter import ParameterChange
 

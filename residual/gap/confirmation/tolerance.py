@@ -28,7 +28,8 @@ from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.model.model import Model
 from residual.gap.search import known
 from residual.gap.search.exchange import add_without_each, exchanged
-from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.pool import Key, all_but
+from residual.gap.search.sets import Search
 from residual.gap.search.significance import size
 from sims.effects.actuator import ActuatorGain
 from sims.effects.library import library
@@ -104,7 +105,8 @@ def allow_for_parameters(
 
     told = []
     for claim in claims:
-        claim = dataclasses.replace(claim, unasked=time.process_time() > until)
+        late = claim.unasked or time.process_time() > until
+        claim = dataclasses.replace(claim, unasked=late)
         if claim.sure:
             as_well = as_good(claim, all_but(key, claim.number))
             little = as_well and slight(claim)

@@ -21,7 +21,8 @@ from residual.gap.model.candidates import Candidate, Knob, candidates
 from residual.gap.model.model import Model
 from residual.gap.result import Meant
 from residual.gap.search.continuation import handed_over, in_place
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.effects.base import Effect
 from sims.host import HostSimulator
 

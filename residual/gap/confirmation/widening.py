@@ -18,7 +18,8 @@ from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.intervals import deviations
 from residual.gap.result import Number
 from residual.gap.search.exchange import exchanged
-from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.pool import Key, all_but
+from residual.gap.search.sets import Search
 from sims.effects.curves import StateCurve
 
 Array = NDArray[np.float64]

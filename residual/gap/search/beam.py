@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from residual.gap.fitting.screening import Gain, Signatures, gains, pair_gains, triple_gains
 from residual.gap.search.drives import driven
 from residual.gap.search.exchange import from_screen, of_several_numbers, spelt_out
+from residual.gap.search.pool import Key
 from residual.gap.search.redundant import by_points
-from residual.gap.search.sets import Key, Proposals, Search
+from residual.gap.search.sets import Proposals, Search
 from residual.gap.search.significance import score
 from residual.gap.search.sound import sound
 

@@ -30,8 +30,9 @@ from residual.gap.search.comparisons import (
     no_match,
 )
 from residual.gap.search.known import departures, extent, parameters
+from residual.gap.search.pool import Key
 from residual.gap.search.reasons import reasons
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.sets import Search
 from residual.gap.search.significance import score
 
 Array = NDArray[np.float64]

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.search.currency import Currency
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,8 @@ from residual.gap.fitting.screening import beside_starts, flatten
 from residual.gap.model.candidates import Candidate
 from residual.gap.model.model import Model
 from residual.gap.search.exchange import add_without_each
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 
 Array = NDArray[np.float64]
 

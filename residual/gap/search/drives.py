@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from residual.gap.search.sound import sound
 
 #: Part of the time left that is spent on it where there are several joints.

@@ -6,7 +6,8 @@ import numpy as np
 
 from residual.gap.fitting.screening import gains
 from residual.gap.search.choice import choose
-from residual.gap.search.sets import Key, Proposals, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Proposals, Search
 
 #: Error with an effect that was lacking over that without, from which on none of them helps.
 HELPS = 0.95

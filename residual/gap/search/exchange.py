@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from residual.gap.fitting.screening import Gain, gains, pair_gains
 from residual.gap.search.in_one import add_in_one
 from residual.gap.search.parted import add_parted
+from residual.gap.search.pool import Key, all_but
 from residual.gap.search.redundant import doubles
-from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.sets import Search
 
 Array = NDArray[np.float64]
 
@@ -48,16 +49,19 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
     a linear screen tells little.
 
     Args:
-        search: What is tried goes there.
+        search: What is tried goes there, and what was not asked for lack of time.
         key: A fitted set.
         most: Effects that are tried in place of each member, beside its family.
     """
     add_without_each(search, key)
     add_parted(search, key)
     add_in_one(search, key)
-    for gone in key:
-        rest = all_but(key, gone)
-        if rest not in search.tried:
+    without = {gone: all_but(key, gone) for gone in key if all_but(key, gone) in search.tried}
+    # What takes off most is asked first: time may be over before the last.
+    for gone in sorted(without, key=lambda n: search.error(without[n]), reverse=True):
+        rest = without[gone]
+        if search.out_of_time:
+            search.unasked.add((key, gone))
             continue
         for number, start in _rivals(search, key, gone, most):
             fresh, theta = search.merged(key, [(number, start)], drop=(gone,))

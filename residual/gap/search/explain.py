@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
+import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -21,9 +22,10 @@ from residual.gap.search.continuation import add_handed_over
 from residual.gap.search.earlier import add_what_it_lacked, carried, is_in_vain, near_best
 from residual.gap.search.exchange import add_exchanged, add_pairs_exchanged, as_good_splits
 from residual.gap.search.pairs import every_two
+from residual.gap.search.pool import Key, Twins
 from residual.gap.search.reasons import reasons
 from residual.gap.search.redundant import curves_in_place
-from residual.gap.search.sets import Key, Proposals, Search, Twins
+from residual.gap.search.sets import Proposals, Search
 from residual.gap.search.significance import score, significant
 from sims.host import HostSimulator
 
@@ -43,6 +45,8 @@ RIVALS, EXCHANGES = 10, 3
 LEAST = 2
 #: Sets that are weighed anew where there is no time to search again.
 LAST = 4
+#: Seconds of processor time for trying those when the time for searching is over, or part of that.
+WEIGHED, AS_LONG = 30.0, 0.5
 
 #: From the fitter that made a fit, and the fit: the fitter whose channels are weighed by what that
 #: leaves of them, and the noise around it.
@@ -123,7 +127,9 @@ def explain(
     """
 
     def begun(fitter: Fitter, floor: Noise, before: Search | None) -> Search:
-        search = Search(simulator, pool, fitter, effort, tell, until, beside, twins, floor.sigma)
+        search = Search(
+            simulator, pool, fitter, effort, tell, until, beside, twins, floor.sigma, weigh_until
+        )
         if len(search.currency.groups) > 1 and not simulator.has_contacts:
             alone = noise_floor(fitter, search.nominal, floor.sigma)
             search.currency = search.currency.only_where_wrong(alone)
@@ -131,6 +137,9 @@ def explain(
             search.globally.after(before.globally)
         return search
 
+    # Later searches are given up where they cannot be weighed in time.
+    weighing = max(WEIGHED, AS_LONG * (until - time.process_time()))
+    weigh_until = until + weighing if earlier is None else np.inf
     seeds: Proposals = {}
     before = earlier
     for _ in range(ROUNDS):

@@ -15,8 +15,9 @@ from residual.gap.fitting.contract import Fitter
 from residual.gap.preparation.prepare import Prepared
 from residual.gap.search.choice import Choice
 from residual.gap.search.explain import Explanation
+from residual.gap.search.pool import Key
 from residual.gap.search.reasons import reasons
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.sets import Search
 from residual.gap.search.significance import ASTRAY, score, significant, tie
 
 #: Sets that meet, the chosen one among them.

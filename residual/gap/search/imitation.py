@@ -7,7 +7,8 @@ import numpy as np
 from residual.gap.fitting.screening import gains, signatures, trials
 from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from residual.gap.search.significance import score, size
 from sims.effects.combinations import near_combinations
 from sims.effects.library import library

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import itertools
 
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.effects.actuator import ActuatorGain
 from sims.effects.combinations import made_by
 from sims.effects.joint import ConstantLoad, ProportionalLoss

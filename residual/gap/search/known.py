@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.effects.base import Effect
 from sims.effects.parameter import ParameterChange
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from residual.gap.fitting.screening import pair_gains
 from residual.gap.search.beam import extend, improves
 from residual.gap.search.exchange import from_screen
+from residual.gap.search.pool import Key
 from residual.gap.search.redundant import by_points
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.sets import Search
 from residual.gap.search.sound import sound
 
 #: Candidates up to which every two of them are fitted.

@@ -10,7 +10,8 @@ import numpy as np
 
 from residual.gap.fitting.screening import beside_starts, flatten, project_out, trials
 from residual.gap.model.candidates import Candidate
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 
 #: Part of what a twin does, in the linear picture, that a set with the effect itself cannot, from
 #: which on it moves otherwise: secants of trials differ by less.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from residual.gap.search.comparisons import MATERIAL, SAME, as_good
 from residual.gap.search.known import departures
-from residual.gap.search.sets import Key, Search
+from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from residual.gap.search.significance import score
 from residual.trajectories import moment
 

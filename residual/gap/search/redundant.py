@@ -11,7 +11,8 @@ from residual.gap.fitting.screening import Signatures
 from sims.effects.curve import Curve
 
 if TYPE_CHECKING:
-    from residual.gap.search.sets import Key, Proposals, Search
+    from residual.gap.search.pool import Key
+    from residual.gap.search.sets import Proposals, Search
 
 #: Part of the length of what an effect does within what a curve can do, beyond which it is a case
 #: of the curve.

@@ -8,7 +8,7 @@ that does not help.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,31 +23,21 @@ from residual.gap.model.nested import absent, from_nested
 from residual.gap.preparation.effort import Effort
 from residual.gap.search.currency import Currency, groups
 from residual.gap.search.global_search import GlobalSearch
+from residual.gap.search.pool import Key, Pool, Twins
 from residual.gap.search.redundant import doubles
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
-Key = tuple[int, ...]
 Proposals = dict[Key, Array]
-Twins = Mapping[str, Sequence[Candidate]]
 
 #: Cosine of what two effects do, start states allowed for, beyond which it is one motion.
 SAME_MOTION = 0.995
 
 
-def all_but(key: Key, number: int) -> Key:
-    """A set without one of its members."""
-    return tuple(i for i in key if i != number)
-
-
-class Search:
+class Search(Pool):
     """Rival sets of effects fitted to the windows of one fitter.
 
     Attributes:
-        candidates: What may be missing, by number; those from ``screened`` on are twins only, or
-            losses that several of them make together.
-        twins: Exact twins of candidates by label, tried where those would be absurd; such a loss
-            by its own label.
         beside: Candidates that are free beside every set, the empty one included, and that no set
             is charged for: parameters within their tolerance.
         nominal: The simulator as it was given; ``before``: its forecasts.
@@ -56,6 +46,7 @@ class Search:
         nearly: Those of them that could be, as far as their numbers are known; ``extreme``: sets
             with numbers as large, that explain what moved.
         halved: Those that were fitted at half the step, too, see ``numerics.at_half_step``.
+        unasked: Sets and members for which there was no time to try what may stand in their place.
         validated: Cross-validated forecasts of the sets; ``currency``: relative errors.
     """
 
@@ -70,14 +61,12 @@ class Search:
         beside: Sequence[Candidate] = (),
         twins: Twins | None = None,
         noise: Array | None = None,
+        weigh_until: float = np.inf,
     ) -> None:
-        self.simulator, self.fitter = simulator, fitter
-        self.twins = twins or {}
-        self.screened = len(candidates)
-        others = {twin.effect: twin for found in self.twins.values() for twin in found}
-        known = {candidate.effect for candidate in candidates}
-        self.candidates = [*candidates, *(t for e, t in others.items() if e not in known)]
-        self.effort, self.tell, self.until = effort or Effort(), tell, until
+        super().__init__(simulator, candidates, twins)
+        self.fitter = fitter
+        self.effort, self.tell = effort or Effort(), tell
+        self.until, self.weigh_until = until, weigh_until
         self.beside = tuple(beside)
         self.nominal = fitter.fit(Model(simulator), np.zeros(0))
         self.before = validate(fitter, self.nominal)
@@ -89,6 +78,7 @@ class Search:
         self.nearly: set[Key] = set()
         self.extreme: set[Key] = set()
         self.halved: dict[Key, Fit] = {}
+        self.unasked: set[tuple[Key, int]] = set()
         self._noise, self.globally = noise, GlobalSearch(noise, until)
         self._from_longer_leads: dict[Key, Array] = {}
         self._signatures: dict[Key, Signatures] = {}
@@ -106,17 +96,9 @@ class Search:
         """Fitted numbers of a set, without those that are free beside every one."""
         return self.tried[key].theta[: self.numbers(key)]
 
-    def labels(self, key: Key) -> tuple[str, ...]:
-        """Names and places of a set."""
-        return tuple(self.candidates[i].label for i in key)
-
     def error(self, key: Key) -> float:
         """Cross-validated relative error."""
         return self.currency.error(self.validated[key].squares)
-
-    def numbers(self, key: Key) -> int:
-        """Free numbers of a set."""
-        return sum(len(self.candidates[i].knobs) for i in key)
 
     def fits_in(self, key: Key) -> bool:
         """Whether a set has few enough numbers for the windows there are, and each effect once.
@@ -158,6 +140,11 @@ class Search:
     def late(self) -> bool:
         """Whether the time for searching is over, or as many sets are fitted as may be."""
         return time.process_time() > self.until or len(self.tried) > self.effort.tried
+
+    @property
+    def out_of_time(self) -> bool:
+        """Whether the time for weighing what was found against its rivals is over, too."""
+        return time.process_time() > self.weigh_until
 
     def signatures(self, key: Key) -> Signatures:
         """What every candidate would add to a fitted set."""
@@ -259,29 +246,6 @@ class Search:
         fresh, theta = self.merged(key, [(place, start)], drop=(gone,))
         self.add({fresh: theta})
 
-    def twins_of(self, number: int) -> list[Candidate]:
-        """Candidates that move exactly as one does."""
-        own = self.candidates[number]
-        return [one for one in self.twins.get(own.label, ()) if one.effect != own.effect]
-
-    def stands_for(self, number: int) -> int:
-        """The screened candidate that moves exactly as a twin does; itself if it is one."""
-        effect = self.candidates[number].effect
-        alike = (
-            i for i in range(self.screened) if effect in [twin.effect for twin in self.twins_of(i)]
-        )
-        return number if number < self.screened else next(alike, number)
-
-    def contains(self, one: int, other: int) -> bool:
-        """Whether an effect is a special case of another at the same place."""
-        return self.candidates[one].effect.contains(self.candidates[other].effect)
-
-    def family(self, number: int) -> str:
-        """What effects that differ in form more than in kind have in common, and where."""
-        effect = self.candidates[number].effect
-        family = effect.family_in(self.simulator)
-        return f"{family}@{self.place(number)}" if family else ""
-
     def same_motion(self, rest: Key, one: int, other: int) -> bool:
         """Whether two effects make the same motion in these data beside some others, if known."""
         if rest not in self.tried:  # as of what would hold an effect twice
@@ -294,7 +258,3 @@ class Search:
         a, b = (around.matrix[:, places[0]] for places in pair)
         lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
         return lengths > 0 and abs(float(a @ b)) > SAME_MOTION * lengths
-
-    def place(self, number: int) -> str:
-        """The joint, actuator, channel or parameter of a candidate."""
-        return self.candidates[number].effect.where

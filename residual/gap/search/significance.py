@@ -10,7 +10,8 @@ import numpy as np
 
 from residual.gap.search.exchange import add_without_each
 from residual.gap.search.known import departures
-from residual.gap.search.sets import Key, Search, all_but
+from residual.gap.search.pool import Key, all_but
+from residual.gap.search.sets import Search
 
 #: Difference of costs that says nothing.
 NO_DIFFERENCE = 1.0

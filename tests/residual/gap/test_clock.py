@@ -13,6 +13,7 @@ from residual.gap import find_gap
 from residual.gap.clock import Clock, OutOfTime
 from residual.gap.model.candidates import candidates
 from residual.gap.preparation.prepare import prepare
+from residual.gap.search import explain
 from residual.gap.search.earlier import add_what_it_lacked, is_in_vain
 from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
@@ -122,6 +123,15 @@ def test_what_there_is_no_time_for_is_one_note_and_leaves_the_form_open(runs, mo
     (note,) = (one.says for one in result.quality if "no time to look" in one.says)
     assert note.startswith("what is left may be load dependent friction")
     assert "a part on a spring" in note and note.endswith("give more --minutes")
+
+
+def test_what_was_not_tried_in_its_place_leaves_an_effect_uncertain(runs, monkeypatch):
+    monkeypatch.setattr(explain, "WEIGHED", 0.0)
+    monkeypatch.setattr(explain, "AS_LONG", -2.0)
+    monkeypatch.setattr(Clock, "searched", property(lambda _: True))
+    result = find_gap(Slide(), runs, minutes=0.2)
+    assert result.verdicts and not any(v.kind == "confirmed" for v in result.verdicts)
+    assert any("no_time" in v.doubts for v in result.verdicts)
 
 
 def test_a_search_begins_with_what_it_is_made_for(runs):

@@ -59,3 +59,11 @@ def test_no_set_holds_a_law_beside_its_special_case(search):
     assert doubles(search, (0, 2))
     add_exchanged(search, PLAIN, 3)
     assert not any(doubles(search, key) for key in search.tried)
+
+
+def test_what_there_is_no_time_to_try_is_noted(search):
+    late = Search(search.simulator, search.candidates, search.fitter, weigh_until=0.0)
+    late.add({PLAIN: np.array([0.02])})
+    add_exchanged(late, PLAIN, 3)
+    assert late.unasked == {(PLAIN, 0)}
+    assert set(late.tried) == {(), PLAIN}
