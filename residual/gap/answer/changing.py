@@ -42,8 +42,6 @@ Array = NDArray[np.float64]
 
 #: Part of what is left beyond noise, without its change, that it may leave.
 HALF = 0.5
-#: Residual over noise beyond which what changes is asked for in place of what is named, too.
-PLAINLY = 5.0
 #: Times that a change of what is named has to leave more.
 CLEARLY = 1.5
 
@@ -66,7 +64,7 @@ def changing(answer: Answer, in_vain: Collection[ParameterCurve] = ()) -> Changi
     search = answer.found.search
     asked = {str(curve) for curve in in_vain}
     told, left = _best(answer, answer.key, asked) or (None, search.tried[answer.key].merit)
-    much = isinstance(search.fitter, SmoothFitter) and answer.left.ratio > PLAINLY
+    much = isinstance(search.fitter, SmoothFitter) and answer.left.ratio > NOTABLE
     alone = _best(answer, (), asked) if answer.key and much else None
     if alone is not None:
         assert isinstance(search.fitter, SmoothFitter)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from residual.gap.confirmation.constancy import FEW, along_records
 from residual.gap.confirmation.push import pushed
 from residual.gap.fitting.contract import Fit
-from residual.gap.fitting.shooting import capped
+from residual.gap.fitting.linearised import capped
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.search.pool import Key
 from residual.gap.search.sets import Search

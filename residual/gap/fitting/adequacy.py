@@ -10,9 +10,9 @@ from scipy.special import chdtrc
 
 from residual.gap.data.samples import Samples
 from residual.gap.data.windows import Windows, carry
+from residual.gap.fitting.linearised import ShootingFit
 from residual.gap.fitting.noise import Floor, driven_states, push
 from residual.gap.fitting.screening import flatten, project_out
-from residual.gap.fitting.shooting import ShootingFit
 from residual.gap.model.slopes import observe
 from sims.host import HostSimulator
 

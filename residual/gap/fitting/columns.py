@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.windows import carry
-from residual.gap.fitting import shooting
 from residual.gap.fitting.contract import Fit
+from residual.gap.fitting.linearised import ShootingFit
 from residual.gap.model.candidates import Candidate
 from residual.gap.model.model import Model
 from residual.gap.model.slopes import observe
@@ -34,7 +34,7 @@ def columns(
     if not candidates:
         return np.zeros((*fit.projected.shape, 0))
     model, samples, windows = fit.model, fitter.samples, fitter.blocks.windows
-    inner: shooting.ShootingFit = fit.inner
+    inner: ShootingFit = fit.inner
     n, width = inner.nodes.shape
     moved: list[Array] = []
     shown: list[Array] = []

@@ -120,7 +120,7 @@ def estimate(
     weight = np.zeros((count, len(pushed) * terms))
     error = sigma
     for turn in range(iterations):
-        slope = slopes(model, samples, nodes, theta, model.step, scale)
+        slope = slopes(model, samples, nodes, theta, scale)
         gaps = defects(samples, slope, nodes)
         nodes = nodes.copy()
         found = []
@@ -139,7 +139,7 @@ def estimate(
         if turn >= 1:
             left, leverage = (np.concatenate(parts) for parts in zip(*found, strict=True))
             sigma, error = _spread(samples, windows, left, leverage, sigma)
-    slope = slopes(model, samples, nodes, theta, model.step, scale)
+    slope = slopes(model, samples, nodes, theta, scale)
     force = np.zeros((len(samples), len(driven)))
     local = np.einsum("wdt,lt->wld", weight.reshape(count, len(pushed), terms), series)
     rows = windows.index[windows.inside]

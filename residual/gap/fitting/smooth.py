@@ -15,6 +15,7 @@ from residual.gap.fitting.adequacy import ERRORS, remainder
 from residual.gap.fitting.chance import TIE, threshold
 from residual.gap.fitting.columns import columns
 from residual.gap.fitting.contract import Fit, Fitter, Foretold, Left
+from residual.gap.fitting.linearised import ShootingFit, capped
 from residual.gap.fitting.noise import Floor, Noise
 from residual.gap.fitting.screening import Signatures
 from residual.gap.fitting.starts import starts
@@ -102,12 +103,10 @@ class SmoothFitter:
         theta = np.clip(theta, model.low, model.high)
         return self._as_fit(self._shot_from_forecasts(model, theta, near.inner))
 
-    def _shot_from_forecasts(
-        self, model: Model, theta: Array, near: shooting.ShootingFit
-    ) -> shooting.ShootingFit:
+    def _shot_from_forecasts(self, model: Model, theta: Array, near: ShootingFit) -> ShootingFit:
         return self._shot(model, self._foretold(model, theta, near), theta, None, 0.05)
 
-    def _foretold(self, model: Model, theta: Array, near: shooting.ShootingFit) -> Array:
+    def _foretold(self, model: Model, theta: Array, near: ShootingFit) -> Array:
         """Nodes on forecasts from the lead-ins of all windows, (n, n_s)."""
         windows, which = self.blocks.windows, np.zeros(len(self.blocks.windows), np.int64)
         first, steps = windows.index[:, 0], windows.index.shape[1] - 1
@@ -129,15 +128,15 @@ class SmoothFitter:
 
     def _shot(
         self, model: Model, nodes: Array, theta: Array, by_state: Array | None, widths: float
-    ) -> shooting.ShootingFit:
+    ) -> ShootingFit:
         return shooting.fit(
             model, self.samples, self.blocks.windows, nodes, theta, self.sigma,
             model.scales(self.scale), self.turns, self.cap, widths, by_state=by_state,
         )  # fmt: skip
 
-    def _as_fit(self, found: shooting.ShootingFit) -> Fit:
+    def _as_fit(self, found: ShootingFit) -> Fit:
         return Fit(
-            found.model, found.theta, shooting.capped(found.costs, self.cap), found.weights,
+            found.model, found.theta, capped(found.costs, self.cap), found.weights,
             found.projected, found.by_knob, found.basis, found.converged, found,
         )  # fmt: skip
 

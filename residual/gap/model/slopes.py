@@ -20,23 +20,19 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True)
 class Slope:
-    """Values and derivatives at every node, for one vector of unknowns.
+    """Values at every node and their derivatives by it, for one vector of unknowns.
 
     Attributes:
         after: Where each node arrives after its interval, (n, n_s).
         by_state: Derivative of ``after`` by the node, (n, n_s, n_s).
-        by_knob: Derivative of ``after`` by the unknowns, (n, n_s, p).
         shown: What the sensors show at the node, (n, n_s).
         shown_by_state: Diagonal of its derivative by the node, (n, n_s).
-        shown_by_knob: Its derivative by the unknowns, (n, n_s, p).
     """
 
     after: Array
     by_state: Array
-    by_knob: Array
     shown: Array
     shown_by_state: Array
-    shown_by_knob: Array
 
 
 def slopes(
@@ -44,7 +40,6 @@ def slopes(
     samples: Samples,
     nodes: Array,
     theta: Array,
-    widths: Array,
     scale: Array,
     by_state: Array | None = None,
     rows: NDArray[np.int64] | None = None,
@@ -52,63 +47,72 @@ def slopes(
     """Everything at the nodes in one batch.
 
     Args:
-        widths: Finite-difference width of every unknown.
         scale: Typical variation of every state; a state is moved by 1e-4 of it.
         by_state: Derivative by the state from an earlier call, to be used again.
-        rows: Samples that matter, if not all; the derivatives of the others are zero.
+        rows: Samples that matter, if not all; what is said of the others is zero.
     """
-    if rows is not None and len(rows) < len(nodes):
-        return _some(model, samples, nodes, theta, widths, scale, by_state, rows)
-    return _all(model, samples, nodes, theta, widths, scale, by_state, None)
-
-
-def _some(
-    model: Model, samples: Samples, nodes: Array, theta: Array, widths: Array, scale: Array,
-    by_state: Array | None, rows: NDArray[np.int64],
-) -> Slope:  # fmt: skip
-    known = None if by_state is None else by_state[rows]
-    part = _all(model, samples, nodes[rows], theta, widths, scale, known, rows)
-    full = {}
-    for field in dataclasses.fields(Slope):
-        values = getattr(part, field.name)
-        full[field.name] = np.zeros((len(nodes), *values.shape[1:]))
-        full[field.name][rows] = values
-    return Slope(**full)
-
-
-def _all(
-    model: Model, samples: Samples, nodes: Array, theta: Array, widths: Array, scale: Array,
-    by_state: Array | None, rows: NDArray[np.int64] | None,
-) -> Slope:  # fmt: skip
-    n, width = nodes.shape
-    p = len(theta)
+    own = nodes if rows is None else nodes[rows]
+    width = own.shape[1]
     moves = np.zeros((0, width)) if by_state is not None else 1e-4 * np.diag(scale)
-    up = np.where(theta + widths > model.high, -widths, widths)
-    thetas = np.vstack([theta[None], np.repeat(theta[None], len(moves), 0), theta + np.diag(up)])
-    states = np.repeat(nodes[None], 1 + len(moves) + p, axis=0)
-    states[1 : 1 + len(moves)] += moves[:, None, :]
-    after = model.advance(samples, states, thetas, rows)
-    base = after[0]
-    by_knob = np.zeros((n, width, p))
-    # A trial that runs away loses later on.
-    with np.errstate(over="ignore", invalid="ignore"):
-        if by_state is None:
-            by_state = np.stack(
-                [(after[1 + i] - base) / moves[i, i] for i in range(width)], axis=-1
-            )
-        for j in range(p):
-            by_knob[:, :, j] = (after[1 + len(moves) + j] - base) / up[j]
-    shown_by_state, shown_by_knob = np.ones((n, width)), np.zeros((n, width, p))
-    shown = nodes
+    states = np.repeat(own[None], 1 + len(moves), axis=0)
+    states[1:] += moves[:, None, :]
+    after = model.advance(samples, states, np.tile(theta, (len(states), 1)), rows)
+    if by_state is None:
+        with np.errstate(over="ignore", invalid="ignore"):  # a trial that runs away loses later on
+            columns = [(after[1 + i] - after[0]) / moves[i, i] for i in range(width)]
+        slope = np.stack(columns, axis=-1)
+    else:
+        slope = by_state if rows is None else by_state[rows]
+    shown, shown_by_state = own, np.ones_like(own)
     if model.has_sensor:
-        moved = np.repeat(nodes[None], 2 + p, axis=0)
-        moved[1] += 1e-4 * scale
-        seen = model.sense(moved, np.vstack([theta[None], theta[None], theta + np.diag(up)]))
-        shown = seen[0]
-        shown_by_state = (seen[1] - shown) / (1e-4 * scale)
-        for j in range(p):
-            shown_by_knob[:, :, j] = (seen[2 + j] - shown) / up[j]
-    return Slope(base, by_state, by_knob, shown, shown_by_state, shown_by_knob)
+        moved = np.stack([own, own + 1e-4 * scale])
+        shown, there = model.sense(moved, np.tile(theta, (2, 1)))
+        shown_by_state = (there - shown) / (1e-4 * scale)
+    found = (after[0], slope, shown, shown_by_state)
+    return Slope(*(_everywhere(values, rows, len(nodes)) for values in found))
+
+
+def by_unknowns(
+    model: Model,
+    samples: Samples,
+    slope: Slope,
+    nodes: Array,
+    theta: Array,
+    widths: Array,
+    rows: NDArray[np.int64] | None = None,
+) -> tuple[Array, Array]:
+    """Derivatives by the unknowns, of where each node arrives and of what the sensors show there.
+
+    Args:
+        slope: Values at the nodes.
+        widths: Finite-difference width of every unknown.
+        rows: Samples that matter, if not all; the derivatives of the others are zero.
+
+    Returns:
+        Two of shape (n, n_s, p).
+    """
+    p, own = len(theta), nodes if rows is None else nodes[rows]
+    if p == 0:
+        return np.zeros((*nodes.shape, 0)), np.zeros((*nodes.shape, 0))
+    up = np.where(theta + widths > model.high, -widths, widths)
+    states, thetas = np.repeat(own[None], p, axis=0), theta + np.diag(up)
+    values = [(model.advance(samples, states, thetas, rows), slope.after)]
+    values += [(model.sense(states, thetas), slope.shown)] if model.has_sensor else []
+    found = []
+    for moved, base in values:
+        with np.errstate(over="ignore", invalid="ignore"):
+            columns = (moved - (base if rows is None else base[rows])) / up[:, None, None]
+        found.append(_everywhere(columns.transpose(1, 2, 0), rows, len(nodes)))
+    return found[0], found[1] if model.has_sensor else np.zeros_like(found[0])
+
+
+def _everywhere(values: Array, rows: NDArray[np.int64] | None, count: int) -> Array:
+    """Values of some samples among zeros for all, (n, ...)."""
+    if rows is None or len(rows) == count:
+        return values
+    full = np.zeros((count, *values.shape[1:]))
+    full[rows] = values
+    return full
 
 
 def observe(

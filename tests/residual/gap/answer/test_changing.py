@@ -12,7 +12,7 @@ from residual.gap.answer.changing import _believable
 from residual.gap.beside import Changing
 from residual.trajectories import Trajectory
 from sims.effects import ActuatorGain, ParameterChange
-from sims.equations import EquationOfMotion
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.simulator import Channel, Parameter
 from studies.gap.files import gap_record
 from studies.gap.summary import summary
@@ -110,3 +110,35 @@ def test_a_gain_may_turn_round_but_not_be_a_hundred_times_larger():
     assert not _believable(None, course, Changing("actuator_gain@push", 0.0, 99.0, 0.0, "1", 0.8))
     # Both ends at one bound change nothing.
     assert not _believable(None, course, Changing("actuator_gain@push", 0.5, 0.5, 0.0, "1", 0.8))
+
+
+class HotPlate(FirstOrderSystem):
+    """A plate on a heating wire whose resistance is taken for constant."""
+
+    dt = 5.0
+    state_channels = (Channel("plate", "degC", "other", scale=50.0),)
+    action_channels = (Channel("volts", "V", "input", low=0.0, high=32.0),)
+    parameters: ClassVar = {
+        "resistance": Parameter(8.0, "ohm", "of the wire", low=0.5),
+        "capacity": Parameter(224.0, "J/K", "of the plate", low=1.0),
+    }
+
+    def derivative(self, x, u, p):
+        heat = u[:, 0] ** 2 / p.resistance
+        return ((heat - 0.9 * (x[:, 0] - 20.0)) / p.capacity)[:, None]
+
+
+def test_a_wire_that_conducts_worse_as_it_warms_is_told_in_place_of_four_that_imitate_it():
+    rng, warm = np.random.default_rng(744), [20.0]
+    volts = np.repeat(np.r_[0, rng.choice([0, 12, 18, 24, 28, 32], 29)], 40).astype(float)
+    for volt in volts[:-1]:
+        resistance = 8.0 * (1 + 0.004 * (warm[-1] - 20.0))
+        over = volt**2 / resistance / 0.9 + 20.0
+        warm.append(over + (warm[-1] - over) * np.exp(-0.9 * 5.0 / 224.0))
+    seen = np.array(warm)[:, None] + rng.normal(0, 0.15, (len(volts), 1))
+    log = Trajectory("0", 5.0 * np.arange(len(volts)), seen, volts[:-1, None])
+    effects = ("asymmetric_response", "actuator_gain", "actuator_bias", "capacity")
+    found = find_gap(HotPlate(), [log], effects=effects, minutes=0.5)
+    changes = found.changing
+    assert changes is not None and changes.instead and changes.over == "plate"
+    assert not any(verdict.kind == "confirmed" for verdict in found.verdicts)
