@@ -139,7 +139,8 @@ class Trajectory:
         actions: Action from sample k to sample k + 1, shape (T, n_a).
         before: Action that was held for long before the first sample, shape (n_a,), which delays
             and lags remember; by default the first one.
-        converted: Channels whose columns were in another unit when they were read.
+        converted: Units that columns were in when they were read, by channel, where that was not
+            the channel's own.
 
     Raises:
         ValueError: The arrays do not belong together.
@@ -150,7 +151,7 @@ class Trajectory:
     states: Array
     actions: Array
     before: Array | None = None
-    converted: frozenset[str] = frozenset()
+    converted: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         samples = len(self.times)

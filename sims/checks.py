@@ -8,18 +8,17 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sims.contract import (
-    acceleration_keeps,
-    contract,
-    declared,
-    forces_act,
-    parameters_by_row,
-    positions_and_rates,
-)
+from sims.contract import contract, declared
 from sims.effects.base import Effect
 from sims.effects.joint import ConstantLoad
 from sims.effects.library import library, typical
 from sims.effects.parameter import ParameterChange
+from sims.equation_contract import (
+    acceleration_keeps,
+    forces_act,
+    parameters_by_row,
+    positions_and_rates,
+)
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.findings import Finding, Findings, draw, example
 from sims.host import HostSimulator

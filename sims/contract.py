@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from types import SimpleNamespace
 
 import numpy as np
 
+from sims.equation_contract import (
+    acceleration_keeps,
+    drive_tells,
+    forces_act,
+    parameters_by_row,
+)
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.findings import Finding, draw, example
 from sims.simulator import Array, Channel, Simulator
@@ -15,11 +20,9 @@ from sims.unsound import Unsound
 #: What makes every number of a simulator worthless.
 _GRAVE = (
     "period", "channels", "parameters", "shape", "arguments", "repeatable", "pure", "rows",
-    "arguments of acceleration", "forces", "parameters by row",
+    "arguments of acceleration", "forces", "parameters by row", "drive_force",
 )  # fmt: skip
 _ROUNDING = 1e-6
-#: Forces that are tried, in the joints' units: one is large enough for whatever is moved.
-_FORCES = (1.0, 1e6, 1e12)
 
 
 def refuse_unsound(simulator: Simulator) -> None:
@@ -67,83 +70,7 @@ def _sound(simulator: Simulator) -> Iterator[Finding]:
         yield forces_act(simulator, states, actions)
     if isinstance(simulator, EquationOfMotion | FirstOrderSystem):
         yield parameters_by_row(simulator, states, actions)
-
-
-def parameters_by_row(
-    simulator: EquationOfMotion | FirstOrderSystem, states: Array, actions: Array
-) -> Finding:
-    """Is a parameter that is one number for each row taken as the number that it was?
-
-    Whoever fits parameters steps many values at once.
-    """
-    author = "acceleration" if isinstance(simulator, EquationOfMotion) else "derivative"
-    remedy = (
-        f"compute in {author} with columns such as {'q' if author[0] == 'a' else 'x'}[:, 0], and "
-        "stack the results: np.stack([...], axis=1)"
-    )
-    whole = simulator.step(states, actions)
-    for name, parameter in simulator.parameters.items():
-        if np.ndim(parameter.value):
-            continue
-        says = f"{name} as one number for each row, shape (n,), "
-        try:
-            by_row = simulator.with_parameters(**{name: np.full(len(states), parameter.value)})
-            found = by_row.step(states, actions)
-        except Exception as error:
-            told = "" if "stack" in str(error) else f"; {remedy}"
-            says += f"raises {type(error).__name__}: {error}{told}"
-            return Finding("parameters by row", False, says)
-        if not np.allclose(found, whole, rtol=_ROUNDING, atol=0, equal_nan=True):
-            return Finding("parameters by row", False, f"{says}gives other numbers; {remedy}")
-    return Finding("parameters by row", True, "one number for each row acts like the same scalar")
-
-
-def acceleration_keeps(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:
-    """Does the user's ``acceleration`` leave its arguments as they were?"""
-    q, v = positions_and_rates(simulator, states)
-    given = (q, v, actions.copy(), np.zeros_like(q))
-    before = [array.copy() for array in given]
-    with np.errstate(all="ignore"):
-        values = SimpleNamespace(**simulator.parameter_values())
-        simulator.acceleration(*given, values)
-    kept = all(map(np.array_equal, given, before))
-    says = "are left as they were" if kept else "are overwritten"
-    return Finding("arguments of acceleration", kept, says)
-
-
-def forces_act(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:
-    """Does a force on each joint accelerate it? Friction, loads and springs are such forces."""
-    q, v = positions_and_rates(simulator, states)
-    values = SimpleNamespace(**simulator.parameter_values())
-
-    def accelerations(force: Array, joint: int) -> Array:
-        found = simulator.acceleration(q.copy(), v.copy(), actions.copy(), force, values)
-        return np.asarray(found)[:, joint]
-
-    for j, joint in enumerate(simulator.joints):
-        with np.errstate(all="ignore"):
-            free = accelerations(np.zeros_like(q), j)
-            if not np.isfinite(free).any():
-                continue  # which is another fault
-            for size in _FORCES:
-                force = np.zeros_like(q)
-                force[:, j] = size
-                if not np.array_equal(accelerations(force, j), free, equal_nan=True):
-                    break
-            else:
-                says = (
-                    f"acceleration does not change with the force on joint {joint.name!r}, so no "
-                    f"effect could act there: add force[:, {j}] to the sum of forces"
-                )
-                return Finding("forces", False, says)
-    return Finding("forces", True, "a force on each joint accelerates it")
-
-
-def positions_and_rates(simulator: EquationOfMotion, states: Array) -> tuple[Array, Array]:
-    """What ``acceleration`` is given of some states, each (n, n_joints)."""
-    names = [channel.name for channel in simulator.state_channels]
-    q = states[:, [names.index(joint.position) for joint in simulator.joints]]
-    return q, states[:, [names.index(str(joint.rate)) for joint in simulator.joints]]
+        yield drive_tells(simulator, states, actions)
 
 
 def declared(simulator: Simulator) -> Iterator[Finding]:

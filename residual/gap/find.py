@@ -124,7 +124,7 @@ def find_gap(
 
         log, prepared = settle(simulator, log, tell)
         clock.begin(minutes or usual_minutes(simulator))
-        converted = frozenset[str]().union(*(run.converted for run in log.runs))
+        converted = {name: unit for run in log.runs for name, unit in run.converted.items()}
         conventions = otherwise(simulator, prepared.fitter, converted)
         conventions = conventions or without_sign(simulator, prepared.fitter)
         conventions = conventions or beyond_scale(simulator, prepared.fitter.samples, converted)

@@ -94,13 +94,13 @@ def runs_of(
         )
     matrix = np.column_stack(seen)
     inputs_matrix = np.column_stack(acted) if acted else np.zeros((len(table), 0))
-    converted = frozenset(
-        channel.name
+    converted = {
+        channel.name: column.unit
         for channel in (*states, *actions)
         if (column := (found | inputs).get(channel.name))
         and column.unit
         and find_unit(column.unit, channel.unit) != Unit(1.0)
-    )
+    }
     for label, rows in _groups(table, columns):
         for part in _resets(table, times, rows, columns.split_at_time_resets, time.column):
             inside = _between(times[part], columns.start, columns.stop)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +31,7 @@ class Run:
         times: In s, shape (n,).
         states: One column for each channel that a log can hold, shape (n, n_s), NaN if missing.
         actions: At each sample, shape (n, n_a), NaN if missing.
-        converted: Channels whose columns are in another unit than they.
+        converted: Units of columns that are in another one than their channel, by channel.
     """
 
     path: Path
@@ -40,7 +40,7 @@ class Run:
     times: Array
     states: Array
     actions: Array
-    converted: frozenset[str] = frozenset()
+    converted: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.times)

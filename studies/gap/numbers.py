@@ -137,5 +137,9 @@ def as_in_a_unit(verdict: Verdict, simulator: HostSimulator) -> str:
     ends = sorted((1 + end) ** way for end in (share.low, share.high) if end > -1)
     if len(ends) < 2 or ends[1] > NARROW * ends[0]:
         return ""
-    units = [name for name, unit in other_units(channel.unit) if ends[0] <= unit.factor <= ends[1]]
+    units = [
+        name
+        for name, unit in other_units(channel.unit)
+        if ends[0] <= unit.factor <= ends[1] and unit.factor != 1.0
+    ]
     return f"as if {channel.name} were logged in {' or '.join(units)}" if units else ""

@@ -29,7 +29,10 @@ def class_of_word(word: str) -> dict[str, str]:
 
 def no_simulator(path: str) -> str:
     """What is to be said of an import path that leads to a class which is no simulator."""
-    found = pydoc.locate(path)
+    try:
+        found = pydoc.locate(path)
+    except pydoc.ErrorDuringImport:
+        return ""  # which is told by whoever loads it
     if not isinstance(found, type) or issubclass(found, Simulator):
         return ""
     return (

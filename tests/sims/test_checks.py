@@ -280,3 +280,26 @@ def test_findings_print_as_a_table():
     assert len(lines) == len(findings) and all(finding.ok for finding in findings)
     starts = {line.index(f.says) for line, f in zip(lines, findings, strict=True)}
     assert len(starts) == 1
+
+
+class Hoist(EquationOfMotion):
+    """Its drive tells a force for every row of every row where the gear is a number by row."""
+
+    dt = 0.02
+    state_channels = (
+        Channel("height", "m", "position", scale=1.0),
+        Channel("speed", "m/s", "rate", rate_of="height", scale=1.0),
+    )
+    action_channels = (Channel("torque", "N m", "input", low=-20.0, high=20.0),)
+    parameters: ClassVar = {"drum": Parameter(0.1, "m", "radius of the drum", low=0.01)}
+
+    def acceleration(self, q, v, u, force, p):
+        return ((u[:, 0] / p.drum + force[:, 0]) / 50.0 - 9.81)[:, None]
+
+    def drive_force(self, q, v, u, p):
+        return u / p.drum
+
+
+def test_a_drive_force_that_mixes_rows_is_refused_before_anything_is_computed():
+    with pytest.raises(Unsound, match=r"drive_force: .*drum is one number for each row"):
+        refuse_unsound(Hoist())

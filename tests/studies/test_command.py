@@ -13,7 +13,7 @@ import pytest
 
 from residual.gap.data.windows import Windows
 from residual.logs.units import find_unit
-from studies import learn
+from studies import find_gap, learn
 from studies.learning.trial import build_parser
 from studies.pendulum_gap import STUDY
 from studies.running import ending
@@ -224,6 +224,15 @@ def test_a_system_file_that_is_no_python_is_the_users(tmp_path, monkeypatch, cap
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and f"{tmp_path / 'unclosed.py'}, line 3" in said
     assert "never closed" in said and not (tmp_path / "out").exists()
+
+
+def test_so_is_a_simulator_that_is_no_python(tmp_path, monkeypatch, capsys):
+    (tmp_path / "commas.py").write_text("class Wheel:\n    def derivative(self,,, x, u, p):\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SystemExit, match="2"):
+        find_gap.main(["--simulator", "commas.Wheel", "--logs", "run.csv"])
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and f"{tmp_path / 'commas.py'}, line 2" in said
 
 
 def test_a_reader_that_has_read_enough_is_no_error():

@@ -3,7 +3,7 @@
 The spectrum of what single steps leave tells the frequency; whether a force on a joint that swings
 so, in every record from its own beginning, takes most of the remainder off, the windows do. What
 inputs do at that frequency, or at a fraction of it, is no disturbance: a drive that swings makes
-harmonics of whatever is missing.
+harmonics of whatever is missing, and so does a pendulum that swings freely.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ AROUND = 0.05
 HALF = 0.5
 #: Periods in the longest record, samples in a period, and samples of a record, at the least.
 PERIODS, PER_PERIOD, ROWS = 5, 3, 64
-#: Whole parts of the frequency at which inputs must not swing.
+#: Whole parts of the frequency at which inputs must not swing, nor, but for itself, motion.
 FRACTIONS = (1, 2, 3, 4, 5)
 
 
@@ -93,17 +93,21 @@ def line(samples: Samples, series: Array) -> float | None:
 
 
 def _driven(samples: Samples, frequency: float) -> bool:
-    """Whether an input swings at a frequency or at a fraction of it."""
-    for series in samples.actions.T:
-        power, step = _spectrum(samples, series)
-        if power is None:
-            continue
-        clear, width = _over_median(power), 2 * (len(power) - 1) * step
-        for part in FRACTIONS:
-            place = round(frequency / part * width)
-            if clear[max(place - 4, 0) : place + 5].max(initial=0.0) > STANDS_OUT:
-                return True
-    return False
+    """Whether an input swings at a frequency or at a fraction of it, or motion at a fraction."""
+    asked: list[tuple[Array, tuple[int, ...]]]
+    asked = [(series, FRACTIONS) for series in samples.actions.T]
+    asked += [(samples.seen[:, column], FRACTIONS[1:]) for column in samples.measured]
+    return any(_swings(samples, series, frequency, parts) for series, parts in asked)
+
+
+def _swings(samples: Samples, series: Array, frequency: float, parts: tuple[int, ...]) -> bool:
+    """Whether a series, (n,), swings at one of these parts of a frequency."""
+    power, step = _spectrum(samples, series)
+    if power is None:
+        return False
+    clear, width = _over_median(power), 2 * (len(power) - 1) * step
+    places = [round(frequency / part * width) for part in parts]
+    return any(clear[max(at - 4, 0) : at + 5].max(initial=0.0) > STANDS_OUT for at in places)
 
 
 def _spectrum(samples: Samples, series: Array) -> tuple[Array | None, float]:

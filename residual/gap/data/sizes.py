@@ -29,7 +29,7 @@ COLD, ZERO, OUTSIDE = 200.0, 273.15, (-10.0, 50.0)
 def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
     """Columns that move far more or far less than declared, as they would not in another unit."""
     found = []
-    converted = frozenset[str]().union(*(run.converted for run in trajectories))
+    converted = {name: unit for run in trajectories for name, unit in run.converted.items()}
     for channel, size, declared in _sizes(simulator, trajectories):
         times = size / declared
         if not times > 0.0 or 1 / FAR < times < FAR:
@@ -39,7 +39,8 @@ def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[
             *(f"`unit: {n}`" for n, unit in units if 1 / NEAR <= times * unit.factor <= most),
             *(f"`unit: {channel.unit}` in place of {n}" if channel.name in converted
               else f"`scale: {1 / unit.factor:g}`"
-              for n, unit in units if 1 / NEAR <= times / unit.factor <= most),
+              for n, unit in units
+              if converted.get(channel.name, n) == n and 1 / NEAR <= times / unit.factor <= most),
         ]  # fmt: skip
         if near:
             says = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,14 +37,14 @@ RATIOS, SMALL = np.geomspace(5.0, 320.0, 13), 0.1
 
 
 def conventions(
-    simulator: HostSimulator, samples: Samples, converted: Collection[str]
+    simulator: HostSimulator, samples: Samples, converted: Mapping[str, str]
 ) -> list[Convention]:
     """What a column map may have to say: signs, zeros of angles, units, other columns.
 
     Args:
         simulator: Its channels are what columns stand for.
         samples: The measured table.
-        converted: Channels whose columns were in another unit.
+        converted: Units that columns were in, by channel, where that is not its own.
     """
     found = []
     for place, action in enumerate(simulator.action_channels):

@@ -9,7 +9,8 @@ better with one of them changed.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -70,7 +71,7 @@ LOST, FOUND, FAR = 4.0, 3.0, 10.0
 
 
 def otherwise(
-    simulator: HostSimulator, fitter: Fitter, converted: Collection[str] = ()
+    simulator: HostSimulator, fitter: Fitter, converted: Mapping[str, str] = MappingProxyType({})
 ) -> Conventions | None:
     """Conventions with which the nominal simulator forecasts far better.
 
@@ -79,7 +80,8 @@ def otherwise(
     Args:
         simulator: The nominal simulator.
         fitter: With the windows to forecast.
-        converted: Channels whose columns were in another unit, which a header may say wrongly.
+        converted: Units that columns were in, by channel, where that is not its own: a header may
+            say so wrongly.
 
     Returns:
         The best of them and what is as good; None where none is.
@@ -207,7 +209,7 @@ def other_sign(simulator: HostSimulator, found: Sequence[Effect]) -> Conventions
 
 
 def beyond_scale(
-    simulator: HostSimulator, samples: Samples, converted: Collection[str] = ()
+    simulator: HostSimulator, samples: Samples, converted: Mapping[str, str] = MappingProxyType({})
 ) -> Conventions | None:
     """Units of a channel that is far beyond the scale that it declares, and would be near it in
     another unit, or without the conversion of its column; None if there is none.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from residual.gap.preparation.convention import Convention, of_states
-from residual.logs.units import Unit, other_units
+from residual.logs.units import Unit, find_unit, other_units
 from sims.host import HostSimulator
 from sims.simulator import Channel
 
@@ -17,12 +17,13 @@ from sims.simulator import Channel
 NEXT_TO = 5.0
 
 
-def in_another_unit(channel: Channel, converted: Collection[str]) -> list[tuple[str, Unit]]:
+def in_another_unit(channel: Channel, converted: Mapping[str, str]) -> list[tuple[str, Unit]]:
     """What an input's column may count in, in words and numbers.
 
     Args:
         channel: The input.
-        converted: Channels whose columns were in another unit, as a header or a map says.
+        converted: Units that columns were in, by channel, as a header or a map says, where that
+            is not the channel's own.
     """
     others = [
         (f"`unit: {name}` for {channel.name} ({_beside_a_unit(unit)})", unit)
@@ -32,7 +33,7 @@ def in_another_unit(channel: Channel, converted: Collection[str]) -> list[tuple[
 
 
 def states_in_other_units(
-    simulator: HostSimulator, joints: Sequence[Sequence[int]], converted: Collection[str]
+    simulator: HostSimulator, joints: Sequence[Sequence[int]], converted: Mapping[str, str]
 ) -> list[Convention]:
     """The same of positions with their rates, one by one and all that share a unit together.
 
@@ -49,7 +50,7 @@ def states_in_other_units(
     return found + _all_in_other_units(simulator, joints, converted)
 
 
-def _others(channel: Channel, converted: Collection[str]) -> list[tuple[str, Unit]]:
+def _others(channel: Channel, converted: Mapping[str, str]) -> list[tuple[str, Unit]]:
     """Units that a column may be in; of one whose unit is stated none that is next to it."""
     stated = channel.name in converted
     return [
@@ -60,7 +61,7 @@ def _others(channel: Channel, converted: Collection[str]) -> list[tuple[str, Uni
 
 
 def _in_other_units(
-    simulator: HostSimulator, joint: Sequence[int], converted: Collection[str]
+    simulator: HostSimulator, joint: Sequence[int], converted: Mapping[str, str]
 ) -> list[Convention]:
     """A position and its rate in units that go together."""
     channels = [simulator.physical_channels[i] for i in joint]
@@ -77,7 +78,7 @@ def _in_other_units(
 
 
 def _all_in_other_units(
-    simulator: HostSimulator, joints: Sequence[Sequence[int]], converted: Collection[str]
+    simulator: HostSimulator, joints: Sequence[Sequence[int]], converted: Mapping[str, str]
 ) -> list[Convention]:
     """All states of one unit in another one: who logs one temperature in K logs them all so."""
     alike: dict[tuple[str, ...], list[Sequence[int]]] = {}
@@ -99,17 +100,17 @@ def _all_in_other_units(
     return found
 
 
-def misread(channel: Channel, converted: Collection[str]) -> list[tuple[str, Unit]]:
+def misread(channel: Channel, converted: Mapping[str, str]) -> list[tuple[str, Unit]]:
     """What undoes the conversion of a column from a unit that it is not in, in words and numbers;
     but for what another unit does, too. Where nothing was converted, there is nothing to undo."""
-    others = other_units(channel.unit) if channel.name in converted else []
-    found = []
-    for name, unit in others:
-        back = Unit(1 / unit.factor, -unit.offset / unit.factor)
-        if not any(np.allclose(back, other) for _, other in others):
-            says = f"`unit: {channel.unit}` for {channel.name} (not {name})"
-            found.append((says, back))
-    return found
+    said = converted.get(channel.name)
+    if said is None:
+        return []
+    unit, others = find_unit(said, channel.unit), other_units(channel.unit)
+    back = Unit(1 / unit.factor, -unit.offset / unit.factor)
+    if any(np.allclose(back, other) for _, other in others):
+        return []
+    return [(f"`unit: {channel.unit}` for {channel.name} (not {said})", back)]
 
 
 def _beside_a_unit(unit: Unit) -> str:

@@ -35,7 +35,7 @@ def a_sign_reversed(read: Read, asked: Asked) -> Read:
     found, fitter, nominal = read.found, read.prepared.fitter, asked.nominal
     if found.adequate or not isinstance(fitter, SmoothFitter):
         return read
-    signs = [one for one in conventions(nominal, fitter.samples, ()) if one.sign]
+    signs = [one for one in conventions(nominal, fitter.samples, {}) if one.sign]
     changes = {one.says for one in signs}
     if read.conventions is not None and changes.issuperset(read.conventions.changes):
         return read

@@ -205,7 +205,7 @@ def test_what_is_explained_does_not_hang_by_a_zero():
     assert not still_open(less, simulator, True, [friction], 4.0)
     assert not still_open(less, simulator, True, [], 1.0)
     # With its direction it is a zero, too; a direction alone is none.
-    kinds = {one.says: one.turned for one in conventions(simulator, samples, ())}
+    kinds = {one.says: one.turned for one in conventions(simulator, samples, {})}
     zeros = {says for says, turned in kinds.items() if turned}
     assert "`offset: 3.14159` and `scale: -1` for angle and rate" in zeros
     assert "`scale: -1` for angle and rate" not in zeros and "`scale: -1` for voltage" not in zeros
@@ -268,7 +268,7 @@ class Servo(FirstOrderSystem):
         return -x
 
 
-@pytest.mark.parametrize("converted", [(), ("angle",)])
+@pytest.mark.parametrize("converted", [{}, {"angle": "rad"}])
 def test_degrees_that_were_taken_for_radians_are_asked_about_first(converted):
     """Where nothing was converted, another unit is all that is left to ask about."""
     angle = np.degrees(90.0 + 80.0 * np.sin(0.1 * np.arange(101)))

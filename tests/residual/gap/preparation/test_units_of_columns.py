@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from residual.gap.preparation.conventions import otherwise
+from residual.gap.preparation.other_units import misread
 from residual.gap.preparation.prepare import prepare
 from residual.logs import read_logs
 from residual.trajectories import Trajectory
@@ -83,7 +84,7 @@ def test_degrees_that_a_header_calls_kelvin_are_told():
         parameters = Room.parameters | {"outside": Parameter(-3.15, "degC", "outside")}
 
     fitter = prepare(InDegrees(), [run], 300.0).fitter
-    found = otherwise(InDegrees(), fitter, {"room"})
+    found = otherwise(InDegrees(), fitter, {"room": "K"})
     assert found is not None
     assert found.changes == ("`unit: degC` for room (not K)",)
     # What was not converted was not converted by mistake.
@@ -117,7 +118,7 @@ def test_degrees_fahrenheit_of_an_input_are_told_of_that_column(tmp_path):
         table = np.column_stack([columns[0], warm + zero, *columns[2:]])
         np.savetxt(path, table, delimiter=",", comments="", header=f"time,{header},heater,outside")
         read = read_logs(path, Yard.state_channels, Yard.action_channels).trajectories
-        assert read[0].converted == ({"room"} if unit else set())
+        assert read[0].converted == ({"room": "K"} if unit else {})
         found = otherwise(Yard(), prepare(Yard(), read, 600.0).fitter, read[0].converted)
         assert found is not None
         assert found.changes[0].startswith("`unit: degF` for outside")
@@ -193,3 +194,10 @@ def test_thousands_of_what_has_no_unit_are_told_and_no_sign_that_bounds_cut_off(
         run = Trajectory("air", np.arange(61.0), carbon[:, None], factor * emitted[:, None])
         found = otherwise(Carbon(), prepare(Carbon(), [run], 6.0).fitter)
         assert (found and found.changes) == wanted
+
+
+def test_only_the_unit_that_a_header_states_may_be_the_wrong_one():
+    height = Channel("height", "m", "other", scale=1.0)
+    assert misread(height, {"height": "ft"})[0][0] == "`unit: m` for height (not ft)"
+    assert misread(height, {"height": "mm"}) == []  # a thousand times more is km as well
+    assert misread(height, {}) == []
