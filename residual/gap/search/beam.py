@@ -52,7 +52,7 @@ def run(
             break
         fresh: list[Key] = []
         for key in frontier:
-            more = grow(search, key)
+            more = grow(search, key, quiet)
             fresh += more + together(search, key, more)
         grown.update(frontier)
         if not fresh or search.late:
@@ -112,9 +112,10 @@ def _pays(search: Search, key: Key, reached: float) -> bool:
     return bool((own < (1 - 2 * search.effort.stale) * its).any())
 
 
-def grow(search: Search, key: Key) -> list[Key]:
+def grow(search: Search, key: Key, quiet: Callable[[Key], bool] = lambda _: False) -> list[Key]:
     """Fit sets one effect larger than a fitted one, the best of the linear screen for each
-    joint; those that turn out absurd are replaced by the next."""
+    joint; those that turn out absurd are replaced by the next. From the nominal simulator on also
+    some of two, unless one alone leaves noise."""
     around = search.signatures(key)
     places = search.currency.groups
     total = search.effort.grown if key else search.effort.singles
@@ -143,6 +144,9 @@ def grow(search: Search, key: Key) -> list[Key]:
         # The joints of what walks and hops move, so that the screen sees what rubs there.
         if not search.simulator.has_contacts:
             found += boldly(search, parameters=False)
+        if _alone(search, quiet):
+            return list(dict.fromkeys(found))
+        if not search.simulator.has_contacts:
             found += driven(search)
         found += partners(search, found)
         # Laws of many numbers gain more, so that two of one number each have their own turn.
