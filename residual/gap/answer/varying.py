@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.answer.changing import courses_of
+from residual.gap.answer.changing import HALF, Course, courses_of
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.left import much_is_left
 from residual.gap.data.levels import levels
@@ -16,6 +16,7 @@ from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
+from residual.gap.search.pool import Key
 from sims.effects.curve import Curve
 from sims.effects.parameter_curve import ParameterCurve
 
@@ -41,7 +42,7 @@ def worth_varying(
         offered: Labels of the effects that may be missing.
     """
     search = answer.found.search
-    courses = [one for one in courses_of(answer) if one.level is not None]
+    courses = _beside(answer, answer.key) or _from_the_nominal(answer)
     if not courses or not search.simulator.written_out:
         return []
     near = [one for one in courses if one.fall.loss <= NEARLY * courses[0].fall.loss]
@@ -51,6 +52,23 @@ def worth_varying(
     laws = [_moved(fitter, fit, curve) for curve in curves] if found else []
     own = [one for one in found if not _is_one_of(_moved(fitter, fit, one), laws)]
     return own[:MOST]
+
+
+def _beside(answer: Answer, key: Key) -> list[Course]:
+    """What changes with a channel beside a set."""
+    return [one for one in courses_of(answer, key) if one.level is not None]
+
+
+def _from_the_nominal(answer: Answer) -> list[Course]:
+    """What changes with a channel and alone leaves half of what all that was named leaves: laws
+    that imitate what changes leave nothing of its shape."""
+    search = answer.found.search
+    if not (isinstance(search.fitter, SmoothFitter) and much_is_left(answer)):
+        return []
+    left = search.tried[answer.key].merit
+    by_noise = search.fitter.noise_alone(answer.found.floor.sigma)
+    most = by_noise + HALF * (left - by_noise)
+    return [one for one in _beside(answer, ()) if one.fall.loss < most]
 
 
 def over_unused(
