@@ -54,8 +54,9 @@ def over_the_log(curve: Curve, fitter: SmoothFitter, simulator: HostSimulator) -
 def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
     """The curves to ask for over what the log holds, if clearly more than noise is left.
 
-    That is where a law of their kind was named; if nothing was, everywhere. A state that settles
-    follows its input, so that a law of the one may be one of the other.
+    That is where a law of their kind was named, or does as well in place of one; if nothing was,
+    everywhere. A state that settles follows its input, so that a law of the one may be one of the
+    other.
 
     Args:
         answer: What was found with the effects on offer.
@@ -65,8 +66,10 @@ def worth_a_curve(answer: Answer, curves: Sequence[Curve]) -> list[Curve]:
     fitter = search.fitter
     if not much_is_left(answer) or not isinstance(fitter, SmoothFitter):
         return []
-    # A simulator's own damping moves like friction at its joint.
+    # A simulator's own damping moves like friction at its joint, and one way so does a load.
     alike = [one.effect for number in key for one in search.twins_of(number)]
+    as_well = {name for claim in answer.claims for name in claim.stand_ins}
+    alike += [one.effect for one in search.candidates if one.label in as_well]
     named = [search.candidates[number].effect for number in key]
     found = []
     for curve in curves:
