@@ -16,8 +16,8 @@ from simgap_files.npz import read_npz, write_npz
 
 Array = NDArray[np.float64]
 
-# Seconds between which times count from 1970, as those of dates do.
-_CALENDAR = 1e8, 1e11
+# Seconds between which times count from 1970, as dates do from 1990 on: days may be counted, too.
+_CALENDAR = 6.3e8, 1e11
 
 
 @dataclasses.dataclass(frozen=True)
@@ -195,6 +195,13 @@ class Trajectory:
     def __repr__(self) -> str:
         seconds = self.times[-1] - self.times[0] if len(self.times) else 0.0
         return f"Trajectory({self.name!r}, {len(self)} steps, {seconds:.4g} s)"
+
+
+def duration_text(seconds: float) -> str:
+    """A length of time in seconds, or in hours or days where there are two of them: ``1 s``."""
+    longer = (pair for pair in ((86400.0, "d"), (3600.0, "h")) if seconds >= 2 * pair[0])
+    size, unit = next(longer, (1.0, "s"))
+    return f"{float(f'{seconds / size:.3g}'):g} {unit}"
 
 
 def moment(seconds: float) -> str:

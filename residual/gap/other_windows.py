@@ -14,6 +14,7 @@ from residual.gap.log import Log
 from residual.gap.longer import LESS, LONGER, longer_horizon, over, slow_error, slow_remainder
 from residual.gap.preparation.horizon import FEWER, WINDOWS, longest_horizon
 from residual.gap.preparation.prepare import Prepared
+from residual.trajectories import duration_text
 from sims.effects.base import Effect
 
 if TYPE_CHECKING:
@@ -70,8 +71,8 @@ class OtherWindows:
         if not explains_the_rest(answer):
             return known
         says = (
-            f"forecasts go over {ready.fitter.seconds:.3g} s: over {search.fitter.seconds:.3g} s, "
-            "of which these records hold more, nothing can be named"
+            f"forecasts go over {duration_text(ready.fitter.seconds)}: of shorter ones, over "
+            f"{duration_text(search.fitter.seconds)}, there are more, but they name nothing"
         )
         return dataclasses.replace(known, prepared=ready, answer=answer, why=says)
 

@@ -10,6 +10,7 @@ from residual.gap.confirmation.certainty import TOO_FEW
 from residual.gap.confirmation.rivals import FEW
 from residual.gap.preparation.horizon import SAMPLES
 from residual.gap.result import OFF, Gap, Verdict
+from residual.trajectories import duration_text
 from sims.effects import Curve
 from sims.effects.actuator import ActuatorEffect
 from studies.gap.numbers import (
@@ -31,7 +32,6 @@ from studies.gap.words import (
     ahead,
     by_place,
     capitalized,
-    duration_text,
     effect_name,
     known_effects,
     listed,

@@ -10,14 +10,13 @@ from matplotlib.figure import Figure as Drawing
 
 from residual.gap import GapResult
 from residual.gap.result import Gap, Rollout, Verdict
-from residual.trajectories import moment
+from residual.trajectories import duration_text, moment
 from sims.effects import Curve, CurveFromZero, ParameterCurve
 from studies.gap.figures import curve, drawn, lags, profile, rollout, shrinking
 from studies.gap.words import (
     CROSS_VALIDATED,
     ahead,
     capitalized,
-    duration_text,
     percent,
     quantity_text,
     unit_text,

@@ -10,6 +10,7 @@ from typing import Any
 
 from residual.gap import GapResult
 from residual.gap.result import Gap, Number, Span
+from residual.trajectories import duration_text
 from sims.effects.base import Effect
 from sims.effects.library import library
 from sims.effects.parameter_curve import ParameterCurve
@@ -189,13 +190,6 @@ def percent(share: float) -> str:
         return "more than 99.9 %"
     close = hundredths < 2 or hundredths > 99
     return f"{hundredths:.1f}".removesuffix(".0") + " %" if close else f"{hundredths:.0f} %"
-
-
-def duration_text(seconds: float) -> str:
-    """A length of time in seconds, or in hours or days where there are two of them: ``1 s``."""
-    longer = (pair for pair in ((86400.0, "d"), (3600.0, "h")) if seconds >= 2 * pair[0])
-    size, unit = next(longer, (1.0, "s"))
-    return f"{float(f'{seconds / size:.3g}'):g} {unit}"
 
 
 def ahead(gap: Gap) -> str:

@@ -6,10 +6,10 @@ import time
 import pytest
 
 from residual.gap.result import Number
+from residual.trajectories import duration_text
 from studies.gap import progress
 from studies.gap.words import (
     by_place,
-    duration_text,
     effect_name,
     number_text,
     percent,
