@@ -92,7 +92,7 @@ def add_pairs_exchanged(search: Search, key: Key) -> None:
 def _rivals(search: Search, key: Key, gone: int, most: int) -> list[tuple[int, Array]]:
     """What may do a member's work, and numbers from which it is fitted."""
     rest, family = all_but(key, gone), search.family(gone)
-    around = search.signatures(rest)
+    around = search.signatures(rest, near=key)
     ranked = gains(around)
     found: dict[int, Array] = {}
     still: set[int] = set()

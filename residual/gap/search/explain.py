@@ -46,7 +46,7 @@ LEAST = 2
 #: Sets that are weighed anew where there is no time to search again.
 LAST = 4
 #: Seconds of processor time for trying those when the time for searching is over, or part of that.
-WEIGHED, AS_LONG = 30.0, 0.5
+WEIGHED, AS_LONG = 60.0, 1.0
 
 #: From the fitter that made a fit, and the fit: the fitter whose channels are weighed by what that
 #: leaves of them, and the noise around it.

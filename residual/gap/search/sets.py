@@ -82,6 +82,7 @@ class Search(Pool):
         self._noise, self.globally = noise, GlobalSearch(noise, until)
         self._from_longer_leads: dict[Key, Array] = {}
         self._signatures: dict[Key, Signatures] = {}
+        self._columns: dict[Key, Array] = {}
         channels = [simulator.physical_channels[c] for c in fitter.samples.measured]
         self.validated: dict[Key, Validated] = {(): validate(fitter, base) if free else self.before}
         self.currency = Currency(self.before.squares, groups(channels))
@@ -146,13 +147,21 @@ class Search(Pool):
         """Whether the time for weighing what was found against its rivals is over, too."""
         return time.process_time() > self.weigh_until
 
-    def signatures(self, key: Key) -> Signatures:
-        """What every candidate would add to a fitted set."""
+    def signatures(self, key: Key, near: Key | None = None) -> Signatures:
+        """What every candidate would add to a fitted set.
+
+        Args:
+            key: The set.
+            near: One like it. What candidates do around that has to do where time is over.
+        """
         if key not in self._signatures:
-            fit = self.tried[key]
+            around = key if near is None or not self.late else near
             screened = self.candidates[: self.screened]
-            columns = self.fitter.columns(fit, screened)
-            self._signatures[key] = signatures(fit, trials(screened), columns)
+            if around not in self._columns:
+                columns = self.fitter.columns(self.tried[around], screened)
+                self._columns = {around: columns}  # of one set: they are large
+            columns = self._columns[around]
+            self._signatures[key] = signatures(self.tried[key], trials(screened), columns)
         return self._signatures[key]
 
     def from_longer_leads(self, key: Key) -> Array:
@@ -236,7 +245,8 @@ class Search(Pool):
         """Forget what was worked out from an earlier fit of a set."""
         for sets in (self.unfit, self.nearly, self.extreme):
             sets.discard(key)
-        for known in (self.refused, self.halved, self._from_longer_leads, self._signatures):
+        by_fit = (self._from_longer_leads, self._signatures, self._columns)
+        for known in (self.refused, self.halved, *by_fit):
             known.pop(key, None)
 
     def add_twin(self, key: Key, gone: int, twin: Candidate) -> None:
