@@ -169,7 +169,8 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
     if result.adequate:
         times = gap.after.value / max(gap.noise_floor.value, 1e-300)
         by = f"forecasts err {times:.3g} times as by noise"
-        found = [by if few else f"no effect of the library is established: {by}"]
+        other = "other " * any(v.kind == "confirmed" for v in result.verdicts)
+        found = [by if few else f"no {other}effect of the library is established: {by}"]
     if few:
         more = duration_text((TOO_FEW - gap.blocks) * gap.horizon_s)
         # Of one or two, shorter ones may have shown nothing.

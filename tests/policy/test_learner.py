@@ -21,7 +21,10 @@ def same(one, other):
         np.testing.assert_array_equal(array, other[name])
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS, ids=["SAC", "TD3"])
+@pytest.mark.parametrize("algorithm", [
+    pytest.param(ALGORITHMS[0], marks=pytest.mark.long, id="SAC"),
+    pytest.param(ALGORITHMS[1], id="TD3"),
+])  # fmt: skip
 def test_another_librarys_algorithm_learns_is_kept_and_repeats(algorithm, tmp_path):
     learners = [algorithm.make(Reach(), 2**40 + 3) for _ in range(2)]
     for learner in learners:
@@ -56,7 +59,9 @@ def test_nothing_is_left_in_the_temporary_folder(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("options", "spread"), [({}, 0.1), ({"action_noise": 0.03}, 0.03)])
+@pytest.mark.parametrize(("options", "spread"), [
+    ({}, 0.1), pytest.param({"action_noise": 0.03}, 0.03, marks=pytest.mark.long),
+])  # fmt: skip
 def test_a_policy_without_noise_of_its_own_explores(options, spread):
     still = SMALL | {"learning_rate": 0.0, "learning_starts": 0}
     learner = Algorithm("stable_baselines3.TD3", options=still | options).make(Reach(), 0)

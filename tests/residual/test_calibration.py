@@ -41,7 +41,9 @@ def test_observation_noise_is_not_scaled():
     assert spread_factor(errors, np.full(20_000, 0.1**2), 0.25) == pytest.approx(3.0, rel=0.15)
 
 
-@pytest.mark.parametrize("function", ["smooth", "with a corner"])
+@pytest.mark.parametrize(
+    "function", [pytest.param("smooth", marks=pytest.mark.long), "with a corner"]
+)
 def test_intervals_in_holes_and_at_the_rim_of_the_data_are_about_right(function):
     def truth(X):
         if function == "smooth":

@@ -50,7 +50,7 @@ def test_training_leaves_the_random_state_of_torch_alone():
     assert torch.equal(before, torch.random.get_rng_state())
 
 
-@pytest.mark.parametrize("dropout", [0.0, 0.1])
+@pytest.mark.parametrize("dropout", [0.0, pytest.param(0.1, marks=pytest.mark.long)])
 def test_learns_a_smooth_function(dropout):
     model = DropoutNet(
         hidden=(100, 100),

@@ -37,12 +37,14 @@ CHECKED = [
     Linear(features="raw"),
     Linear(features="quadratic", alpha=1.0),
     GaussianProcess(max_iter=5, random_state=0),
-    GaussianProcess(max_iter=5, max_points=30, inducing=20, kernel="matern", random_state=0),
     DropoutNet(
         hidden=(32, 32), dropout=0.05, epochs=30, batch_size=32, learning_rate=0.01, random_state=0
     ),
-    DropoutNet(hidden=(32,), dropout=0.0, epochs=30, batch_size=32, paper=True, random_state=0),
     ChannelFeatures(),
+]
+VARIANTS = [
+    GaussianProcess(max_iter=5, max_points=30, inducing=20, kernel="matern", random_state=0),
+    DropoutNet(hidden=(32,), dropout=0.0, epochs=30, batch_size=32, paper=True, random_state=0),
 ]
 
 
@@ -63,6 +65,12 @@ def test_scikit_learn_checks(estimator, check):
     check(estimator)
 
 
+@pytest.mark.long
+@parametrize_with_checks(VARIANTS)
+def test_scikit_learn_checks_of_variants(estimator, check):
+    check(estimator)
+
+
 def small() -> list:
     return [
         Linear(degree=2),
@@ -70,6 +78,11 @@ def small() -> list:
         GaussianProcess(max_iter=20, max_points=50, inducing=30, random_state=0),
         DropoutNet(hidden=(40, 40), epochs=20, batch_size=32, learning_rate=0.01, random_state=0),
     ]
+
+
+def few() -> list:
+    linear, exact, induced, net = small()
+    return [linear, exact, pytest.param(induced, marks=pytest.mark.long), net]
 
 
 def wave(n: int, seed: int = 0, noise: float = 0.0):
@@ -121,7 +134,7 @@ def test_same_seed_same_bits_whatever_the_global_generators_hold(estimator):
     assert torch.get_default_dtype() == torch.float32
 
 
-@pytest.mark.parametrize("estimator", small(), ids=lambda e: type(e).__name__)
+@pytest.mark.parametrize("estimator", few(), ids=lambda e: type(e).__name__)
 @settings(max_examples=3)
 @given(
     scale=st.floats(1e-3, 1e3), shift=st.floats(-1e2, 1e2), unit=st.sampled_from([1e-3, 1.0, 1e4])

@@ -54,6 +54,7 @@ def test_rates_need_no_sensor():
     assert error(model, states) < 0.5
 
 
+@pytest.mark.long
 def test_named_effects_read_the_measured_path_itself():
     measurement = Measurement(noise=(0.01, 0.2))
     data, _ = record(measurement)

@@ -45,7 +45,9 @@ def test_forty_exact_rows_name_the_mass_and_predict_everywhere(model, probe):
     np.testing.assert_allclose(model.predict(*probe), wanted, atol=1e-4)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(0, marks=pytest.mark.long), 1, pytest.param(2, marks=pytest.mark.long)]
+)
 def test_half_a_second_of_exact_rows_is_enough_for_the_mass(seed):
     model = DifferenceModel(NamedEffects(), Pendulum()).fit(rows(Pendulum.true(), 10, seed))
     (effect,) = model.fitted().effects_
@@ -108,7 +110,7 @@ def test_two_effects_from_a_few_dozen_rows():
     assert {e.name for e in found.effects_} == {"mass", "coulomb_friction"}
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.long), 0.01])
 def test_nothing_is_predicted_where_nothing_is_missing(noise, probe):
     simulator = PendulumEquation()
     model = DifferenceModel(NamedEffects(), simulator).fit(rows(simulator, 200, 3, noise))
@@ -121,6 +123,7 @@ def test_nothing_is_predicted_where_nothing_is_missing(noise, probe):
     assert np.all(np.abs(std - wanted) < 0.8 * wanted + 1e-12)
 
 
+@pytest.mark.long
 def test_noisy_rows_still_tell_the_mass():
     model = DifferenceModel(NamedEffects(), PendulumEquation())
     found = model.fit(rows(PendulumEquation.true(), 80, 4, 0.01)).fitted()
@@ -138,6 +141,7 @@ def test_what_a_difference_cannot_hold_stays_unexplained():
     assert (found.residual_ > 0).all()
 
 
+@pytest.mark.long
 def test_a_search_ends_after_as_many_sets_as_may_be(monkeypatch):
     """By their number: a limit of time would give other machines other answers."""
     counts = []
@@ -212,6 +216,7 @@ class Wheel(EquationOfMotion):
         return ((force[:, 0] + u[:, 0] - p.damping * v[:, 0]) / p.inertia)[:, None]
 
 
+@pytest.mark.long
 def test_what_a_simulator_has_too_much_of_is_found_while_angles_turn_fast():
     true = Wheel().with_parameters(damping=0.005)
     rng = np.random.default_rng(0)

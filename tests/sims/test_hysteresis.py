@@ -102,6 +102,7 @@ def logged(width, seed=3):
     return Trajectory("run", 0.1 * np.arange(len(path)), seen, commands[:-1, None])
 
 
+@pytest.mark.long
 def test_find_gap_names_it_and_its_width_and_no_play_where_there_is_none():
     found = find_gap(Valve(), [logged(6.0)])
     play = next(v for v in found.verdicts if v.effect == "hysteresis")

@@ -47,7 +47,9 @@ def told(caplog, *given, episodes=2):
     return [record.getMessage() for record in caplog.records]
 
 
-@pytest.mark.parametrize("begins", [np.pi, -np.pi, 3.2])
+@pytest.mark.parametrize("begins", [
+    pytest.param(np.pi, marks=pytest.mark.long), pytest.param(-np.pi, marks=pytest.mark.long), 3.2,
+])  # fmt: skip
 def test_nothing_is_said_of_one_that_is_as_the_task(caplog, begins):
     assert told(caplog, begins) == []
 

@@ -90,6 +90,7 @@ def test_it_is_looked_for_where_nothing_pulls_by_direction(kind, there):
     assert any(isinstance(effect, Unbalance) for effect in library(kind())) == there
 
 
+@pytest.mark.long
 def test_it_is_named_where_it_shows():
     rng = np.random.default_rng(5)
     runs = [record(0), record(1)]

@@ -83,7 +83,10 @@ def test_what_a_policy_sees_of_a_state_is_what_the_environment_observes(simulato
     np.testing.assert_array_equal(columns.observe(bare), observe(simulator, states))
 
 
-@pytest.mark.parametrize("learner", ["policy.DDPG", "stable_baselines3.SAC"])
+@pytest.mark.parametrize(
+    "learner",
+    ["policy.DDPG", pytest.param("stable_baselines3.SAC", marks=pytest.mark.long)],
+)
 def test_a_loaded_policy_acts_on_states_as_it_did_in_its_rollout(tmp_path, learner, in_memory):
     ours = learner == "policy.DDPG"
     if not ours:
@@ -108,6 +111,7 @@ def test_a_loaded_policy_acts_on_states_as_it_did_in_its_rollout(tmp_path, learn
         loaded[0].act(episode["states"][0])
 
 
+@pytest.mark.long
 def test_kept_steps_know_their_columns_and_have_the_same_bytes(tmp_path, in_memory):
     kept, again = (lift_learnt(ddpg=SMALL, keep=tmp_path / "kept") for _ in range(2))
     state = [700.0, 0.5, -200.0, 0.1]

@@ -54,7 +54,7 @@ def learnt_with(keeper, rule="first"):
     return run_loop(do, BUDGET, PendulumEquation(0.089974))
 
 
-@pytest.fixture(scope="module", params=["first", "all"])
+@pytest.fixture(scope="module", params=["first", pytest.param("all", marks=pytest.mark.long)])
 def learnt(tmp_path_factory, request):
     return request.param, learnt_with(OnDisk(tmp_path_factory.mktemp("kept")), request.param)
 
@@ -108,7 +108,9 @@ def test_all_policies_are_tested_from_the_same_starts(outcome):
     np.testing.assert_array_equal(starts, starts[:1].repeat(len(starts), axis=0))
 
 
-@pytest.mark.parametrize(("start_at", "count"), [("anywhere", 5), ("hanging", 1)])
+@pytest.mark.parametrize(
+    ("start_at", "count"), [pytest.param("anywhere", 5, marks=pytest.mark.long), ("hanging", 1)]
+)
 def test_there_are_several_starts_where_they_differ(start_at, count):
     task = SwingUp(horizon=20, start_at=start_at)
     found = quickly(PendulumEquation(), PendulumEquation.true(), task)
@@ -176,6 +178,7 @@ def quickly(nominal, true, task, estimator=LINEAR, **options):
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_true_system_with_hidden_memory_is_learnt_and_measured():
     class Named(SwingUp):
         def reward(self, states, actions, next_states):
@@ -250,6 +253,7 @@ def test_what_named_effects_named_is_told(called, tmp_path):
     assert record["says"] in page.replace("\u00a0", " ")
 
 
+@pytest.mark.long
 def test_an_estimator_that_has_a_length_is_taken_as_well():
     """An ensemble of trees that is not fitted yet has no length, and asking for it raises."""
     trees = ExtraTreesRegressor(3, random_state=0)
@@ -268,11 +272,7 @@ def test_settings_of_another_learner_are_not_taken_in_silence():
 @pytest.mark.parametrize(
     ("name", "given", "says"),
     [
-        (
-            "estimator",
-            "residual.Linear",
-            r"'residual.Linear', expected .*=residual.Linear",
-        ),
+        ("estimator", "residual.Linear", r"'residual.Linear', expected .*=residual.Linear"),
         ("estimator", Linear, r"estimator is the class Linear, expected an object"),
         ("evaluation", {}, r"evaluation is {}, expected .*EvaluationProtocol\("),
         ("ddpg", {"hidden": (8, 8)}, r"expected .*ddpg=DDPGConfig\("),

@@ -25,6 +25,11 @@ from studies.judging.forecasts import plan, relative_error, root_mean_squares
 
 SHARP = Sensors(noise=0.0, coloured=0.0)
 LABELS = [(system, label) for system, labels in HIDDEN.items() for label in labels]
+#: Of these, every run of the suite takes the ones of two systems.
+QUICK = [
+    pytest.param(*one, marks=[] if one[0] in ("arm", "oven") else [pytest.mark.long])
+    for one in LABELS
+]
 
 
 @pytest.fixture
@@ -44,7 +49,7 @@ def test_a_clean_truth_moves_as_the_nominal_simulator(system):
     assert relative_error(simulator, groups) < 1e-4
 
 
-@pytest.mark.parametrize(("system", "label"), LABELS)
+@pytest.mark.parametrize(("system", "label"), QUICK)
 def test_a_hidden_effect_is_what_the_library_calls_so(system, label, short_records):
     """With the library's effect at the true strength, nothing is left."""
     name, _, where = label.partition("@")
@@ -101,7 +106,10 @@ def test_sets_are_repeatable_and_held_runs_are_others(short_records):
     assert all(0.005 < abs(off) < 0.035 for off in a.truth.off.values())
 
 
-@pytest.mark.parametrize("label", ["viscous_friction@shoulder", "mass", "delay@torque"])
+@pytest.mark.parametrize("label", [
+    pytest.param("viscous_friction@shoulder", marks=pytest.mark.long), "mass",
+    pytest.param("delay@torque", marks=pytest.mark.long),
+])  # fmt: skip
 def test_the_oracle_finds_the_strength_amid_the_dirt(label):
     made = make_set({"system": "arm", "hidden": label, "size": 6.0, "layout": "many", "seed": 11})
     fit = plan(made.simulator, made.logs, made.horizon, LEAD * made.horizon, 20)

@@ -122,6 +122,7 @@ def test_verdict_table_evidence_report_and_file_tell_the_same(record, found):
     assert load_simulator(folder / "corrected.yaml").effects == result.effects
 
 
+@pytest.mark.long
 def test_records_set_aside_are_judged_and_change_nothing_else(record, settings, tmp_path):
     held = record["held_out"]["by_channel"]["angle"]
     assert held["after"]["value"] < 0.1 * held["before"]["value"]
@@ -133,6 +134,7 @@ def test_records_set_aside_are_judged_and_change_nothing_else(record, settings, 
     assert plain["verdicts"] == record["verdicts"] and plain["gap"] == record["gap"]
 
 
+@pytest.mark.long
 def test_the_order_of_the_files_changes_no_digit(record, settings, tmp_path):
     run({**settings, "logs": settings["logs"][::-1]}, tmp_path / "back")
     back = json.loads((tmp_path / "back" / "gap.json").read_text())
@@ -162,6 +164,7 @@ def test_the_corrected_simulator_loads_from_any_folder_without_a_file(found, tmp
     assert json.loads(done.stdout) == wanted.tolist()
 
 
+@pytest.mark.long
 def test_a_hold_by_input_goes_into_the_corrected_simulator(settings, tmp_path):
     # A lag happens before an input that was measured at the actuator, so it is no candidate.
     asked = {**settings, "effects": ["mass", "actuator_lag"], "hold": {"voltage": "linear"}}
@@ -201,12 +204,14 @@ def test_the_same_settings_give_the_same_numbers(record, logs, tmp_path):
     assert again["gap"] == record["gap"] and again["verdicts"] == record["verdicts"]
 
 
+@pytest.mark.long
 def test_an_error_that_does_not_matter_is_said_not_to(settings, tmp_path, capsys):
     arguments = ["--simulator", EQUATION, "--output", str(tmp_path / "g"), "--tolerance", "100"]
     main([*arguments, "--effects", *FEW, "--logs", *settings["logs"]])
     assert capsys.readouterr().out.strip().startswith("Nothing that matters: the ")
 
 
+@pytest.mark.long
 def test_classes_in_the_current_folder_need_no_registration(logs, tmp_path):
     (tmp_path / "mine.py").write_text(
         "import dataclasses\n"

@@ -23,8 +23,11 @@ TINY = [
 @pytest.mark.parametrize(
     "sensors",
     [
-        ["--measure.noise", "0.01", "0.2"],
-        ["--measure.noise", "0.01", "0.2", "--measure.unmeasured", "rate"],
+        pytest.param(["--measure.noise", "0.01", "0.2"], marks=pytest.mark.long),
+        pytest.param(
+            ["--measure.noise", "0.01", "0.2", "--measure.unmeasured", "rate"],
+            marks=pytest.mark.long,
+        ),
         ["--measure.steps", "0.0015", "0", "--measure.unmeasured", "rate", "--measure.delay", "1"],
     ],
     ids=["noise", "no rate", "steps, late, no rate"],

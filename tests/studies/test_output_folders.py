@@ -42,6 +42,7 @@ def ended(capsys, *arguments):
     return end.value.code, capsys.readouterr().err.strip().splitlines()[-1]
 
 
+@pytest.mark.long
 def test_a_folder_holds_one_run(tmp_path, systems, capsys):
     out = tmp_path / "out"
     one = ["--system", "brought.ONE", *QUICK, "--output", str(out)]

@@ -145,6 +145,7 @@ def test_a_study_killed_again_and_again_ends_with_the_same_results(tmp_path):
     assert results(tmp_path / "run") == results(tmp_path / "undisturbed")
 
 
+@pytest.mark.long
 def test_an_estimator_of_ones_own_needs_no_registration(tmp_path, monkeypatch):
     (tmp_path / "my_nearest.py").write_text(
         "import numpy as np\n"
@@ -192,6 +193,7 @@ def test_a_wrong_argument_gets_one_line_and_exit_code_2(arguments, names, tmp_pa
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.long
 def test_a_grid_runs_every_trial_and_reports_failed_ones(tmp_path, monkeypatch, capsys):
     (tmp_path / "grid.yaml").write_text(
         "budget: {iterations: 1, idealised_steps: 250, difference_steps: 250}\n"

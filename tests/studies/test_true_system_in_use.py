@@ -40,6 +40,7 @@ class Loose(Foreign):
         return super().step(action)
 
 
+@pytest.mark.long
 def test_what_was_trained_is_kept_if_the_robot_fails_in_a_test(tmp_path, monkeypatch):
     monkeypatch.setattr(Loose, "taken", 0)
     monkeypatch.setattr(Loose, "loose_at", 10)
@@ -68,7 +69,11 @@ def with_loose(folder):
 
 @pytest.mark.parametrize(
     "loose_at",
-    [pytest.param(1 + 45, marks=pytest.mark.long), 1 + 150 + 35, 1 + 150 + 60 + 150 + 40],
+    [
+        pytest.param(1 + 45, marks=pytest.mark.long),
+        pytest.param(1 + 150 + 35, marks=pytest.mark.long),
+        1 + 150 + 60 + 150 + 40,
+    ],
 )
 def test_a_robot_that_breaks_off_costs_the_episode_at_hand(whole, tmp_path, monkeypatch, loose_at):
     whole, needed, kept = whole
@@ -105,6 +110,7 @@ def test_every_step_of_the_true_system_is_counted(monkeypatch):
     assert tested + learnt.accuracy[0]["rollout_steps"] + 60 + 1 == Loose.taken
 
 
+@pytest.mark.long
 def test_what_the_true_system_warns_of_stands_in_the_report(tmp_path):
     class Cut(Foreign):
         def step(self, action):
@@ -119,6 +125,7 @@ def test_what_the_true_system_warns_of_stands_in_the_report(tmp_path):
     assert "tests and accuracy on the truth" in page
 
 
+@pytest.mark.long
 def test_the_true_samples_are_runs_that_find_gap_takes():
     options = QUICK | {"samples": 300}
     heavy = PendulumEquation().with_parameters(mass=0.08)

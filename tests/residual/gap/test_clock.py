@@ -115,6 +115,7 @@ def runs() -> list[Trajectory]:
     return slides()
 
 
+@pytest.mark.long
 def test_what_there_is_no_time_for_is_one_note_and_leaves_the_form_open(runs, monkeypatch):
     monkeypatch.setattr(Clock, "searched", property(lambda _: True))
     result = find_gap(Slide(), runs, minutes=0.2)

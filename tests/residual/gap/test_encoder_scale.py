@@ -85,7 +85,10 @@ def test_it_moves_as_a_gain_where_all_is_in_proportion():
     assert twins(Motor()) and not twins(Swing())
 
 
-@pytest.mark.parametrize("of_speed", [1.06, 1.0], ids=["both read so", "the speed is right"])
+@pytest.mark.parametrize("of_speed", [
+    pytest.param(1.06, marks=pytest.mark.long, id="both read so"),
+    pytest.param(1.0, id="the speed is right"),
+])  # fmt: skip
 def test_an_encoder_that_counts_too_much_is_named(of_speed):
     """Where the speed is right, a gain of that size was named in its place, and was certain."""
     result = find_gap(Swing(), logs(Swing, 1.06, of_speed))
@@ -102,12 +105,14 @@ def named(result):
     return one
 
 
+@pytest.mark.long
 def test_a_gain_as_large_as_two_sensors_disagree_is_not_certain():
     one = named(find_gap(Motor(), logs(Motor, 1.15)))
     assert (one.kind, one.label) == ("ambiguous", "actuator_gain@volts")
     assert one.doubts == ("conventions",) and "encoder_scale@angle" in one.alternatives
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("of_speed", [1.0, 1.04], ids=["both agree", "the speed reads more"])
 def test_another_gain_is(of_speed):
     one = named(find_gap(Motor(), logs(Motor, 1.0, of_speed, gain=1.15)))
@@ -115,6 +120,7 @@ def test_another_gain_is(of_speed):
     assert one.parameters["gain"].value == pytest.approx(0.15, abs=0.01)
 
 
+@pytest.mark.long
 def test_a_speed_that_reads_too_much_leaves_no_gap():
     result = find_gap(Motor(), logs(Motor, 1.0, 1.15))
     assert result.verdicts[0].kind == "no_gap" and not any(v.parameters for v in result.verdicts)

@@ -47,7 +47,7 @@ def stepped(time_constant, wander=0.0):
     return Trajectory("steps", 0.005 * np.arange(len(seen)), states, drive[:-1, None])
 
 
-@pytest.mark.parametrize("wander", [0.0, 0.03])
+@pytest.mark.parametrize("wander", [0.0, pytest.param(0.03, marks=pytest.mark.long)])
 def test_a_motor_that_is_twenty_times_faster_than_its_data_sheet_is_named(wander):
     found = find_gap(Motor(), [stepped(0.005, wander)], effects=OFFERED)
     first = found.verdicts[0]
@@ -56,6 +56,7 @@ def test_a_motor_that_is_twenty_times_faster_than_its_data_sheet_is_named(wander
     assert first.parameters["change"].low < -0.095 < first.parameters["change"].high
 
 
+@pytest.mark.long
 def test_it_is_not_believed_where_much_of_the_motion_is_left():
     found = find_gap(Motor(), [stepped(0.005, wander=0.3)], effects=OFFERED)
     assert not any(verdict.effect == "time_constant" for verdict in found.verdicts)
@@ -63,6 +64,7 @@ def test_it_is_not_believed_where_much_of_the_motion_is_left():
     assert any("times its nominal value" in reason for reason in reasons)
 
 
+@pytest.mark.long
 def test_what_it_would_do_alone_is_told():
     found = find_gap(Motor(), [stepped(0.005, wander=0.2)], effects=OFFERED)
     assert not any(verdict.effect == "time_constant" for verdict in found.verdicts)

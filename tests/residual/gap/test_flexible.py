@@ -112,6 +112,7 @@ def test_a_shaft_that_twists_shows_in_the_speed_of_the_motor():
         assert number.value == pytest.approx(true, rel=0.15)
 
 
+@pytest.mark.long
 def test_a_sled_without_a_spring_has_none():
     runs = []
     rng = np.random.default_rng(3)

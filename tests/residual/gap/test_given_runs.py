@@ -89,6 +89,7 @@ def test_settings_that_are_no_numbers_or_beyond_their_range_are_refused(settings
         find_gap(PendulumEquation(), noisy(), **settings)
 
 
+@pytest.mark.long
 def test_one_effect_by_name_is_a_list_of_one():
     one, listed = (
         find_gap(PendulumEquation(), noisy(), effects=effects) for effects in ("mass", ["mass"])

@@ -45,7 +45,9 @@ def log(conductance, wall, seed=0):
     return Trajectory("oven", DT * np.arange(len(air)), air, power[:, None])
 
 
-@pytest.mark.parametrize(("conductance", "wall"), [(8.0, 1600.0), (4.0, 400.0)])
+@pytest.mark.parametrize(
+    ("conductance", "wall"), [pytest.param(8.0, 1600.0, marks=pytest.mark.long), (4.0, 400.0)]
+)
 def test_a_wall_is_named_with_its_rate_and_time(conductance, wall):
     found = find_gap(Oven(), [log(conductance, wall)])
     (named,) = [verdict for verdict in found.verdicts if verdict.parameters]

@@ -88,6 +88,7 @@ def named(logs):
     return {(v.effect, v.where): v for v in found.verdicts if v.kind in ("confirmed", "ambiguous")}
 
 
+@pytest.mark.long
 def test_what_both_have_is_named_once_and_what_one_has_is_named_there():
     found = named([drive(seed) for seed in range(2)])
     assert set(found) == {("delay", "left and right"), ("actuator_gain", "left and right")}

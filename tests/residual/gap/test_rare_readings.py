@@ -60,7 +60,10 @@ def test_rows_of_a_thinned_log_are_those_with_readings():
     np.testing.assert_array_equal(whole.times, whole.times[0] + 0.04 * np.arange(len(whole)))
 
 
-@pytest.mark.parametrize("every", [(1, 1), (5, 5), (7, 3), (20, 1), (1, 20)])
+@pytest.mark.parametrize("every", [
+    pytest.param((1, 1), marks=pytest.mark.long), (5, 5), (7, 3),
+    pytest.param((20, 1), marks=pytest.mark.long), pytest.param((1, 20), marks=pytest.mark.long),
+])  # fmt: skip
 def test_noise_is_told_from_motion(every):
     run = log([ConstantLoad("pivot", 0.005)], every)
     ready = prepare(PendulumEquation(dt=0.01), [run], 1.0)
@@ -82,6 +85,7 @@ def test_an_answer_does_not_take_every_row_for_a_reading(effects, kind):
         assert len(result.effects) == len(effects)
 
 
+@pytest.mark.long
 def test_what_noise_alone_makes_is_not_put_down_to_parameters():
     """A hundred readings of the angle alone: 46 % of the "gap" were parameters off by 0.1 %."""
     run = log(every=(20, 1))

@@ -42,6 +42,7 @@ def heated(lag, rise, rows=260, seed=0):
                       np.array(powers)[:-1, None])  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_step_from_rest_is_asked_with_lags_beside_what_was_not_chosen():
     """Taken to have gone on before, it leads to a delay and twice the time constant."""
     offered = ("actuator_lag", "delay", "actuator_gain", "rise", "time_constant", "constant_load")
@@ -77,6 +78,7 @@ def wheel(speeds, duties, seed=0):
     return Trajectory(f"run {seed}", 0.02 * np.arange(rows), seen[:, None], duties[:-1, None])
 
 
+@pytest.mark.long
 def test_when_an_input_came_on_that_never_changes_is_not_certain():
     times = 0.02 * np.arange(300)
     speeds = 24.0 * (1 - np.exp(-np.maximum(times - 0.1, 0.0) / 0.2))

@@ -73,9 +73,8 @@ def cut(log, row):
     ]
 
 
-@pytest.mark.parametrize(
-    "row", [None, pytest.param(90, marks=pytest.mark.long)], ids=["one record", "cut in two"]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("row", [None, 90], ids=["one record", "cut in two"])
 def test_three_that_help_only_together_are_found(row):
     log = levels(0)
     found = find_gap(Tanks(), cut(log, row) if row else [log], effects=OFFERED)

@@ -50,7 +50,7 @@ def log(conductance, seed=0):
     return Trajectory("bodies", times, seen, steps[:, None])
 
 
-@pytest.mark.parametrize("conductance", [0.015, 0.05])
+@pytest.mark.parametrize("conductance", [pytest.param(0.015, marks=pytest.mark.long), 0.05])
 def test_an_exchange_is_named_with_both_rates(conductance):
     found = find_gap(Apart(), [log(conductance)])
     (named,) = [verdict for verdict in found.verdicts if verdict.parameters]

@@ -28,14 +28,8 @@ def kinds(found):
     return [v.kind for v in found.verdicts if v.kind in ANSWERS]
 
 
-@pytest.mark.parametrize(
-    ("excitation", "kind"),
-    [
-        ("weak", "B"),
-        pytest.param("strong", "A", marks=pytest.mark.long),
-        pytest.param("policy", "A", marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("excitation", "kind"), [("weak", "B"), ("strong", "A"), ("policy", "A")])
 def test_no_gap_is_said_when_there_is_none(excitation, kind):
     found = answer(Truth(), excitation=excitation, kind=kind, runs=3)
     assert kinds(found) == ["no_gap"]
@@ -43,22 +37,21 @@ def test_no_gap_is_said_when_there_is_none(excitation, kind):
     assert found.gap.after == found.gap.before
 
 
-def effect(truth, kind, name, field, value, *marks):
-    return pytest.param(truth, kind, name, field, value, marks=marks, id=f"{name}-{kind}")
+def effect(truth, kind, name, field, value):
+    return pytest.param(truth, kind, name, field, value, id=f"{name}-{kind}")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("truth", "kind", "effect", "field", "value"),
     [
         # With rates; with an angle in steps and no rate; with a noisy angle alone.
         effect(Truth(mass=0.3), "A", "mass", "change", 0.3 * 0.055),
-        effect(
-            Truth(coulomb_friction=3e-4), "B", "coulomb_friction", "level", 3e-4, pytest.mark.long
-        ),
-        effect(Truth(delay=0.04), "C", "delay", "time", 0.04, pytest.mark.long),
-        effect(Truth(sensor_offset=0.1), "A", "sensor_offset", "offset", 0.1, pytest.mark.long),
-        effect(Truth(saturation=2.2), "A", "saturation", "level", 2.2, pytest.mark.long),
-        effect(Truth(backlash=0.35), "A", "backlash", "width", 0.35, pytest.mark.long),
+        effect(Truth(coulomb_friction=3e-4), "B", "coulomb_friction", "level", 3e-4),
+        effect(Truth(delay=0.04), "C", "delay", "time", 0.04),
+        effect(Truth(sensor_offset=0.1), "A", "sensor_offset", "offset", 0.1),
+        effect(Truth(saturation=2.2), "A", "saturation", "level", 2.2),
+        effect(Truth(backlash=0.35), "A", "backlash", "width", 0.35),
     ],
 )
 def test_hidden_effect_is_named_and_measured(truth, kind, effect, field, value):
@@ -90,6 +83,7 @@ def test_what_is_not_in_the_library_stays_unexplained():
     assert "confirmed" not in kinds(found)
 
 
+@pytest.mark.long
 def test_what_is_removed_from_the_library_is_called_unexplained():
     simulator = PendulumEquation()
     rivals = ("mass", "gravity", "coulomb_friction", "dead_zone", "actuator_lag", "saturation")
@@ -126,12 +120,14 @@ def test_corrected_simulator_forecasts_like_the_truth():
     )
 
 
+@pytest.mark.long
 def test_the_same_logs_give_the_same_answer():
     first, second = (answer(Truth(inertia=0.2), runs=4, effects=few()) for _ in range(2))
     assert first.verdicts == second.verdicts
     assert first.gap == second.gap
 
 
+@pytest.mark.long
 def test_records_set_aside_only_judge():
     logs = make_logs(Truth(inertia=0.3), 11, "strong", "A", 6)
     options = {"effects": few(), "hold": "zero", "minutes": 20.0}
@@ -143,7 +139,10 @@ def test_records_set_aside_only_judge():
     assert judged.held_out.after.value < 0.6 * judged.held_out.before.value
 
 
-@pytest.mark.parametrize(("inertia", "doubt"), [(-0.3, "set_aside"), (0.13, "no_help")])
+@pytest.mark.parametrize(
+    ("inertia", "doubt"),
+    [pytest.param(-0.3, "set_aside", marks=pytest.mark.long), (0.13, "no_help")],
+)
 def test_nothing_is_certain_that_records_set_aside_speak_against(inertia, doubt):
     """They are of a lighter rotor, or of one between the nominal one and the heavier one."""
     logs = make_logs(Truth(inertia=0.3), 11, "strong", "A", 4)
@@ -154,6 +153,7 @@ def test_nothing_is_certain_that_records_set_aside_speak_against(inertia, doubt)
     assert first.doubts == (doubt,)
 
 
+@pytest.mark.long
 def test_a_single_record_with_uneven_sampling():
     simulator = PendulumEquation(mass=0.07)
     rng = np.random.default_rng(5)
@@ -172,6 +172,7 @@ def test_a_single_record_with_uneven_sampling():
     assert abs(number.value - 0.015) < 2 * (number.high - number.low)
 
 
+@pytest.mark.long
 def test_a_dead_channel_hides_nothing():
     """A constant column is taken as not measured, and the others still count."""
     logs = make_logs(Truth(inertia=0.3), 11, "strong", "A", 4)

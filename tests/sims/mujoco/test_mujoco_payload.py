@@ -93,6 +93,7 @@ def test_a_body_balanced_in_its_frame_can_get_another_centre(tmp_path):
     assert after[1] == pytest.approx(2 * 9.81 * 0.05 / inertia * wheel.dt, rel=1e-2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["payload at tip of body fore", "mass of body fore"])
 def test_a_weight_at_the_tip_and_a_heavier_link_are_told_apart(name):
     arm = robot("arm2")

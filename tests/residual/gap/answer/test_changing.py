@@ -55,6 +55,7 @@ def ask(*records):
     return find_gap(Trolley(), list(records), effects=ASKED, minutes=1)
 
 
+@pytest.mark.long
 def test_a_spring_that_weakens_about_its_nominal_is_told_with_both_ends():
     result = ask(*(record(seed, lambda part: 23.0 - 6.0 * part) for seed in (0, 1)))
     found = result.changing
@@ -67,7 +68,7 @@ def test_a_spring_that_weakens_about_its_nominal_is_told_with_both_ends():
     assert gap_record(result, {})["changing"]["label"] == "stiffness"
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.8])
+@pytest.mark.parametrize("friction", [0.0, pytest.param(0.8, marks=pytest.mark.long)])
 def test_what_stays_the_same_changes_nothing(friction):
     """Also where something is missing, and named."""
     assert ask(*(record(seed, lambda _: 20.0, friction) for seed in (2, 3))).changing is None
@@ -87,6 +88,7 @@ def test_what_laws_only_imitate_is_told_in_their_place():
     assert "in place of all that is named" in " ".join(summary(found).split())
 
 
+@pytest.mark.long
 def test_what_is_different_in_the_middle_of_a_record_is_no_change_along_it():
     """A stiffness that comes and goes twice in a record."""
     records = [record(seed, lambda part: 20 + 4 * np.sin(4 * np.pi * part)) for seed in (4, 5)]

@@ -9,7 +9,9 @@ from sims.pendulum_equation import PendulumEquation
 from studies.gap.lead import lead
 
 
-@pytest.mark.parametrize(("noise", "kind"), [(3.0, "unexplained"), (0.02, "no_gap")])
+@pytest.mark.parametrize(
+    ("noise", "kind"), [(3.0, "unexplained"), pytest.param(0.02, "no_gap", marks=pytest.mark.long)]
+)
 def test_noise_as_large_as_the_motion_is_told(noise, kind):
     pendulum, rng = PendulumEquation(), np.random.default_rng(0)
     inputs = np.repeat(rng.uniform(-1.0, 1.0, (40, 1)), 10, axis=0)

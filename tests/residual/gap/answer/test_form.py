@@ -16,11 +16,12 @@ def friction(effects, **hidden):
     return found, next(v for v in found.verdicts if v.where == "place")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("effect", "hidden"),
     [
         ("viscous_friction", {"drag": 0.025}),
-        pytest.param("quadratic_drag", {"damping": lambda place: 1.04}, marks=pytest.mark.long),
+        ("quadratic_drag", {"damping": lambda place: 1.04}),
     ],
 )
 def test_a_form_that_the_data_reject_is_undecided(effect, hidden):

@@ -43,12 +43,14 @@ def test_parameters_that_are_exact_are_not_moved():
     assert not found.effects
 
 
+@pytest.mark.long
 def test_what_pulls_all_parameters_to_their_ends_is_no_calibration():
     found = answer(Truth(mass=0.3), effects=[])
     assert [v.kind for v in found.verdicts] == ["unexplained"]
     assert found.gap.after.value == found.gap.before.value
 
 
+@pytest.mark.long
 def test_an_effect_is_named_beside_parameters_that_are_off():
     found = answer(Truth(**OFF, coulomb_friction=5e-4), effects=[CoulombFriction("pivot")])
     first = found.verdicts[0]

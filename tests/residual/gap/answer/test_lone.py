@@ -61,6 +61,7 @@ def test_what_the_rest_of_the_log_shows_is_named(monkeypatch):
     assert said.endswith("It was left out of everything that is said")
 
 
+@pytest.mark.long
 def test_what_is_left_in_one_stretch_beside_a_name_is_told():
     (said,) = with_a_stretch(by_hand)
     assert "of the squared error that is left lies in one stretch, run 2 from" in said
@@ -155,6 +156,7 @@ def stretches(leak):
     return [one.says for one in found.quality if "stretches" in one.says]
 
 
+@pytest.mark.long
 def test_what_happens_now_and_then_is_told_with_its_times():
     said = stretches(0.5)
     assert len(said) == 1 and "Did something happen there" in said[0]

@@ -80,7 +80,9 @@ def test_a_brake_that_weakens_with_speed_is_a_curve(braked):
     assert braked.gap.share.value > 0.999
 
 
-@pytest.mark.parametrize("name", ["friction_curve", "friction_curve@speed"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("friction_curve", marks=pytest.mark.long), "friction_curve@speed"]
+)
 def test_a_curve_may_be_asked_for_by_name(name):
     logs = [log(eddy_brake, 0)]
     found = find_gap(Rotor(), logs, effects=("coulomb_friction", name))
@@ -97,6 +99,7 @@ def test_a_curve_with_more_numbers_than_the_log_can_tell_is_told():
     assert any("input_curve@torque was not tried" in one.says for one in found.quality)
 
 
+@pytest.mark.long
 def test_it_explains_records_set_aside(braked):
     assert braked.held_out.after.value < 0.02 * braked.held_out.before.value
 
@@ -107,6 +110,7 @@ def test_what_the_library_has_is_named_by_it():
     assert [v.effect for v in viscous.verdicts if v.kind == "confirmed"] == ["viscous_friction"]
 
 
+@pytest.mark.long
 def test_a_remainder_that_does_not_follow_speed_leaves_the_laws_of_the_library():
     def shaken(seed):
         clean = log(lambda v: 2.0 * v, seed)
@@ -119,6 +123,7 @@ def test_a_remainder_that_does_not_follow_speed_leaves_the_laws_of_the_library()
     assert "viscous_friction" in {v.effect for v in found.verdicts}
 
 
+@pytest.mark.long
 def test_a_damping_of_the_simulator_s_own_makes_no_difference():
     offered = ("viscous_friction", "quadratic_drag", "coulomb_friction", "damping")
     found = find_gap(DampedRotor(), [log(eddy_brake, 0)], effects=offered)
@@ -197,6 +202,7 @@ def test_a_magnet_that_repels_far_out_is_a_force_by_position():
     assert found.gap.after.value < 1.3 * found.gap.noise_floor.value
 
 
+@pytest.mark.long
 def test_torricelli_s_outflow_is_a_rate_by_the_level():
     def rhs(x, u):
         return [0.005 * u - 0.012 * np.sqrt(max(x[0], 0))]
@@ -213,6 +219,7 @@ def test_torricelli_s_outflow_is_a_rate_by_the_level():
         assert curve.at(x) - 0.01 * x == pytest.approx(-0.012 * np.sqrt(x), rel=0.05)
 
 
+@pytest.mark.long
 def test_a_thruster_that_flattens_is_a_curve_by_command():
     def rhs(x, u):
         return [x[1], 8 * np.tanh(0.25 * u) - 20 * x[0] - x[1]]
@@ -227,6 +234,7 @@ def test_a_thruster_that_flattens_is_a_curve_by_command():
         assert curve.shape(u) == pytest.approx(8 * np.tanh(0.25 * u), abs=0.15)
 
 
+@pytest.mark.long
 def test_where_a_law_was_left_out_its_curve_is_left_out_too():
     logs = [log(eddy_brake, 0)]
     found = find_gap(Rotor(), logs, effects=("viscous_friction", "coulomb_friction"))

@@ -54,7 +54,7 @@ def test_its_frequency_and_size_are_told(disturbed):
     assert gap_record(disturbed, {})["periodic"]["joint"] == "place"
 
 
-@pytest.mark.parametrize("swings", [None, 0.7])
+@pytest.mark.parametrize("swings", [pytest.param(None, marks=pytest.mark.long), 0.7])
 def test_friction_that_is_missing_repeats_no_more_than_its_drive(swings):
     assert ask(runs(friction=1.5, swings=swings)).periodic is None
 

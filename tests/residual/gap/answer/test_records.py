@@ -69,7 +69,11 @@ def test_what_is_the_same_in_all_records_is_named_beside_what_differs():
 
 @pytest.mark.parametrize(
     "truth",
-    [Truth(), Truth(mass=0.2), pytest.param(Truth(wind=4e-3), marks=pytest.mark.long)],
+    [
+        Truth(),
+        pytest.param(Truth(mass=0.2), marks=pytest.mark.long),
+        pytest.param(Truth(wind=4e-3), marks=pytest.mark.long),
+    ],
     ids=["nothing", "mass", "wind"],
 )
 def test_records_that_agree_are_not_said_to_differ(truth):
@@ -90,6 +94,7 @@ def test_loads_of_a_lift_are_told_in_place_of_what_makes_the_best_of_them():
     assert "and nothing else is added, 99.1 % of the gap has a name" in lead(found)
 
 
+@pytest.mark.long
 def test_nothing_is_said_of_a_single_record():
     (run,) = make_logs(Truth(wind=4e-3), 5, "strong", "A", runs=1, steps=300)
     assert ask([run]).unlike == ()

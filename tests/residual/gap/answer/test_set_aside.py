@@ -29,6 +29,7 @@ def runs():
     return make_logs(Truth(mass=0.2), 3, "strong", "A", runs=6)
 
 
+@pytest.mark.long
 def test_their_noise_is_that_of_their_own_channels(runs):
     fitted, held = runs[:4], runs[4:]
     both = ask(fitted, held).held_out.by_channel
@@ -40,6 +41,7 @@ def test_their_noise_is_that_of_their_own_channels(runs):
     assert both["angle"].noise_floor.value < 0.2 * both["rate"].noise_floor.value
 
 
+@pytest.mark.long
 def test_what_only_they_measure_is_not_judged(runs):
     found = ask(measuring(runs[:4], ANGLE), runs[4:])
     assert set(found.held_out.by_channel) == {"angle"}

@@ -41,6 +41,7 @@ def record(rate, pieces):
     return Trajectory("run", 0.25 * np.arange(len(seen)), seen, actions)
 
 
+@pytest.mark.long
 def test_a_time_constant_many_times_off_that_follows_the_flow_is_named_as_that():
     """Near the simulator's own value the linear picture shows nothing of it."""
     pieces = [

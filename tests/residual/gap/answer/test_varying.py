@@ -73,6 +73,7 @@ def test_a_resistance_that_rises_as_it_warms_is_confirmed_at_its_size():
     assert "Resistance that changes with temp: change −0.1" in told and "degC" in told
 
 
+@pytest.mark.long
 def test_a_parameter_that_nobody_asks_for_is_no_curve():
     result = find_gap(Motor(), motor(1, 0.0039), effects=("inertia", "coulomb_friction"))
     assert not any(isinstance(effect, ParameterCurve) for effect in result.effects)

@@ -126,7 +126,9 @@ def spun_down(noise, rows, seed):
     return rotor, runs
 
 
-@pytest.mark.parametrize(("noise", "rows", "seed"), [(0.005, 110, 2), (0.02, 90, 1)])
+@pytest.mark.parametrize(
+    ("noise", "rows", "seed"), [(0.005, 110, 2), pytest.param(0.02, 90, 1, marks=pytest.mark.long)]
+)
 def test_too_much_damping_is_found_beside_friction_that_is_missing(noise, rows, seed):
     """Each of the two alone makes nothing better: at high speed the one makes up for the other.
 
@@ -141,7 +143,9 @@ def test_too_much_damping_is_found_beside_friction_that_is_missing(noise, rows, 
     assert found["damping"].parameters["change"].value == pytest.approx(-1.4e-5, rel=0.2)
 
 
-@pytest.mark.parametrize(("damping", "label"), [(0.5, "damping"), (1.6, "viscous_friction@speed")])
+@pytest.mark.parametrize(("damping", "label"), [
+    (0.5, "damping"), pytest.param(1.6, "viscous_friction@speed", marks=pytest.mark.long),
+])  # fmt: skip
 def test_damping_that_is_too_large_is_found_as_one_that_is_too_small(damping, label):
     result = find_gap(Wheel(), logs(Wheel(), relaxing(4.0, damping, 0.1), -10.0))
     (verdict,) = [v for v in result.verdicts if v.effect]
@@ -151,6 +155,7 @@ def test_damping_that_is_too_large_is_found_as_one_that_is_too_small(damping, la
     assert {"viscous_friction@speed", "damping"} - {label} <= set(verdict.same_motion)
 
 
+@pytest.mark.long
 def test_a_leak_is_a_loss_in_proportion():
     result = find_gap(Tank(), logs(Tank(), relaxing(0.4, 0.05, 2.0), 0.0))
     (verdict,) = [v for v in result.verdicts if v.effect]

@@ -25,7 +25,7 @@ OFFERED = ("actuator_lag", "delay", "actuator_gain", "slow")
 TESTS = [steps(s, [duty], 0.0, hold=120) for s, duty in enumerate((0.4, 0.8, 0.6, 1.0))]
 
 
-@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("turned", [pytest.param(False, marks=pytest.mark.long), True])
 def test_a_lag_shows_in_step_tests_that_begin_with_the_step(turned):
     found = find_gap(Oven(), TESTS[::-1] if turned else TESTS, effects=OFFERED)
     assert lag_of(found) == pytest.approx(LAG, rel=0.05)
@@ -40,6 +40,7 @@ def test_what_was_settled_at_its_first_input_stays_so():
     assert not told(found)
 
 
+@pytest.mark.long
 def test_records_of_both_kinds_are_told_apart():
     runs = [steps(s, [d, 1 - d / 2, 0.3], d * (s % 2)) for s, d in enumerate((0.4, 0.8, 0.6, 1.0))]
     found = find_gap(Oven(), runs, effects=OFFERED)
@@ -55,6 +56,7 @@ def test_without_a_lag_it_makes_no_difference_and_is_not_told():
     assert not told(found)
 
 
+@pytest.mark.long
 def test_it_is_asked_where_only_a_delay_is_offered():
     found = find_gap(Oven(), TESTS, effects=("delay", "actuator_gain", "constant_load", "slow"))
     assert told(found)
@@ -62,11 +64,13 @@ def test_it_is_asked_where_only_a_delay_is_offered():
     assert found.gap.after.value < 0.4 * found.gap.before.value
 
 
+@pytest.mark.long
 def test_records_set_aside_are_judged_likewise():
     found = find_gap(Oven(), TESTS[:3], held_out=TESTS[3:], effects=OFFERED)
     assert found.held_out.after.value < 0.1 * found.held_out.before.value
 
 
+@pytest.mark.long
 def test_a_record_set_aside_that_goes_on_is_not_taken_to_begin_from_rest():
     """As where a step test is cut in two: a lag has nothing to do in the second half."""
     ends = [Trajectory(f"end {i}", t.times[60:], t.states[60:], t.actions[60:]) for i, t in

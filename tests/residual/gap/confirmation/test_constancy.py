@@ -27,8 +27,9 @@ def shifted(run, first, last):
 
 
 @pytest.mark.parametrize(("zeros", "creeps"), [
-    (((5, 5), (5, 5)), False), (((4.8, 5.2), (4.8, 5.2)), False),
-    (((3, 7), (3, 7)), True), (((7, 3), (7, 3)), True), (((7, 7), (3, 3)), True),
+    (((5, 5), (5, 5)), False), pytest.param(((4.8, 5.2), (4.8, 5.2)), False, marks=pytest.mark.long),
+    (((3, 7), (3, 7)), True), pytest.param(((7, 3), (7, 3)), True, marks=pytest.mark.long),
+    pytest.param(((7, 7), (3, 3)), True, marks=pytest.mark.long),
 ])  # fmt: skip
 def test_a_push_is_certain_only_while_it_is_a_constant(zeros, creeps):
     runs = [shifted(run, *ends) for run, ends in zip(RUNS, zeros, strict=True)]
@@ -72,7 +73,9 @@ def rubbed(seed, begin, end, n=600):
     return Trajectory(f"record {seed}", times, states, volts[:-1, None])
 
 
-@pytest.mark.parametrize(("begin", "end"), [(40.0, 14.0), (25.0, 25.0)])
+@pytest.mark.parametrize(
+    ("begin", "end"), [pytest.param(40.0, 14.0, marks=pytest.mark.long), (25.0, 25.0)]
+)
 def test_friction_that_falls_as_it_warms_is_told_with_where_it_begins_and_ends(begin, end):
     asked = ("coulomb_friction", "viscous_friction", "actuator_gain")
     found = find_gap(Wheel(), [rubbed(seed, begin, end) for seed in (0, 1)], effects=asked)
@@ -113,6 +116,7 @@ def limited(seed, largest, smallest, n=900):
     return Trajectory(f"record {seed}", 0.02 * np.arange(len(seen)), states, goals[:-1, None])
 
 
+@pytest.mark.long
 def test_a_lag_that_is_many_times_as_long_where_steps_are_large_is_not_certain():
     runs = [limited(seed, 150.0, 10.0) for seed in (0, 1)]
     found = find_gap(Servo(), runs, effects=["actuator_lag", "constant_load"], hold="zero")

@@ -33,12 +33,14 @@ def in_a_room_that_warms(by):
     return named(warmed(steps(0, DUTIES, 0.0, lag=0.0), by))
 
 
-@pytest.mark.parametrize("by", [1.0, pytest.param(3.0, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("by", [1.0, 3.0])
 def test_a_room_that_warms_has_no_name_that_is_certain(by):
     found = in_a_room_that_warms(by)
     assert not [verdict.label for verdict in found if verdict.kind == "confirmed"]
 
 
+@pytest.mark.long
 def test_what_is_there_in_a_room_that_warms_stays_certain():
     offered = ("actuator_lag", "delay", "actuator_gain", "constant_load", "second_store", "slow")
     found = named(warmed(steps(0, DUTIES, 0.0, lag=8.0), 1.0), effects=offered)
@@ -46,6 +48,7 @@ def test_what_is_there_in_a_room_that_warms_stays_certain():
     assert not [v.label for v in found if v.kind == "confirmed" and v.effect != "actuator_lag"]
 
 
+@pytest.mark.long
 def test_a_gain_in_a_room_that_stays_as_it_is_is_certain():
     duties = np.random.default_rng(3).uniform(0.0, 0.9, 25)
     run = steps(0, list(duties), 0.0, lag=0.0)
@@ -55,6 +58,7 @@ def test_a_gain_in_a_room_that_stays_as_it_is_is_certain():
     assert gain.parameters["gain"].value == pytest.approx(-0.1, abs=5e-3)
 
 
+@pytest.mark.long
 def test_no_number_of_what_is_certain_lies_at_its_bound():
     """A store so slow that it is a ramp."""
     found = in_a_room_that_warms(1.0)
@@ -130,6 +134,7 @@ def driven(seed, wind, n=1800, drag=3.5e-4):
     return Trajectory(f"drive {seed}", times, states, traction[:-1, None])
 
 
+@pytest.mark.long
 def test_the_size_of_drag_holds_beside_a_wind_that_rises():
     asked = ("quadratic_drag", "viscous_friction", "constant_load", "actuator_gain", "mass", "roll")
     found = find_gap(Car(), [driven(seed, wind=8.0) for seed in (0, 1)], effects=asked)

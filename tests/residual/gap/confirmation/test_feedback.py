@@ -56,6 +56,7 @@ def test_records_of_one_goal_each_change_it_together():
     assert fed_back(Samples.join(runs[:1], 1)) and not fed_back(Samples.join(runs, 1))
 
 
+@pytest.mark.long
 def test_without_inputs_of_its_own_a_load_is_not_certain():
     for goals, alone in ((ONE, False), (SEVERAL, True)):
         found = find_gap(Motor(), [run(goals)])

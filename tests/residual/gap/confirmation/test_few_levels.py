@@ -40,9 +40,10 @@ def record(seed, duties):
 ASKED = ("actuator_gain", "dead_zone", "quadratic_actuator", "saturation", "delay")
 
 
-@pytest.mark.parametrize(
-    ("duties", "sure"), [((0.25, 0.6), False), ((0.2, 0.35, 0.5, 0.7, 0.9), True)], ids=["2", "5"]
-)
+@pytest.mark.parametrize(("duties", "sure"), [
+    pytest.param((0.25, 0.6), False, marks=pytest.mark.long, id="2"),
+    pytest.param((0.2, 0.35, 0.5, 0.7, 0.9), True, id="5"),
+])  # fmt: skip
 def test_a_dead_zone_and_a_gain_need_three_levels(duties, sure):
     found = find_gap(Lamp(), [record(seed, 4 * duties) for seed in (1, 2)], effects=ASKED)
     laws = [v for v in found.verdicts if v.effect in ASKED[:4]]
@@ -66,7 +67,9 @@ class Wheel(FirstOrderSystem):
         return (20.0 * u - x) / LAG
 
 
-@pytest.mark.parametrize(("duties", "sure"), [((-0.3, 0.3), False), ((-0.3, 0.0, 0.3), True)])
+@pytest.mark.parametrize(("duties", "sure"), [
+    ((-0.3, 0.3), False), pytest.param((-0.3, 0.0, 0.3), True, marks=pytest.mark.long),
+])  # fmt: skip
 def test_a_push_is_a_gain_that_differs_by_direction_where_the_input_has_two_levels(duties, sure):
     rng = np.random.default_rng(4)
     duty, speed, seen = np.repeat(rng.permutation(8 * duties), 25), 0.0, []

@@ -73,7 +73,8 @@ def kinds(system, seed):
     return {verdict.label: verdict for verdict in found.verdicts if verdict.parameters}
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
 def test_numbers_of_another_law_are_not_certain(seed):
     """But that growth falls where there is much food is."""
     named = kinds(Inhibited(), seed)

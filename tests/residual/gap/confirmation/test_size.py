@@ -47,6 +47,7 @@ def pushed(friction, gain, rows=360, noise=5e-4, wave=0.03):
     return recorded("run", braked(force, friction, 0.5, 0.01), pwm, 0.01, noise, rng)
 
 
+@pytest.mark.long
 def test_friction_without_which_nothing_fits_is_certain_though_the_mass_may_be_meant():
     # Eight times the force with friction 20, or an eighth of the mass with friction 2.5: the same.
     asked = ("viscous_friction", "coulomb_friction", "actuator_gain", "mass", "sensor_scale")

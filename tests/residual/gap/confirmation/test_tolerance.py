@@ -37,8 +37,9 @@ def named(inertia, wind, **options):
     return found.verdicts[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("inertia", "wind", "sure"), [
-    (0.025, 2e-4, False), pytest.param(0.3, 1e-3, True, marks=pytest.mark.long),
+    (0.025, 2e-4, False), (0.3, 1e-3, True),
 ])  # fmt: skip
 def test_a_change_within_the_tolerance_of_parameters_is_not_certain(inertia, wind, sure):
     exact = named(inertia, wind, parameter_tolerance=0.0)
@@ -55,6 +56,7 @@ def test_a_change_within_the_tolerance_of_parameters_is_not_certain(inertia, win
     assert wide.high - wide.low > 0.03 * INERTIA
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("inertia", "sure"), [(0.025, False), (0.3, True)])
 def test_where_only_noise_is_left_parameters_may_be_off_too(inertia, sure):
     simulator = PendulumEquation()
@@ -71,7 +73,9 @@ def test_where_only_noise_is_left_parameters_may_be_off_too(inertia, sure):
     assert np.isclose(exact.verdicts[0].parameters["change"].value, inertia * INERTIA, rtol=0.2)
 
 
-@pytest.mark.parametrize(("delay", "sure"), [(0.02, False), (0.04, True)])
+@pytest.mark.parametrize(
+    ("delay", "sure"), [(0.02, False), pytest.param(0.04, True, marks=pytest.mark.long)]
+)
 def test_a_delay_of_less_than_half_a_sample_is_not_certain(delay, sure):
     simulator = PendulumEquation()
     offered = [e for e in library(simulator) if e.name in ("inertia", "delay", "dead_zone")]
@@ -152,6 +156,7 @@ def test_a_fit_with_free_parameters_that_did_not_converge_is_resumed(monkeypatch
     assert calibrated(search, (0,), free).fit.merit == pytest.approx(good, rel=0.02)
 
 
+@pytest.mark.long
 def test_what_there_was_no_time_to_ask_is_not_certain(monkeypatch):
     """As of a robot whose fits take as long as the budget."""
     simulator = PendulumEquation()

@@ -53,6 +53,7 @@ def test_brief_records_between_long_rests_stay():
     assert not said and kept == [run]
 
 
+@pytest.mark.long
 def test_the_answer_is_of_the_motion_and_not_of_the_port():
     found = find_gap(PendulumEquation(), [swinging()], effects=["mass", "viscous_friction"])
     assert [verdict.kind for verdict in found.verdicts if verdict.kind == "confirmed"] == []

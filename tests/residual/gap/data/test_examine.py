@@ -126,7 +126,9 @@ def test_a_clean_log_has_no_findings():
         assert kinds(noisy(seed)) == set()
 
 
-@pytest.mark.parametrize("truth", [Truth(), Truth(coulomb_friction=1e-3), Truth(dead_zone=1.0)])
+@pytest.mark.parametrize("truth", [
+    Truth(), pytest.param(Truth(coulomb_friction=1e-3), marks=pytest.mark.long), Truth(dead_zone=1.0)
+])  # fmt: skip
 @pytest.mark.parametrize("excitation", ["strong", "weak", "policy"])
 def test_logs_of_known_truth_have_no_findings(truth, excitation):
     for noise in ("A", "C"):

@@ -53,6 +53,7 @@ def test_what_changes_in_every_row_or_hardly_ever_has_no_rhythm(noise):
     assert rhythm([np.ones(1200)]) == 0 and rhythm([]) == 0
 
 
+@pytest.mark.long
 def test_a_slow_bus_hides_no_friction():
     """The pendulum's angle comes in every fourth row; all rows show stairs."""
     logs = make_logs(Truth(coulomb_friction=2e-4), 3, "strong", "A", runs=4)

@@ -126,6 +126,7 @@ def test_an_input_that_makes_no_difference_is_told():
     assert (finding.kind, finding.where) == ("unused", "power")
 
 
+@pytest.mark.long
 def test_nothing_is_certain_while_a_limit_may_be_a_mistake():
     asked = ("actuator_gain", "saturation", "constant_load", "proportional_loss")
     found = find_gap(Limited(), [heated()], effects=asked)

@@ -74,7 +74,7 @@ def slopes_by_block(rng, amplitudes, together, numbers=1):
 
 
 @pytest.mark.parametrize("numbers", [1, 5])
-@pytest.mark.parametrize("together", [0.0, 1.0])
+@pytest.mark.parametrize("together", [pytest.param(0.0, marks=pytest.mark.long), 1.0])
 @pytest.mark.parametrize("amplitudes", [np.ones(10), np.linspace(0.1, 1, 10)], ids=["even", "ramp"])
 def test_intervals_cover_however_blocks_are_driven(amplitudes, together, numbers):
     rng, covered = np.random.default_rng(0), []

@@ -29,7 +29,7 @@ def windows_of(fitter, floor, seconds=1.25):
 
 
 @pytest.mark.parametrize("excitation", ["strong", "weak", "policy"])
-@pytest.mark.parametrize("kind", ["A", "B", "C"])
+@pytest.mark.parametrize("kind", ["A", pytest.param("B", marks=pytest.mark.long), "C"])
 def test_true_model_leaves_the_noise(excitation, kind):
     fitter, floor = surveyed(Truth(), excitation, kind)
     windows, samples = windows_of(fitter, floor), fitter.samples
@@ -40,13 +40,13 @@ def test_true_model_leaves_the_noise(excitation, kind):
     assert found.costs.max() < 8 * np.median(found.costs)
 
 
-@pytest.mark.parametrize("kind", ["A", "B"])
+@pytest.mark.parametrize("kind", ["A", pytest.param("B", marks=pytest.mark.long)])
 def test_noise_is_found_although_the_model_is_wrong(kind):
     _, floor = surveyed(Truth(mass=0.03), "strong", kind)
     assert np.all(np.abs(floor.sigma / NOISE[kind] - 1) < 0.25)
 
 
-@pytest.mark.parametrize("kind", ["A", "B"])
+@pytest.mark.parametrize("kind", ["A", pytest.param("B", marks=pytest.mark.long)])
 def test_noise_does_not_depend_on_how_many_windows_are_fitted_at_once(kind, monkeypatch):
     truth = Truth(mass=0.03)
     _, whole = surveyed(truth, "strong", kind, runs=2)
@@ -61,7 +61,9 @@ def test_noise_does_not_depend_on_how_many_windows_are_fitted_at_once(kind, monk
     ("label", "truth", "value"),
     [
         ("dead_zone@voltage", Truth(dead_zone=0.05), 0.05),
-        ("actuator_lag@voltage", Truth(actuator_lag=0.007), 0.007),
+        pytest.param(
+            "actuator_lag@voltage", Truth(actuator_lag=0.007), 0.007, marks=pytest.mark.long
+        ),
         ("inertia", Truth(inertia=0.03), 0.03 * 1.91e-4),
     ],
 )

@@ -59,6 +59,7 @@ def test_cogging_is_looked_for_where_a_whole_period_was_seen():
     assert orders(0.8) == list(range(4, 13))
 
 
+@pytest.mark.long
 def test_a_small_swing_names_no_law_that_its_motion_cannot_show():
     found = find_gap(Rod(), [swing(0.06)])
     named = {v.effect: v for v in found.verdicts if v.kind in ("confirmed", "ambiguous")}

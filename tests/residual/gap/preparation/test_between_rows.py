@@ -56,6 +56,7 @@ def run(seed, coupling=None, noise=NOISE, hold=1, n=1500):
     return Trajectory(f"run {seed}", times, states, force[:, None])
 
 
+@pytest.mark.long
 def test_a_vibration_between_the_rows_is_no_noise():
     runs = [run(seed, (1600.0, 6.0)) for seed in (0, 1)]
     offered = ("mass", "damping", "delay", "actuator_lag", "coulomb_friction", "flexible_part")

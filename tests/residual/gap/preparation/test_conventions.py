@@ -27,7 +27,8 @@ from sims.pendulum_equation import PendulumEquation
 from sims.simulator import Channel
 
 LARGE = [
-    (), (CoulombFriction("pivot", 0.01),), (LinearSpring("pivot", 0.01, np.pi),),
+    (), pytest.param((CoulombFriction("pivot", 0.01),), marks=pytest.mark.long),
+    (LinearSpring("pivot", 0.01, np.pi),),
     (ActuatorGain("voltage", 1.0),), (ActuatorGain("voltage", -0.8),),
 ]  # fmt: skip
 
@@ -62,7 +63,9 @@ def test_a_reversed_input_is_told(effects):
     assert "`scale: -1` for voltage" in told
 
 
-@pytest.mark.parametrize("effects", [(), (CoulombFriction("pivot", 1e-3),)])
+@pytest.mark.parametrize(
+    "effects", [(), pytest.param((CoulombFriction("pivot", 1e-3),), marks=pytest.mark.long)]
+)
 def test_a_reversed_input_is_told_where_it_is_swung_by(effects):
     """The nominal simulator's forecasts are not poor: most of the motion is a free swing's."""
     run = log(effects, start=1.0, most=0.7)
@@ -111,7 +114,8 @@ def test_zeros_on_which_nothing_depends_are_no_other_convention():
     assert set(found.changes) == {"`scale: -1` for voltage", "`scale: -1` for angle and rate"}
 
 
-@pytest.mark.parametrize("factor", [-1.0, pytest.param(1000.0, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("factor", [-1.0, 1000.0])
 def test_nothing_is_certain_before_it_is_seen_how_the_log_counts(factor):
     run = log((CoulombFriction("pivot", 0.003),))
     offered = ["coulomb_friction@pivot"]

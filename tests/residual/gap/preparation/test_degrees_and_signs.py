@@ -74,6 +74,7 @@ def test_small_swings_in_radians_are_not(effects):
     assert asked(Thread(), swings(effects), 0.6) is None
 
 
+@pytest.mark.long
 def test_nothing_is_certain_of_degrees_that_pass_for_radians():
     found = find_gap(Thread(), swings(DAMPED, factor=180 / np.pi), minutes=0.5)
     assert found.conventions is not None

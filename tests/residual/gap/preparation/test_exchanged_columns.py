@@ -60,8 +60,9 @@ def changes(run):
 
 
 @pytest.mark.parametrize("effects", [
-    (), (ActuatorGain("left heater", -0.2),), (ActuatorLag("right heater", 15.0),),
-    (ConstantLoad("left", 0.1),),
+    (), pytest.param((ActuatorGain("left heater", -0.2),), marks=pytest.mark.long),
+    (ActuatorLag("right heater", 15.0),),
+    pytest.param((ConstantLoad("left", 0.1),), marks=pytest.mark.long),
 ])  # fmt: skip
 def test_exchanged_columns_are_told_and_honest_ones_not(effects):
     run = log(effects)

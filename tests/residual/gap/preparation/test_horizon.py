@@ -36,7 +36,7 @@ def swing(period, seconds=60.0, step=0.02, size=0.4, noise=0.0, name="run"):
 
 @pytest.mark.parametrize(("step", "asked", "why"), [
     (0.02, 0.5, None), (0.02, 0.04, "too far apart"), (0.1, 0.2, "too far apart"),
-    (0.02, 9.0, "too short"),
+    pytest.param(0.02, 9.0, "too short", marks=pytest.mark.long),
 ])  # fmt: skip
 def test_another_length_than_was_asked_for_is_told(step, asked, why):
     found = find_gap(
@@ -70,6 +70,7 @@ def test_noise_makes_no_motion_faster(noise, seed):
     assert usual_horizon(Flywheel(), [run]) > 0.6
 
 
+@pytest.mark.long
 def test_a_length_beyond_the_record_is_what_it_holds_and_one_block_is_never_no_gap():
     """Rows were chosen for the length asked for, too far apart to see anything."""
     runs = [swing(2.0, 10.0, noise=1e-3)]

@@ -90,6 +90,7 @@ def slid(seed, friction=1300.0, rows=600):
     return recorded(f"run {seed}", places, pwm, 0.02, 2e-5, rng)
 
 
+@pytest.mark.long
 def test_friction_too_fast_for_steps_that_suit_the_nominal_simulator_is_found_and_judged():
     offered = [e for e in library(Slide()) if e.name in ("viscous_friction", "actuator_gain")]
     found = find_gap(Slide(), [slid(0)], held_out=[slid(1)], effects=offered, hold="zero")
@@ -134,7 +135,7 @@ def swung(simulator, hold, seed=0, runs=3, rows=400, step=0.02):
 FEW = (ParameterChange("mass"), Delay("voltage"))
 
 
-@pytest.mark.parametrize("hold", ["zero", "linear"])
+@pytest.mark.parametrize("hold", ["zero", pytest.param("linear", marks=pytest.mark.long)])
 def test_how_inputs_run_between_samples_is_told_by_the_data(hold):
     logs = swung(PendulumEquation(mass=0.09), hold)
     found = find_gap(PendulumEquation(), logs, effects=FEW, horizon=0.4, minutes=20.0)
@@ -150,6 +151,7 @@ def test_a_hold_that_is_given_is_kept():
     assert held_as(PendulumEquation(), None).action_channels[0].hold == "zero"
 
 
+@pytest.mark.long
 def test_a_large_gap_does_not_turn_the_hold():
     logs = make_logs(Truth(mass=0.636), 11, "strong", "A", 4)
     found = find_gap(PendulumEquation(), logs, effects=FEW, minutes=20.0)

@@ -56,6 +56,7 @@ def test_a_speed_without_its_sign_is_told(of, told):
         assert found.times > 2
 
 
+@pytest.mark.long
 def test_nothing_is_certain_before_its_sign_is_seen():
     offered = ("gain", "viscous_friction", "dead_zone")
     result = find_gap(Wheel(), [record(seed) for seed in (1, 2)], effects=offered, minutes=0.1)

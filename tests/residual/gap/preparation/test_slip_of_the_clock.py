@@ -63,6 +63,7 @@ def test_rare_and_frequent_samples_are_none(effects):
         assert asked(run, dt) is None, dt
 
 
+@pytest.mark.long
 def test_nothing_is_certain_before_the_clock_is_seen_to():
     run = heated((ParameterChange("time_constant", 6.0),))
     found = find_gap(Plate(), [dataclasses.replace(run, times=10.0 * run.times)], minutes=0.5)

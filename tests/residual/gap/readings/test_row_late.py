@@ -54,6 +54,7 @@ def test_a_weak_heater_is_all_that_is_named(late):
     assert result.held_out.after.value < 1.2 * result.held_out.noise_floor.value
 
 
+@pytest.mark.long
 def test_another_time_constant_is_no_late_row():
     fast = record(late=False)
     result = find_gap(Oven(), [Trajectory("run", 2 * fast.times, fast.states, fast.actions)])

@@ -35,7 +35,8 @@ def crane(seed, late):
     return Trajectory(f"run {seed}", times, seen, forces[:, None])
 
 
-@pytest.mark.parametrize("late", [pytest.param(0.0, marks=pytest.mark.long), LATE])
+@pytest.mark.long
+@pytest.mark.parametrize("late", [0.0, LATE])
 def test_a_late_sensor_is_told_and_nothing_is_made_of_it(late):
     offered = ("coulomb_friction@trolley", "delay")
     found = find_gap(Crane(), [crane(seed, late) for seed in range(3)], effects=offered)

@@ -56,6 +56,7 @@ def test_a_mass_takes_over_from_a_gain_and_the_load_goes_along():
     assert again.merit < 1.05 * search.tried[key].merit
 
 
+@pytest.mark.long
 def test_too_much_damping_is_not_called_a_stronger_motor_and_a_larger_mass():
     def acceleration(v, u):
         return (0.5 * u - 20.0 * v - 10.0 * np.tanh(v / 1e-3)) / 4.0

@@ -59,16 +59,19 @@ def motor() -> GapResult:
     return find_gap(Motor(), [ramps()], effects=OFFERED)
 
 
+@pytest.mark.long
 def test_a_motor_has_stribeck_friction_and_another_gain(motor: GapResult) -> None:
     named = {v.effect for v in motor.verdicts if v.kind in ("confirmed", "ambiguous")}
     assert {"stribeck_friction", "gain"} <= named
 
 
+@pytest.mark.long
 def test_nothing_else_is_certain(motor: GapResult) -> None:
     certain = {v.effect for v in motor.verdicts if v.kind == "confirmed"}
     assert certain <= {"stribeck_friction", "gain", "time_constant"}
 
 
+@pytest.mark.long
 def test_forecasts_err_by_less_than_slopes_alone_reach(motor: GapResult) -> None:
     # Coulomb friction and a gain, where slopes end, leave a third.
     assert motor.gap.after.value < 0.2 * motor.gap.before.value

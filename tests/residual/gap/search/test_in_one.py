@@ -3,6 +3,7 @@
 from typing import ClassVar
 
 import numpy as np
+import pytest
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
@@ -47,6 +48,7 @@ def certain(found):
     return {v.effect: v for v in found.verdicts if v.kind == "confirmed"}
 
 
+@pytest.mark.long
 def test_a_loss_to_the_room_is_no_gain_and_exchange():
     found = certain(find_gap(Tank(), runs(EXCHANGE, FLOW + EXCHANGE + 0.03, FLOW * 25 + 0.66)))
     assert set(found) == {"proportional_loss", "constant_load"}

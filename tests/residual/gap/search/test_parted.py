@@ -53,6 +53,7 @@ def found():
     return find_gap(Cylinder(), [log()], effects=OFFERED)
 
 
+@pytest.mark.long
 def test_it_is_no_friction_by_direction(found):
     certain = {v.effect: v for v in found.verdicts if v.kind == "confirmed"}
     assert {"dead_zone", "actuator_bias"} <= set(certain) <= {"dead_zone", "actuator_bias", "lag"}
@@ -63,6 +64,7 @@ def test_it_is_no_friction_by_direction(found):
     assert found.gap.after.value < 1.1 * found.gap.noise_floor.value
 
 
+@pytest.mark.long
 def test_a_load_is_told_from_a_bias_behind_the_dead_zone(found):
     (bias,) = (verdict for verdict in found.verdicts if verdict.effect == "actuator_bias")
     assert "constant_load@stroke" not in bias.same_motion
