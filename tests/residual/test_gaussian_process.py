@@ -127,7 +127,7 @@ def jumping(seed, share, rows=1600, inputs=12):
     return X, smooth, (y - y.mean()) / y.std()
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_jumps_do_not_hide_what_is_smooth(seed):
     X, smooth, y = jumping(seed, 0.05)
     model = GaussianProcess(hyper_points=300, random_state=0).fit(X[:1000], y[:1000])

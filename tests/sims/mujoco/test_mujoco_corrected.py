@@ -51,14 +51,7 @@ def at_a_usual_size(effect, simulator):
 #: Joints and links of the large arm that are further cases of what others show.
 FURTHER = ("shoulder_lift", "elbow", "wrist", "upper_arm", "forearm")
 CASES = [
-    pytest.param(
-        name,
-        str(effect),
-        integrator,
-        marks=[pytest.mark.long]
-        if name == "arm6" and any(p in str(effect) for p in FURTHER)
-        else [],
-    )
+    pytest.param(name, str(effect), integrator, marks=[pytest.mark.long] * further)
     for name, integrator in (
         ("cart_pole", None),
         ("arm2", "implicitfast"),
@@ -66,6 +59,7 @@ CASES = [
     )
     for effect in robot(name).offered_effects()
     if effect.enters != "sensor" and not isinstance(effect, DeadZone)
+    for further in [name == "arm6" and any(part in str(effect) for part in FURTHER)]
 ]
 
 

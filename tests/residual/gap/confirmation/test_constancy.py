@@ -27,7 +27,8 @@ def shifted(run, first, last):
 
 
 @pytest.mark.parametrize(("zeros", "creeps"), [
-    (((5, 5), (5, 5)), False), pytest.param(((4.8, 5.2), (4.8, 5.2)), False, marks=pytest.mark.long),
+    (((5, 5), (5, 5)), False),
+    pytest.param(((4.8, 5.2), (4.8, 5.2)), False, marks=pytest.mark.long),
     (((3, 7), (3, 7)), True), pytest.param(((7, 3), (7, 3)), True, marks=pytest.mark.long),
     pytest.param(((7, 7), (3, 3)), True, marks=pytest.mark.long),
 ])  # fmt: skip

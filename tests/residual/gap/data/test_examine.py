@@ -35,8 +35,7 @@ def test_a_rate_on_another_scale_is_put_right_and_told():
 def test_coarse_sampling_is_no_reason_to_blame_the_sensor(excitation):
     logs = make_logs(Truth(), 3, excitation, "A", 5)
     runs, found = kinematics(PendulumEquation(), logs)
-    assert found == []
-    assert runs == logs
+    assert (runs, found) == (logs, [])
 
 
 def test_noise_in_the_rate_is_not_taken_for_a_smaller_scale():
@@ -110,9 +109,8 @@ def test_a_walk_without_one_encoder_is_refused():
 
 
 def test_a_parameter_of_zero_that_makes_no_number_is_named():
-    with pytest.raises(
-        ValueError, match=r"\(its inertia is 0\) returns .* from the state recorded at"
-    ):
+    says = r"\(its inertia is 0\) returns .* from the state recorded at"
+    with pytest.raises(ValueError, match=says):
         examine(PendulumEquation().with_parameters(inertia=0.0), [noisy()])
 
 
@@ -127,7 +125,8 @@ def test_a_clean_log_has_no_findings():
 
 
 @pytest.mark.parametrize("truth", [
-    Truth(), pytest.param(Truth(coulomb_friction=1e-3), marks=pytest.mark.long), Truth(dead_zone=1.0)
+    Truth(), pytest.param(Truth(coulomb_friction=1e-3), marks=pytest.mark.long),
+    Truth(dead_zone=1.0),
 ])  # fmt: skip
 @pytest.mark.parametrize("excitation", ["strong", "weak", "policy"])
 def test_logs_of_known_truth_have_no_findings(truth, excitation):
@@ -269,9 +268,8 @@ def test_a_record_is_cut_at_a_command_that_nobody_can_have_meant(simulator):
     (told,) = [one for one in examined.findings if one.kind == "wild"]
     assert told.where == "voltage"
     assert "3000 V in 1 of" in told.says
-    assert [len(run.times) for run in examined.trajectories] == [
-        101, len(logs[0].times) - 101, len(logs[1].times)
-    ]  # fmt: skip
+    rows = [len(run.times) for run in examined.trajectories]
+    assert rows == [101, len(logs[0].times) - 101, len(logs[1].times)]
     assert max(np.abs(run.actions).max() for run in examined.trajectories) < 10
 
 

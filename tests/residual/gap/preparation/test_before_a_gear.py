@@ -38,7 +38,7 @@ def told(ratio, effects=()):
     return () if found is None else found.changes
 
 
-@pytest.mark.parametrize("ratio", [15.0, 50.0, 160.0])
+@pytest.mark.parametrize("ratio", [15.0, pytest.param(50.0, marks=pytest.mark.long), 160.0])
 def test_the_ratio_of_a_gear_is_told_about(ratio):
     (first, *_) = told(ratio, [CoulombFriction("angle", 0.5)])
     assert "before a gear" in first

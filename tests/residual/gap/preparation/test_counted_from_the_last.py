@@ -54,6 +54,6 @@ def test_the_knee_counted_otherwise_is_told(times, effects, word):
     assert counted(times, effects) == (says,)
 
 
-@pytest.mark.parametrize("change", [0.0, -15.0, 15.0])
+@pytest.mark.parametrize("change", [0.0, -15.0, pytest.param(15.0, marks=pytest.mark.long)])
 def test_a_knee_that_counts_as_is_said_stays(change):
     assert not counted(0.0, (ParameterChange("swing", change),))
