@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 
+from residual.gap.clock import OutOfTime
 from residual.gap.confirmation.numerics import fits_better
 from residual.gap.preparation.numerics import held_otherwise, how_held
 from residual.gap.preparation.prepare import prepare
@@ -27,11 +29,12 @@ def held_the_other_way(read: Read, asked: Asked) -> Read:
         f"inputs were taken to {how_held(other)}: the data fit better so; set hold to say otherwise"
     )
     kept = None if read.by_a_row else read.conventions
-    again = Read(log, ready, asked.explained(other, ready, earlier=search), (says,), kept)
-    if again.clearly_better_than(read):
-        return again
-    if not again.found.search.late:
-        return read
+    with contextlib.suppress(OutOfTime):
+        again = Read(log, ready, asked.explained(other, ready, earlier=search), (says,), kept)
+        if again.clearly_better_than(read):
+            return again
+        if not again.found.search.late:
+            return read
     says = (
         f"the data fit better with inputs taken to {how_held(other)}, but there was no time to "
         "search so: set hold to say which it is, or give more --minutes"

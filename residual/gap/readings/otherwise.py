@@ -27,10 +27,12 @@ def read_otherwise(read: Read, asked: Asked, clock: Clock, hold_is_known: bool) 
     with clock.once_more(), contextlib.suppress(OutOfTime):
         read = a_sign_reversed(read, asked)
     if read.conventions is None:
-        read = a_row_earlier(read, asked)
+        with clock.once_more(), contextlib.suppress(OutOfTime):
+            read = a_row_earlier(read, asked)
     if read.conventions is None and not read.says:
         with clock.once_more(), contextlib.suppress(OutOfTime):
             read = a_sensor_earlier(read, asked)
     if not hold_is_known and not read.says:
-        read = held_the_other_way(read, asked)
+        with clock.once_more():
+            read = held_the_other_way(read, asked)
     return begun_from_rest(read, asked)
