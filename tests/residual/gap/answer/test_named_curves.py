@@ -257,3 +257,22 @@ def test_a_thruster_that_is_weaker_astern_is_a_curve_of_both_directions():
     for u in (-8.0, -6.0, -3.0, 3.0, 6.0, 8.0):
         assert curve.shape(u) == pytest.approx(float(thrust(u)), abs=0.5)
     assert found.gap.share.value > 0.95
+
+
+def test_a_curve_is_asked_for_where_a_law_of_its_kind_does_as_well_as_a_load():
+    """A wheel that turns one way: a load, its first name, is dry friction there."""
+    rng, runs = np.random.default_rng(751), []
+    for number in range(4):
+        torque, path = np.repeat(rng.uniform(-1.0, 7.0, 14), 50), [rng.uniform(0.0, 60.0)]
+        for push in torque[:-1]:
+            path.append(path[-1])
+            for _ in range(8):
+                brake = 0.1 * path[-1] + 12.0 * (path[-1] / 40) / (1 + (path[-1] / 40) ** 2)
+                path[-1] += 0.0025 * (5.0 * push - brake)
+        seen = np.array(path)[:, None] + rng.normal(0, 0.25, (len(torque), 1))
+        times = 0.02 * np.arange(len(seen))
+        runs.append(Trajectory(str(number), times, seen, torque[:-1, None]))
+    slow = DampedRotor().with_parameters(damping=0.1)
+    found = find_gap(slow, runs, effects=OFFERED, minutes=0.5)
+    assert "friction_curve" in {verdict.effect for verdict in found.verdicts}
+    assert found.gap.after.value < 3 * found.gap.noise_floor.value
