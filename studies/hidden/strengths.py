@@ -121,7 +121,7 @@ def _reference(excitation: Excitation, noise: str) -> tuple[SmoothFitter, Fit, i
     sigma = np.array([angle] if kind.rate is None else [angle, kind.rate])
     scale = np.array([1.0, 10.0])
     model, none = Model(simulator), np.zeros(0)
-    slope = slopes(model, samples, nodes, none, none, scale)
+    slope = slopes(model, samples, nodes, none, scale)
     windows = cut(samples, slope.by_state, scale, 25 * DT)
     grouped = blocks(samples, windows, np.zeros(len(samples)), len(windows))
     fitter = SmoothFitter(samples, grouped, nodes, slope.by_state, sigma, scale, turns=2)
