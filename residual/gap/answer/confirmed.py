@@ -95,6 +95,7 @@ def confirm(
     search, key = found.search, found.key if asked else ()
     leads: tuple[str, ...] = ()
     asked_before = {key}
+    search.weigh_until = until  # for what is left without what cannot be named
 
     def exchange(key: Key) -> None:
         most = RIVALS if len(key) <= FEW else LEAST
