@@ -66,7 +66,7 @@ def test_cogging_is_that_of_the_turn_in_any_unit_of_angle(unit):
 def test_quarter_turns_are_those_of_the_unit():
     zeros = {
         one.says
-        for one in conventions(motor("deg")(), Samples.join([log("deg")], 4), ())
+        for one in conventions(motor("deg")(), Samples.join([log("deg")], 4), {})
         if one.turned
     }
     assert {"`offset: 90` for angle", "`offset: 180` for angle", "`offset: -90` for angle"} <= zeros

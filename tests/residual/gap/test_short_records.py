@@ -56,7 +56,7 @@ def test_a_step_that_eight_short_forecasts_do_not_show_is_seen_in_five_longer_on
     change = verdict.parameters["change"]
     assert verdict.effect == "time_constant" and change.low < 0.03 < change.high
     assert verdict.provisional
-    assert any("of which these records hold more" in one.says for one in found.quality)
+    assert any("there are more, but they name nothing" in one.says for one in found.quality)
     assert 5 <= found.gap.blocks < 8
 
 
