@@ -63,6 +63,7 @@ def add_exchanged(search: Search, key: Key, most: int) -> None:
         if search.out_of_time:
             search.unasked.add((key, gone))
             continue
+        search.unasked.discard((key, gone))
         for number, start in _rivals(search, key, gone, most):
             fresh, theta = search.merged(key, [(number, start)], drop=(gone,))
             search.add({fresh: theta})
