@@ -197,6 +197,11 @@ class Trajectory:
         return f"Trajectory({self.name!r}, {len(self)} steps, {seconds:.4g} s)"
 
 
+def converted_units(runs: Iterable[Trajectory]) -> dict[str, str]:
+    """Units that columns of any run were in, by channel, where that was not the channel's own."""
+    return {name: unit for run in runs for name, unit in run.converted.items()}
+
+
 def duration_text(seconds: float) -> str:
     """A length of time in seconds, or in hours or days where there are two of them: ``1 s``."""
     longer = (pair for pair in ((86400.0, "d"), (3600.0, "h")) if seconds >= 2 * pair[0])

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from sims.equation_contract import (
+    ROUNDING,
     acceleration_keeps,
     drive_tells,
     forces_act,
@@ -22,7 +23,6 @@ _GRAVE = (
     "period", "channels", "parameters", "shape", "arguments", "repeatable", "pure", "rows",
     "arguments of acceleration", "forces", "parameters by row", "drive_force",
 )  # fmt: skip
-_ROUNDING = 1e-6
 
 
 def refuse_unsound(simulator: Simulator) -> None:
@@ -61,7 +61,7 @@ def _sound(simulator: Simulator) -> Iterator[Finding]:
     turned = simulator.step(states[::-1], actions[::-1])[::-1]
     # Libraries may round a batch otherwise than a row; that harms nobody.
     same = all(
-        np.allclose(one, whole[: len(one)], rtol=_ROUNDING, atol=0, equal_nan=True)
+        np.allclose(one, whole[: len(one)], rtol=ROUNDING, atol=0, equal_nan=True)
         for one in (alone, turned)
     )
     yield Finding("rows", same, "a row's result depends on the rows beside it")

@@ -10,7 +10,8 @@ from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.findings import Finding
 from sims.simulator import Array
 
-_ROUNDING = 1e-6
+#: Relative difference of a row alone from the same one in a batch that libraries may make.
+ROUNDING = 1e-6
 #: Forces that are tried, in the joints' units: one is large enough for whatever is moved.
 _FORCES = (1.0, 1e6, 1e12)
 
@@ -28,20 +29,26 @@ def parameters_by_row(
         "stack the results: np.stack([...], axis=1)"
     )
     whole = simulator.step(states, actions)
-    for name, parameter in simulator.parameters.items():
-        if np.ndim(parameter.value):
-            continue
+    for name, rows in _by_row(simulator, len(states)).items():
         says = f"{name} as one number for each row, shape (n,), "
         try:
-            by_row = simulator.with_parameters(**{name: np.full(len(states), parameter.value)})
-            found = by_row.step(states, actions)
+            found = simulator.with_parameters(**{name: rows}).step(states, actions)
         except Exception as error:
             told = "" if "stack" in str(error) else f"; {remedy}"
             says += f"raises {type(error).__name__}: {error}{told}"
             return Finding("parameters by row", False, says)
-        if not np.allclose(found, whole, rtol=_ROUNDING, atol=0, equal_nan=True):
+        if not np.allclose(found, whole, rtol=ROUNDING, atol=0, equal_nan=True):
             return Finding("parameters by row", False, f"{says}gives other numbers; {remedy}")
     return Finding("parameters by row", True, "one number for each row acts like the same scalar")
+
+
+def _by_row(simulator: EquationOfMotion | FirstOrderSystem, count: int) -> dict[str, Array]:
+    """Every parameter that is a number, as one number for each row, (count,)."""
+    return {
+        name: np.full(count, parameter.value)
+        for name, parameter in simulator.parameters.items()
+        if not np.ndim(parameter.value)
+    }
 
 
 def acceleration_keeps(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:
@@ -100,9 +107,8 @@ def drive_tells(
     if not simulator.has_drive_force:
         return Finding(check, True, "is not told")
     asked: dict[str, dict[str, Array]] = {"": {}} | {
-        f" where {name} is one number for each row": {name: np.full(len(states), one.value)}
-        for name, one in simulator.parameters.items()
-        if not np.ndim(one.value)
+        f" where {name} is one number for each row": {name: rows}
+        for name, rows in _by_row(simulator, len(states)).items()
     }
     for where, values in asked.items():
         try:

@@ -43,7 +43,7 @@ from residual.gap.search.finals import on_more_windows
 from residual.gap.search.known import KNOWN
 from residual.logs import LogData
 from residual.logs.checks import Finding
-from residual.trajectories import Trajectory, trajectories_of
+from residual.trajectories import Trajectory, converted_units, trajectories_of
 from sims.contract import refuse_unsound
 from sims.effects.base import Effect
 from sims.host import HostSimulator
@@ -124,7 +124,7 @@ def find_gap(
 
         log, prepared = settle(simulator, log, tell)
         clock.begin(minutes or usual_minutes(simulator))
-        converted = {name: unit for run in log.runs for name, unit in run.converted.items()}
+        converted = converted_units(log.runs)
         conventions = otherwise(simulator, prepared.fitter, converted)
         conventions = conventions or without_sign(simulator, prepared.fitter)
         conventions = conventions or beyond_scale(simulator, prepared.fitter.samples, converted)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.left import NOTABLE
+from residual.gap.answer.left import HALF, NOTABLE, half_beyond_noise
 from residual.gap.beside import Changing
 from residual.gap.confirmation.constancy import (
     CHANCE,
@@ -40,8 +40,6 @@ from sims.effects.parameter_curve import ParameterCurve
 
 Array = NDArray[np.float64]
 
-#: Part of what is left beyond noise, without its change, that it may leave.
-HALF = 0.5
 #: Times that a change of what is named has to leave more.
 CLEARLY = 1.5
 
@@ -66,11 +64,8 @@ def changing(answer: Answer, in_vain: Collection[ParameterCurve] = ()) -> Changi
     told, left = _best(answer, answer.key, asked) or (None, search.tried[answer.key].merit)
     much = isinstance(search.fitter, SmoothFitter) and answer.left.ratio > NOTABLE
     alone = _best(answer, (), asked) if answer.key and much else None
-    if alone is not None:
-        assert isinstance(search.fitter, SmoothFitter)
-        by_noise = search.fitter.noise_alone(answer.found.floor.sigma)
-        if alone[1] - by_noise < HALF * (left - by_noise):
-            return dataclasses.replace(alone[0], instead=True)
+    if alone is not None and alone[1] < half_beyond_noise(answer, left):
+        return dataclasses.replace(alone[0], instead=True)
     return told
 
 

@@ -21,7 +21,7 @@ from sims.effects.flexible import FlexiblePart
 #: Part of the squared forecast error of the library's laws, less what noise makes, that further
 #: effects may leave; where they stand for more effects than they are.
 QUARTER, OF_MORE = 0.25, 0.5
-#: Part of what is left beyond noise that a rarer effect has to take off in the linear picture.
+#: Part of what is left beyond noise that its cause may leave in the linear picture.
 HALF = 0.5
 #: Loss over that of one of its family, up to which an effect fits about as well.
 NEARLY = 1.25
@@ -54,8 +54,7 @@ def worth_asking_for(answer: Answer, further: Sequence[Effect]) -> list[Effect]:
     fitter, fit = search.fitter, search.tried[key]
     if not isinstance(fitter, SmoothFitter) or not much_is_left(answer):
         return []
-    noise = fitter.noise_alone(answer.found.floor.sigma)
-    most = noise + HALF * (fit.merit - noise)
+    most = half_beyond_noise(answer, fit.merit)
     pool = candidates(fit.model.simulator, further, fitter.samples)
     moved = [beside_starts(fit, fitter.columns(fit, [one])) for one in pool]
     losses = [beside(fit, [columns], fitter.cap).loss for columns in moved]
@@ -78,6 +77,19 @@ def _fits_in_place(one: Candidate, fitter: SmoothFitter, fit: Fit) -> bool:
     model = Model(fit.model.simulator, [*kept, one])
     starts = (np.append(own, trial.values[0]) for trial in one.trials)
     return any(fitter.fit(model, start, fit).merit < NEARLY * fit.merit for start in starts)
+
+
+def half_beyond_noise(answer: Answer, loss: float) -> float:
+    """Half of a loss, beside what noise alone makes: what a remainder with a cause leaves at most.
+
+    Args:
+        answer: Of a system without impacts.
+        loss: What is left without that cause.
+    """
+    fitter = answer.found.search.fitter
+    assert isinstance(fitter, SmoothFitter)
+    by_noise = fitter.noise_alone(answer.found.floor.sigma)
+    return by_noise + HALF * (loss - by_noise)
 
 
 def much_is_left(answer: Answer) -> bool:

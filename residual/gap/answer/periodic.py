@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import percentile_filter
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.left import NOTABLE
+from residual.gap.answer.left import NOTABLE, half_beyond_noise
 from residual.gap.beside import Periodic
 from residual.gap.confirmation.drift import beside
 from residual.gap.data.samples import Samples
@@ -30,8 +30,6 @@ Array = NDArray[np.float64]
 STANDS_OUT = 25.0
 #: Bins, as a share of all, over which that median is taken.
 AROUND = 0.05
-#: Part of what is left beyond noise that it may leave.
-HALF = 0.5
 #: Periods in the longest record, samples in a period, and samples of a record, at the least.
 PERIODS, PER_PERIOD, ROWS = 5, 3, 64
 #: Whole parts of the frequency at which inputs must not swing, nor, but for itself, motion.
@@ -44,7 +42,7 @@ def periodic(answer: Answer) -> Periodic | None:
     Args:
         answer: What was named.
     """
-    found, search = answer.found, answer.found.search
+    search = answer.found.search
     fitter, fit = search.fitter, search.tried[answer.key]
     if not isinstance(fitter, SmoothFitter) or answer.left.adequate:
         return None
@@ -55,8 +53,7 @@ def periodic(answer: Answer) -> Periodic | None:
     after = model.advance(samples, nodes[None], fit.theta[None])[0]
     steps = np.append(nodes[1:] - after[:-1], np.zeros((1, nodes.shape[1])), axis=0)
     names = [channel.name for channel in search.simulator.physical_channels]
-    by_noise = fitter.noise_alone(found.floor.sigma)
-    best, least = None, by_noise + HALF * (fit.merit - by_noise)
+    best, least = None, half_beyond_noise(answer, fit.merit)
     for joint in search.simulator.joints:
         series = steps[:, names.index(joint.rate or joint.position)]
         frequency = line(samples, series)

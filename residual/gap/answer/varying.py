@@ -8,9 +8,9 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.answer.changing import HALF, Course, courses_of
+from residual.gap.answer.changing import Course, courses_of
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.left import much_is_left
+from residual.gap.answer.left import half_beyond_noise, much_is_left
 from residual.gap.data.levels import levels
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts
@@ -65,9 +65,7 @@ def _from_the_nominal(answer: Answer) -> list[Course]:
     search = answer.found.search
     if not (isinstance(search.fitter, SmoothFitter) and much_is_left(answer)):
         return []
-    left = search.tried[answer.key].merit
-    by_noise = search.fitter.noise_alone(answer.found.floor.sigma)
-    most = by_noise + HALF * (left - by_noise)
+    most = half_beyond_noise(answer, search.tried[answer.key].merit)
     return [one for one in _beside(answer, ()) if one.fall.loss < most]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from residual.gap.data.inspection import measured
 from residual.logs.checks import Finding
 from residual.logs.units import other_units
-from residual.trajectories import Trajectory
+from residual.trajectories import Trajectory, converted_units
 from sims.host import HostSimulator
 from sims.simulator import UNDECLARED, Channel
 
@@ -29,7 +29,7 @@ COLD, ZERO, OUTSIDE = 200.0, 273.15, (-10.0, 50.0)
 def sizes(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
     """Columns that move far more or far less than declared, as they would not in another unit."""
     found = []
-    converted = {name: unit for run in trajectories for name, unit in run.converted.items()}
+    converted = converted_units(trajectories)
     for channel, size, declared in _sizes(simulator, trajectories):
         times = size / declared
         if not times > 0.0 or 1 / FAR < times < FAR:
