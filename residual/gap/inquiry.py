@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from residual.gap.answer.confirmed import Answer, confirm
 from residual.gap.answer.curves import over_the_log
 from residual.gap.clock import Clock, seldom
+from residual.gap.confirmation.instead import with_other_answers
 from residual.gap.confirmation.twins import exact_twins, with_twins
 from residual.gap.confirmed import Confirmed
 from residual.gap.fitting.smooth import LEAD, SmoothFitter
@@ -93,7 +94,11 @@ class Inquiry:
         if matters:
             known = OnceMore(self, log, tolerance).of(known)
         answer = known.answer
-        claims = with_twins(answer.found.search, answer.key, answer.claims)
+        search, found = answer.found.search, answer.found
+        claims = with_other_answers(
+            search, answer.key, answer.claims, found.adequate, found.floor, until
+        )
+        claims = with_twins(search, answer.key, claims)
         return dataclasses.replace(known, answer=dataclasses.replace(answer, claims=claims))
 
     def asked_of(

@@ -25,7 +25,7 @@ Doubt = Literal[
     "not_needed", "unsteady", "creeps", "drift", "one_way", "law", "numerics", "at_bound",
     "clock", "within_step", "swapped", "conventions", "cut_off", "extreme", "orders", "levels",
     "loop", "records", "set_aside", "no_help", "sensor", "no_time", "may_be_zero", "size_open",
-    "share_may_be_zero", "calibration", "within", "slight", "few_blocks", "rivals",
+    "share_may_be_zero", "calibration", "within", "slight", "few_blocks", "rivals", "instead",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.
 WORSE = 1.05
@@ -89,6 +89,7 @@ class Verdict:
             of a remainder, the part that is left.
         provisional: True if too few blocks of data had to confirm it.
         same_motion: Those of ``alternatives`` that no motion can tell from it.
+        instead: Effects that together do as well as all that is named, without it.
         meant: What some of those would be in its place.
         beside: What this one would be if a twin of another named effect is meant, where that
             makes a difference; the intervals hold it.
@@ -112,6 +113,7 @@ class Verdict:
     together: tuple[tuple[str, ...], ...] = ()
     form: tuple[str, ...] = ()
     doubts: tuple[Doubt, ...] = ()
+    instead: tuple[str, ...] = ()
     follows: str = ""
     shape: Mapping[str, float] = dataclasses.field(default_factory=dict)
     meant: tuple[Meant, ...] = ()

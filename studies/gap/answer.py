@@ -132,13 +132,17 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
             found.append(
                 f"{name}no constant: about {begin} where records begin and {end} where they end"
             )
-    doubts = [DOUBTS[doubt] for doubt in verdict.doubts if doubt != "rivals"]
+    # What would do in its place is told by name.
+    doubts = [DOUBTS[one] for one in verdict.doubts if one not in ("rivals", "instead")]
     own = verdict.label
     if own in rivals(verdict):
         found.append("of another order it would do nearly as well")
     others = [label for label in rivals(verdict) if label != own]
     if others:
         found.append(f"one of {names_of((own, *others))}: these data cannot tell which")
+    if verdict.instead:
+        together = listed([effect_name(name) for name in verdict.instead])
+        found.append(f"not certain: {together} would do as well as all that is named here")
     if doubts:
         found.append(f"not certain: {listed(doubts)}")
     if verdict.form:

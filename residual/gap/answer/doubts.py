@@ -50,6 +50,7 @@ DOUBTS: dict[Doubt, str] = {
     "few_blocks": "what has no name is much more than noise, and there are too few blocks of data "
     "to say that it is not what this one stands for",
     "rivals": "an effect of another kind does nearly as well",
+    "instead": "other effects together do as well without it",
 }
 
 
@@ -95,5 +96,6 @@ def doubts(
         "share_may_be_zero": not claim.gains,
         "few_blocks": thin,
         "rivals": bool(claim.rivals or claim.alike),
+        "instead": bool(claim.instead),
     }
     return tuple(doubt for doubt, there in why.items() if there)

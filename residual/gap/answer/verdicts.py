@@ -97,15 +97,17 @@ def effect_verdict(
     if together:
         sets = " or ".join(" with ".join(names) for names in together[:2])
         says.append(f"{sets}, in one exact proportion, would move alike")
+    if claim.instead:
+        says.append(f"{', '.join(claim.instead)} do as well without it")
     why = doubts(claim, vanishes, thin, wide)
-    says += [DOUBTS[doubt] for doubt in why if doubt != "rivals"]
+    says += [DOUBTS[doubt] for doubt in why if doubt not in ("rivals", "instead")]
     if claim.by_fit and not (claim.needed and claim.gains):
         says.append("a fit to all data leaves three times as much without it")
     return Verdict(
         kind, effect.name, effect.where, claim.numbers,
         tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
         "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
-        why, shape=given, meant=claim.meant, beside=claim.beside,
+        why, claim.instead, shape=given, meant=claim.meant, beside=claim.beside,
     )  # fmt: skip
 
 

@@ -43,6 +43,7 @@ class Claim:
             are free within their tolerance.
         within: Whether it may be a parameter, gain or scale off by no more than its tolerance.
         slight: Whether they are without these, too: the parameters do nothing of its work.
+        instead: Effects that together do as well as its whole set, without it.
         unasked: Whether there was no time to ask that, or for what may stand in its place.
         brief: Whether it is a time too short for the log's own clock.
         within_step: Whether it may be less than a step of the sensor whose zero it is.
@@ -101,6 +102,7 @@ class Claim:
     drifts: bool = False
     one_way: bool = False
     other_law: bool = False
+    instead: tuple[str, ...] = ()
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
 
@@ -136,6 +138,7 @@ class Claim:
             self.helpless,
             self.rivals,
             self.alike,
+            self.instead,
             self.unasked,
             self.creeps,
             self.drifts,

@@ -44,7 +44,7 @@ def run(
     grown: set[Key] = set()
     reached = 1.0
     if seeds:
-        frontier = _best(search, search.add(seeds)) or frontier
+        frontier = best_of(search, search.add(seeds)) or frontier
         reached = search.error(frontier[0])
         frontier = _alone(search, quiet) or frontier
     for level in range(1, effort.most + 1):
@@ -62,7 +62,7 @@ def run(
             break
         if frontier:
             continue
-        frontier = _best(search, fresh)
+        frontier = best_of(search, fresh)
         now = search.error(frontier[0])
         if (level > 1 or seeds) and not _pays(search, frontier[0], reached):
             break
@@ -94,7 +94,7 @@ def _alone(search: Search, quiet: Callable[[Key], bool]) -> list[Key]:
     return [likeliest] if quiet(likeliest) else []
 
 
-def _best(search: Search, keys: list[Key]) -> list[Key]:
+def best_of(search: Search, keys: list[Key]) -> list[Key]:
     """The sets that forecast best, with and without room for more, and those that fit best."""
     good = sorted((key for key in keys if search.sound(key)), key=search.error)
     room = [key for key in good if search.numbers(key) < search.most_numbers]

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from residual.gap.fitting.screening import Signatures
+from sims.effects.base import Effect
 from sims.effects.curve import Curve
+from sims.effects.sensor import SensorEffect
 
 if TYPE_CHECKING:
     from residual.gap.search.pool import Key
@@ -29,6 +31,8 @@ def doubles(search: Search, key: Key) -> bool:
     effects = [search.candidates[i].effect for i in key]
     if any(one.covers(other) for one in effects for other in effects):
         return True
+    if any(_misplaces(search, one, other) for one in effects for other in effects):
+        return True
     points = [number for number in by_points(search) if number in key]
     if len(key) < 2 or not points:
         return False
@@ -39,6 +43,14 @@ def doubles(search: Search, key: Key) -> bool:
         for other in key
         if other != curve and not _takes_away(search, other, curve)
     )
+
+
+def _misplaces(search: Search, sensor: Effect, curve: Effect) -> bool:
+    """Whether a sensor's zero or scale only moves the points of a curve by what it shows."""
+    if not (isinstance(sensor, SensorEffect) and isinstance(curve, Curve)):
+        return False
+    joints = {joint.name: joint.position for joint in search.simulator.joints}
+    return curve.along == "position" and sensor.where == joints[curve.where]
 
 
 def _takes_away(search: Search, number: int, curve: int) -> bool:

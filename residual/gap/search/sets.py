@@ -73,6 +73,8 @@ class Search(Pool):
         free = sum(len(candidate.knobs) for candidate in beside)
         base = fitter.fit(self.model(()), np.zeros(free), self.nominal) if free else self.nominal
         self.tried: dict[Key, Fit] = {(): base}
+        self.barred: frozenset[int] = frozenset()
+        self.at_most = 1_000_000
         self.unfit: set[Key] = set()
         self.refused: dict[Key, str] = {}
         self.nearly: set[Key] = set()
@@ -109,8 +111,8 @@ class Search(Pool):
         """
         windows = len(self.fitter.blocks.windows)
         most = windows if len(key) == 1 else self.most_numbers
-        few = len(key) <= self.effort.most and self.numbers(key) <= most
-        return few and not doubles(self, key)
+        few = len(key) <= self.effort.most and self.numbers(key) <= min(most, self.at_most)
+        return few and self.barred.isdisjoint(key) and not doubles(self, key)
 
     @property
     def most_numbers(self) -> int:
@@ -127,7 +129,7 @@ class Search(Pool):
 
     def usable(self) -> list[Key]:
         """Sets that converged and may be right."""
-        return [k for k in self.validated if k not in self.unfit and k not in self.refused]
+        return [key for key in self.validated if self.sound(key)]
 
     def best(self) -> Key:
         """The set that forecasts best."""
@@ -135,7 +137,8 @@ class Search(Pool):
 
     def sound(self, key: Key) -> bool:
         """Whether a fitted set converged and may be right."""
-        return key not in self.unfit and key not in self.refused
+        wrong = key in self.unfit or key in self.refused
+        return not wrong and self.barred.isdisjoint(key)
 
     @property
     def late(self) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from residual.gap.fitting.screening import Gain
-from residual.gap.search.beam import _best, boldly, improves, partners, plainer, together
+from residual.gap.search.beam import best_of, boldly, improves, partners, plainer, together
 
 LAW, CASE, OTHER = 0, 1, 2
 
@@ -29,7 +29,7 @@ def test_sets_with_room_for_more_keep_their_place():
         tried={key: SimpleNamespace(merit=error) for key, error in errors.items()},
         effort=SimpleNamespace(beam=2),
     )  # fmt: skip
-    assert _best(search, list(errors)) == [(1, 2), (3,), (0,)]
+    assert best_of(search, list(errors)) == [(1, 2), (3,), (0,)]
 
 
 def test_a_set_that_stands_for_an_absurd_one_adds_nothing_for_its_joint():
