@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
+from sims.effects.coupling import Coupling
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import flexible_parts
 from sims.effects.friction import DryFriction
@@ -20,9 +21,9 @@ from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
 from sims.effects.parameter_curve import ParameterCurve
 from sims.effects.response import AsymmetricResponse
-from sims.effects.store import SecondStore, stores
+from sims.effects.store import stores
 from sims.host import HostSimulator
-from sims.motion import Acceleration, DriveForce, Motion, carrying
+from sims.motion import Acceleration, DriveForce, Flow, Motion, carrying
 from sims.simulator import Array
 
 #: What a thread asked for last: a path asks for the same motion at every step.
@@ -64,10 +65,10 @@ def motion_of(
     """
     there = [effect for effect in host.effects if not effect.absent]
     forces = [(names.index(e.joint), e.where_turn_is(_turn(host, e))) for e in host.joint_effects()]
-    flows: list[tuple[int, int, Exchange | SecondStore]] = [
+    flows: list[tuple[int, int, Flow]] = [
         (names.index(e.pair[0]), names.index(e.pair[1]), e)
         for e in there
-        if isinstance(e, Exchange)
+        if isinstance(e, (Exchange, Coupling))
     ]
     flows += [(names.index(e.joint), len(names) + i, e) for i, e in enumerate(stores(host))]
     states = len(names) + len(stores(host))

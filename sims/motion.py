@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from sims.effects.backlash import Backlash
+from sims.effects.coupling import Coupling
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import FlexiblePart
 from sims.effects.friction import CoulombFriction, DryFriction
@@ -24,6 +25,7 @@ from sims.simulator import Array
 
 Acceleration = Callable[[Array, Array, Array, Array, SimpleNamespace], Array]
 DriveForce = Callable[[Array, Array, Array, SimpleNamespace], Array]
+Flow = Exchange | SecondStore | Coupling
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,7 +53,7 @@ class Motion:
     plays: tuple[tuple[int, Backlash], ...] = ()
     capped: tuple[tuple[int, RateLimit], ...] = ()
     returns: tuple[tuple[int, AsymmetricResponse, bool], ...] = ()
-    flows: tuple[tuple[int, int, Exchange | SecondStore], ...] = ()
+    flows: tuple[tuple[int, int, Flow], ...] = ()
     parts: tuple[tuple[int, int, FlexiblePart], ...] = ()
     span: Array | None = None
 

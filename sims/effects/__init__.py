@@ -16,6 +16,7 @@ from sims.effects.backlash import Backlash as Backlash
 from sims.effects.base import Effect as Effect
 from sims.effects.base import Quantity as Quantity
 from sims.effects.base import number as number
+from sims.effects.coupling import Coupling as Coupling
 from sims.effects.curve import Curve as Curve
 from sims.effects.curve import CurveFromZero as CurveFromZero
 from sims.effects.curves import CURVES as CURVES

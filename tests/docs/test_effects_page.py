@@ -46,11 +46,13 @@ class Coupled(EquationOfMotion):
 def row(effect: Effect) -> str:
     """The effect's row of the table; units are those of a joint that turns, driven by a voltage."""
     first_order = effect.where.startswith("level")
-    host = Coupled() if effect.name == "added_inertia" else PendulumEquation()
+    coupled = effect.name in ("added_inertia", "coupling")
+    host = Coupled() if coupled else PendulumEquation()
     known = effect.quantities(Tank() if first_order else host)
     numbers = ", ".join(f"`{name}` {quantity.unit}" for name, quantity in known.items())
     place = PLACES[next(iter(inspect.signature(type(effect)).parameters))]
     place = "two states" if " and " in effect.where else place
+    place = "two joints" if effect.name == "coupling" else place
     family = effect.family + (f", {effect.subfamily}" if effect.subfamily else "")
     cells = (f"`{effect.name}`", place, numbers, family, effect.sentence, effect.needs)
     return f"| {' | '.join(cells)} |"
@@ -69,7 +71,7 @@ OTHERS = [
     effects.ParameterCurve("mass", "voltage"), effects.Unbalance("pivot"),
     effects.LoadDependentFriction("pivot"), effects.AsymmetricResponse("level"),
     effects.AsymmetricActuator("voltage"), effects.SlewLimit("voltage"),
-    effects.Hysteresis("voltage"),
+    effects.Hysteresis("voltage"), effects.Coupling("pivot by elbow"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}

@@ -20,6 +20,7 @@ from residual.gap.model.reach import (
 )
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect, Quantity
+from sims.effects.coupling import Coupling
 from sims.effects.curve import Curve
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import FlexiblePart
@@ -197,8 +198,9 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
         return not set(effect.pair) <= measured
     if isinstance(effect, SecondStore):
         return effect.joint not in measured
-    joint = next((j for j in simulator.joints if j.name == effect.where), None)
-    if isinstance(effect, FlexiblePart) and joint is not None:
+    where = effect.pair[1] if isinstance(effect, Coupling) else effect.where
+    joint = next((j for j in simulator.joints if j.name == where), None)
+    if isinstance(effect, (FlexiblePart, Coupling)) and joint is not None:
         return not {joint.position, joint.rate} & measured
     if not isinstance(effect, JointEffect) or joint is None or joint.position in measured:
         return False
