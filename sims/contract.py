@@ -15,7 +15,7 @@ from sims.equation_contract import (
 )
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.findings import Finding, draw, example
-from sims.simulator import Array, Channel, Simulator
+from sims.simulator import Array, Channel, Parameter, Simulator
 from sims.unsound import Unsound
 
 #: What makes every number of a simulator worthless.
@@ -82,8 +82,7 @@ def declared(simulator: Simulator) -> Iterator[Finding]:
     wrong = _wrong_channels(simulator)
     says = wrong or f"{len(simulator.state_channels)} of the state"
     yield Finding("channels", not wrong, says)
-    if not isinstance(getattr(simulator, "parameters", {}), Mapping):
-        says = f"parameters is a {type(simulator.parameters).__name__}, expected them by name"
+    if says := _wrong_parameters(simulator):
         yield Finding("parameters", False, says)
 
 
@@ -105,6 +104,18 @@ def _wrong_channels(simulator: Simulator) -> str:
             return f"{names.count(channel.name)} channels are called {channel.name!r}"
         if channel.rate_of is not None and channel.rate_of not in names:
             return f"{channel.name!r} is the rate of {channel.rate_of!r}, which is no channel"
+    return ""
+
+
+def _wrong_parameters(simulator: Simulator) -> str:
+    """What is wrong with the parameters, if there are any and anything is."""
+    given = getattr(simulator, "parameters", {})
+    if not isinstance(given, Mapping):
+        return f"parameters is a {type(given).__name__}, expected them by name"
+    for name, one in given.items():
+        inside = not isinstance(one, Parameter) or (one.low <= one.value) & (one.value <= one.high)
+        if not np.all(inside):
+            return f"{name!r} is {one.value}, outside its own bounds {one.low:g} and {one.high:g}"
     return ""
 
 

@@ -18,7 +18,7 @@ import yaml
 from simgap_files import safe_yaml
 from sims.effects.base import Effect
 from sims.host import HostSimulator
-from sims.model_files import model_settings, names_model
+from sims.model_files import MODEL_FILES, model_settings, names_model
 from sims.simulator import Hold, Simulator
 from sims.trust import check_file, trusting
 
@@ -157,9 +157,10 @@ def not_found(source: str | Mapping[str, Any]) -> str:
             f"{source} is a folder; expected MODULE.CLASS, as import would find it, or a file that "
             "names one"
         )
-    if isinstance(source, str) and Path(source).suffix in (".yaml", ".yml"):
-        if not Path(source).is_file():
-            return "there is no such file"
+    kind = Path(source).suffix.lower() if isinstance(source, str) else ""
+    if kind in (".yaml", ".yml", *MODEL_FILES) and not Path(str(source)).is_file():
+        return f"there is no file {source}"
+    if isinstance(source, str) and kind in (".yaml", ".yml"):
         try:
             settings = safe_yaml.read(source)
         except ValueError as error:

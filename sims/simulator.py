@@ -6,13 +6,14 @@ import abc
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Literal, Self
+from typing import Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Hold = Literal["zero", "linear"]
+Kind = Literal["position", "rate", "input", "other", "memory"]
 
 #: Units of angles, and what a whole turn is in each.
 TURNS: Mapping[str, float] = {"rad": math.tau, "deg": 360.0, "rev": 1.0}
@@ -47,13 +48,13 @@ class Channel:
             may be summed up from a yaw rate: its noise is then a random walk.
 
     Raises:
-        ValueError: A channel with ``angle=True`` that is not in rad, so that its turns are not
-            those of 2 pi.
+        ValueError: There is no such kind; or ``angle=True`` of a channel that is not in rad, so
+            that its turns are not those of 2 pi.
     """
 
     name: str
     unit: str
-    kind: Literal["position", "rate", "input", "other", "memory"]
+    kind: Kind
     angle: bool = False
     rate_of: str | None = None
     scale: float = UNDECLARED
@@ -64,6 +65,11 @@ class Channel:
     integrates: str | None = None
 
     def __post_init__(self) -> None:
+        if self.kind not in get_args(Kind):
+            expected = ", ".join(map(repr, get_args(Kind)))
+            raise ValueError(
+                f"channel {self.name!r} has kind={self.kind!r}, expected one of {expected}"
+            )
         if self.angle and self.unit != "rad":
             raise ValueError(
                 f"channel {self.name!r} has angle=True and unit={self.unit!r}, expected 'rad': "

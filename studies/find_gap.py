@@ -168,6 +168,7 @@ def run(
     tell("checking the integration step")
     for line in advice(simulator, data.trajectories):
         tell(line)
+        findings.append(Finding("step", simulator.name, line, severity="warning"))
     moved = simulator.for_motion([run.states for run in data.trajectories])
     minutes = study.minutes or usual_minutes(moved)
     budget(60 * minutes)

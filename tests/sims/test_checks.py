@@ -223,6 +223,13 @@ class Empty(Good):
     state_channels = ()
 
 
+class Negative(PendulumEquation):
+    def __init__(self, **options):
+        super().__init__(**options)
+        mass = Parameter(-0.1, "kg", "of the pendulum", low=0.0)
+        self.parameters = self.parameters | {"mass": mass}
+
+
 class Bent(PendulumEquation):
     def acceleration(self, q, v, u, force, p):
         return super().acceleration(q, v, u, force * np.abs(force), p)
@@ -242,6 +249,7 @@ class Undefined(PendulumEquation):
         (BreakingFarOut, "finite to the bounds"),
         (Timeless, "period"),
         (Empty, "channels"),
+        (Negative, "parameters"),
         (Bent, "linear in forces"),
     ],
 )

@@ -285,3 +285,8 @@ def test_an_angle_that_wraps_is_in_rad():
     with pytest.raises(ValueError, match=r"'sway' has angle=True and unit='deg', expected 'rad'"):
         Channel("sway", "deg", "position", angle=True)
     Channel("sway", "deg", "position")
+
+
+def test_a_channel_of_no_kind_is_refused():
+    with pytest.raises(ValueError, match=r"'x' has kind='positoin', expected one of 'position', "):
+        Channel("x", "m", "positoin")

@@ -181,6 +181,7 @@ SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
         ("find_gap", ("--simulator", "bytes.yaml"), "bytes.yaml is no YAML: character 1: "),
         ("find_gap", ("--simulator=sims.None",), "--simulator: there is no class sims.None; expec"),
         ("find_gap", ("--simulator=sims.Pendulm",), "sims.Pendulm; did you mean sims.Pendulum?"),
+        ("find_gap", ("--simulator", "gone.xml"), "--simulator: there is no file gone.xml"),
         ("find_gap", ("--simulator", "no_such.X"), "there is no module 'no_such' for no_such"),
         ("find_gap", ("--simulator", "arm.py:Arm"), "is no import path; write arm.Arm"),
         ("find_gap", ("--simulator", "."), "--simulator: . is a folder; expected MODULE.CLASS"),
