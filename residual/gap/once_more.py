@@ -40,7 +40,7 @@ class OnceMore(OtherWindows):
         left_out = bool(known.says)
         for step in (
             self.with_parameters_free, self.with_further, self.with_varying, self.with_curves,
-            self.with_parts, self.longer, self.longest, self.slow,
+            self.shorter, self.with_parts, self.longer, self.longest, self.slow,
         ):  # fmt: skip
             known = self._step(step, known)
         if known.why:

@@ -6,6 +6,8 @@ import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.left import names_more
 from residual.gap.answer.lone import explains_the_rest, lone_stretch
@@ -23,6 +25,9 @@ if TYPE_CHECKING:
 #: Part of a slow error that may be left by what takes the place of names of which none is certain,
 #: where more than noise is left.
 HALF = 0.5
+#: Part of the usual length that much shorter forecasts have, and rows at least; residual over noise
+#: from which on they are tried.
+PART, SAMPLES, FAR = 1 / 8, 16, 10.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,6 +59,29 @@ class OtherWindows:
         if not explains_the_rest(answer):
             return known
         return Confirmed(ready, answer, (stretch.says(left_out=True),))
+
+    def shorter(self, known: Confirmed) -> Confirmed:
+        """The same, or what is found over much shorter forecasts.
+
+        They are tried where nothing could be named of much: motion that teeth or a stop catch now
+        and then goes another way after a while for the least difference, and hides its cause.
+        """
+        answer, search = known.answer, known.answer.found.search
+        horizon = PART * self.log.horizon
+        step = np.median(np.concatenate([run.durations for run in self.log.recorded]))
+        if self.log.by_user or answer.key or search.beside or search.simulator.has_contacts:
+            return known
+        if answer.left.ratio < FAR or horizon < SAMPLES * step or self.inquiry.clock.searched:
+            return known
+        ready, found = self.over(known, horizon, "much shorter forecasts")
+        if not explains_the_rest(found):
+            return known
+        says = (
+            f"forecasts go over {duration_text(ready.fitter.seconds)}: over "
+            f"{duration_text(search.fitter.seconds)} motion hangs on where it begins, and nothing "
+            "could be named"
+        )
+        return dataclasses.replace(known, prepared=ready, answer=found, why=says)
 
     def longer(self, known: Confirmed) -> Confirmed:
         """The same, or what is found over longer forecasts, of which the records hold fewer.
