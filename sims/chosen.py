@@ -63,6 +63,12 @@ def chosen_effects(
             there = [*known, *map(str, reserve)]
             near = difflib.get_close_matches(str(entry), there, 1)
             hint = f"did you mean {near[0]!r}? Else " if near else ""
+            places = [e.where for e in (*known.values(), *reserve) if e.name == name]
+            if places and where:
+                raise ValueError(
+                    f"no effect {entry!r} for {simulator.name}: {name} acts at "
+                    f"{' or '.join(dict.fromkeys(places))}, and there is no {where!r}"
+                )
             raise ValueError(
                 f"no effect {entry!r} for {simulator.name}: {hint}give the import path of a class "
                 f"of your own, or name@place of {_by_place(there)}"

@@ -88,7 +88,8 @@ class Verdict:
         share: Part of the nominal simulator's cross-validated squared error that it takes off;
             of a remainder, the part that is left.
         provisional: True if too few blocks of data had to confirm it.
-        same_motion: Those of ``alternatives`` that no motion can tell from it.
+        same_motion: Those of ``alternatives`` that no motion can tell from it, ``resized`` those of
+            them that need other sizes of what else is named for that.
         instead: Effects that together do as well as all that is named, without it.
         meant: What some of those would be in its place.
         beside: What this one would be if a twin of another named effect is meant, where that
@@ -118,6 +119,7 @@ class Verdict:
     shape: Mapping[str, float] = dataclasses.field(default_factory=dict)
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
+    resized: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
@@ -261,8 +263,7 @@ class GapResult:
         substeps: Sub-steps per control period of ``corrected``, if it needs more than it had.
         conventions: What to look at first, None where nothing is counted otherwise.
         cut_off: Channels that the simulator cuts off within what was recorded of them.
-        unlike: Effects that would take much of what is left off with a size of their own in each
-            record, best first.
+        unlike: Effects that would take much of what is left off with own sizes in each record.
         changing: What would take most of what is left off if it changed along the records;
             ``periodic``: a force at one frequency that would.
         nearly_late: Labels of delays and lags of some inputs that late, or filtering, sensors would

@@ -76,11 +76,12 @@ class Table:
         listed = ", ".join(shortened(str(name)) for name in self.names[:12])
         return listed + (f" and {len(self.names) - 12} more" if len(self.names) > 12 else "")
 
-    def values(self, column: str | int) -> Sequence[str] | NDArray[Any]:
+    def values(self, column: str | int, channel: str = "") -> Sequence[str] | NDArray[Any]:
         """One column as it stands in the file.
 
         Args:
             column: Name, or position from 1.
+            channel: What it was said to hold.
 
         Raises:
             LogError: It is not there, or there twice.
@@ -90,7 +91,8 @@ class Table:
         if column not in self.columns:
             near = difflib.get_close_matches(str(column), [str(n) for n in self.names], 1, 0.5)
             hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise LogError(f"no column {column!r}, the file has {self.listed}{hint}", self.path)
+            wanted = f"no column {column!r}" + (f" for {channel!r}" if channel else "")
+            raise LogError(f"{wanted}, the file has {self.listed}{hint}", self.path)
         if self.names.count(column) > 1:
             raise LogError(
                 f"{self.names.count(column)} columns have this name, expected one: "

@@ -149,8 +149,13 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         found.append(f"of the same family, {names_of(verdict.form)} would do as well")
     if verdict.same_motion:
         known = {o.effect: f" ({values_of(o)})" for o in verdict.meant}
-        names = [f"{effect_name(name)}{known.get(name, '')}" for name in verdict.same_motion]
-        found.append(f"no motion can tell it from {listed(names, 'or')}")
+        alone = [name for name in verdict.same_motion if name not in verdict.resized]
+        names = [f"{effect_name(name)}{known.get(name, '')}" for name in alone]
+        if names:
+            found.append(f"no motion can tell it from {listed(names, 'or')}")
+        if verdict.resized:
+            moved = listed([effect_name(name) for name in verdict.resized], "or")
+            found.append(f"with other sizes of what else is named, {moved} moves exactly alike")
     if effect.looks_like and isinstance(effect, ActuatorEffect):
         # Sensors that are all late look exactly like inputs that are all late.
         if len(effect.actuators) == len(result.corrected.action_channels):

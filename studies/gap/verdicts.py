@@ -122,7 +122,8 @@ def apart(result: GapResult) -> list[Section]:
         groups = (
             ([name for name in rivals(answer) if name != label], "these data", False),
             (answer.form, "these data, and it is of the same family", False),
-            (answer.same_motion, in_any, True),
+            ([n for n in answer.same_motion if n not in answer.resized], in_any, True),
+            (answer.resized, f"{in_any}, with other sizes of what else is named", True),
             (together, f"{in_any}, in one exact proportion", True),
         )
         rows += [

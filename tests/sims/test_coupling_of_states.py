@@ -99,3 +99,12 @@ def test_what_may_act_on_what():
     for names in ("current by place", "current and speed", "speed by speed"):
         with pytest.raises(ValueError, match="it has: current by speed"):
             Motor(effects=[Coupling(names)])
+
+
+def test_a_place_that_is_none_is_named_with_those_there_are():
+    for asked, says in (
+        ("delay@amps", "delay acts at voltage, and there is no 'amps'"),
+        ("coupling@speed", "coupling acts at current by speed or speed by current or "),
+    ):
+        with pytest.raises(ValueError, match=says):
+            chosen_effects(Motor(), [asked])

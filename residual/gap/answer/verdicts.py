@@ -92,8 +92,11 @@ def effect_verdict(
         )
         says.append(f"these data cannot exclude {', '.join(rivals)}")
     twins = tuple(dict.fromkeys((*claim.twins, *stand_ins)))
-    if twins:
-        says.append(f"the same motion as {', '.join(twins)}")
+    resized = tuple(name for name in twins if name not in claim.twins)
+    if claim.twins:
+        says.append(f"the same motion as {', '.join(claim.twins)}")
+    if resized:
+        says.append(f"with other sizes of the rest the same motion as {', '.join(resized)}")
     if together:
         sets = " or ".join(" with ".join(names) for names in together[:2])
         says.append(f"{sets}, in one exact proportion, would move alike")
@@ -108,6 +111,7 @@ def effect_verdict(
         tuple(dict.fromkeys((*twins, *claim.form, *claim.alike, *claim.rivals))), family,
         "; ".join(says), Span(*claim.share), blocks < FEW, twins, tuple(together), claim.form,
         why, claim.instead, shape=given, meant=claim.meant, beside=claim.beside,
+        resized=resized,
     )  # fmt: skip
 
 

@@ -133,7 +133,10 @@ def test_missing_columns_are_named_with_what_is_there(csv):
     message = error(path)
     assert "no column for action 'voltage', the file has 't', 'theta', 'rate', 'volts'" in message
     message = error(path, actions={"voltage": "volt"}, time="t")
-    assert "no column 'volt', the file has" in message and "did you mean 'volts'?" in message
+    assert (
+        "no column 'volt' for 'voltage', the file has" in message
+        and "did you mean 'volts'?" in message
+    )
     path = csv(lambda lines: ["time,x,y,voltage", *lines[1:]])
     assert "no column is named like a state of the simulator ('angle', 'rate')" in error(path)
 
