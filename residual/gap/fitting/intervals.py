@@ -50,23 +50,41 @@ def deviations(fit: Fit, blocks: Blocks) -> Array:
     return by_slopes if fit.spread is None else np.maximum(by_slopes, fit.spread)
 
 
+def scatter(fit: Fit, blocks: Blocks) -> Array:
+    """How many times as much the numbers scatter from block to block as residuals of the size that
+    is left make them, (p,); one where the model is right and residuals are noise.
+
+    Source: White, "Maximum likelihood estimation of misspecified models", Econometrica 50 (1982):
+    of a wrong model the two ways to tell how well a number is known differ.
+    """
+    if not len(fit.theta):
+        return np.zeros(0)
+    plain, jackknife, _ = _spreads(fit, blocks)
+    return jackknife / np.maximum(plain, 1e-300)
+
+
 def _by_slopes(fit: Fit, blocks: Blocks) -> Array:
-    """Standard deviation of the numbers, (p,): the larger of two.
+    """Standard deviation of the numbers, (p,): the larger one of ``_spreads``, with Student's t for
+    as many blocks as tell of a number."""
+    if not len(fit.theta):
+        return np.zeros(0)
+    plain, jackknife, telling = _spreads(fit, blocks)
+    return np.maximum(plain, jackknife) * _student(telling)
+
+
+def _spreads(fit: Fit, blocks: Blocks) -> tuple[Array, Array, Array]:
+    """Two standard deviations of the numbers, (p,) each, and how many blocks tell of each.
 
     One is Gauss-Newton's with start states projected out, times the residual variance; the other
     is of the numbers that data without one of the blocks would give, which allows for errors that
-    go together within a block. Both with Student's t for as many blocks as tell of a number. What
-    is known of a number beforehand counts as an observation, and is known as well however large
-    the residuals are.
+    go together within a block, zero of too few. What is known of a number beforehand counts as an
+    observation, and is known as well however large the residuals are.
 
     Sources: MacKinnon, Nielsen and Webb, "Fast and reliable jackknife and bootstrap methods for
     cluster-robust inference", J. Applied Econometrics 38 (2023); for the number of blocks Carter,
     Schnepel and Steigerwald, "Asymptotic behavior of a t-test robust to cluster heterogeneity",
     Review of Economics and Statistics 99 (2017).
     """
-    p = len(fit.theta)
-    if not p:
-        return np.zeros(0)
     told = fit.told
     rows, residual = told.by_knob, told.residual
     scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
@@ -85,7 +103,7 @@ def _by_slopes(fit: Fit, blocks: Blocks) -> Array:
     plain = variance * np.maximum(np.diag(inverse), 0.0)  # of a matrix that is all but singular
     count = len(blocks)
     if count <= taken + 1:
-        return np.sqrt(plain) / scale
+        return np.sqrt(plain) / scale, 0.0 * plain, np.full(len(plain), np.inf)
     per_window = np.einsum("wri,wr->wi", unit, residual)
     scores = np.stack([per_window[blocks.block == b].sum(axis=0) for b in range(count)])
     own = np.stack([each[blocks.block == b].sum(axis=0) for b in range(count)])
@@ -96,7 +114,7 @@ def _by_slopes(fit: Fit, blocks: Blocks) -> Array:
     moved = _without_each(inverse, own, scores)
     jackknife = (count - 1) / count * (moved**2).sum(axis=0)
     jackknife += variance**2 * np.einsum("ji,ik,kj->j", inverse, prior, inverse)
-    return np.sqrt(np.maximum(plain, jackknife)) * _student(_telling(inverse, own)) / scale
+    return np.sqrt(plain) / scale, np.sqrt(jackknife) / scale, _telling(inverse, own)
 
 
 def _without_each(inverse: Array, own: Array, scores: Array) -> Array:

@@ -6,8 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from residual.gap.confirmation.certainty import SCATTERED
 from residual.gap.fitting.contract import Fit
-from residual.gap.fitting.intervals import bounded, deviations, ended
+from residual.gap.fitting.intervals import bounded, deviations, ended, scatter
 
 
 def fitted(value, slopes):
@@ -102,3 +103,13 @@ def test_an_interval_is_no_narrower_than_the_profile_of_the_loss_tells():
     own = deviations(fit, Ten())
     wide = dataclasses.replace(fit, spread=np.array([2.0, 0.1]) * own)
     np.testing.assert_allclose(deviations(wide, Ten()), [2.0, 1.0] * own)
+
+
+def test_numbers_scatter_as_noise_does_only_where_the_law_is_right():
+    rng, ramp = np.random.default_rng(0), np.linspace(0.3, 1, 10)
+    right, wrong = (
+        [scatter(slopes_by_block(rng, ramp, together, 2), Ten()).max() for _ in range(200)]
+        for together in (0.0, 1.0)
+    )
+    assert np.median(right) == pytest.approx(1.0, abs=0.3) and max(right) < SCATTERED
+    assert np.mean(np.array(wrong) > SCATTERED) > 0.95
