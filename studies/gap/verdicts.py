@@ -119,12 +119,14 @@ def apart(result: GapResult) -> list[Section]:
         label = answer.label
         together = tuple(" with ".join(names) for names in answer.together[:TOGETHER])
         in_any = "the same motion in any data"
+        whole = (" with ".join(answer.instead),) if answer.instead else ()
         groups = (
             ([name for name in rivals(answer) if name != label], "these data", False),
             (answer.form, "these data, and it is of the same family", False),
             ([n for n in answer.same_motion if n not in answer.resized], in_any, True),
             (answer.resized, f"{in_any}, with other sizes of what else is named", True),
             (together, f"{in_any}, in one exact proportion", True),
+            (whole, "these data, in place of all that is named", False),
         )
         rows += [
             [effect_name(label), names_of(group), why, experiment(label, group, result, same)]
