@@ -62,17 +62,15 @@ def chosen_effects(
         if not own:
             there = [*known, *map(str, reserve)]
             near = difflib.get_close_matches(str(entry), there, 1)
-            hint = f"did you mean {near[0]!r}? Else " if near else ""
-            places = [e.where for e in (*known.values(), *reserve) if e.name == name]
-            if places and where:
-                raise ValueError(
-                    f"no effect {entry!r} for {simulator.name}: {name} acts at "
-                    f"{' or '.join(dict.fromkeys(places))}, and there is no {where!r}"
-                )
-            raise ValueError(
-                f"no effect {entry!r} for {simulator.name}: {hint}give the import path of a class "
-                f"of your own, or name@place of {_by_place(there)}"
-            )
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            places = [e.where for e in (*known.values(), *reserve) if e.name == name and where]
+            says = "Else give" if near else "give"
+            says += " the import path of a class of your own, or name@place of "
+            says += _by_place(there)
+            if places:
+                at = " or ".join(dict.fromkeys(places))
+                says = f"there is no {where!r}, and {name} acts at {at}"
+            raise ValueError(f"no effect {entry!r} for {simulator.name}: {hint}{says}")
         found.update({str(effect): effect for effect in own})
     return tuple(found.values())
 

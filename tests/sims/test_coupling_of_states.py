@@ -103,8 +103,8 @@ def test_what_may_act_on_what():
 
 def test_a_place_that_is_none_is_named_with_those_there_are():
     for asked, says in (
-        ("delay@amps", "delay acts at voltage, and there is no 'amps'"),
-        ("coupling@speed", "coupling acts at current by speed or speed by current or "),
+        ("delay@amps", "there is no 'amps', and delay acts at voltage"),
+        ("coupling@speed", "there is no 'speed', and coupling acts at current by speed or "),
     ):
         with pytest.raises(ValueError, match=says):
             chosen_effects(Motor(), [asked])

@@ -81,10 +81,12 @@ def akin(search: Search, number: int) -> frozenset[int]:
 
 @contextlib.contextmanager
 def _barring(search: Search, numbers: frozenset[int], most: int, until: float) -> Iterator[None]:
-    """Within this context no set holds some candidates, or more numbers than so many."""
-    before = search.barred, search.at_most, search.until
-    search.barred, search.at_most, search.until = numbers, most, until
+    """Within this context no set holds some candidates, or more numbers than so many, and none is
+    tried after a time."""
+    before = search.barred, search.at_most, search.until, search.weigh_until
+    search.barred, search.at_most = numbers, most
+    search.until = search.weigh_until = until
     try:
         yield
     finally:
-        search.barred, search.at_most, search.until = before
+        search.barred, search.at_most, search.until, search.weigh_until = before
