@@ -119,6 +119,11 @@ class Clock:
         return self.over - kept - time.process_time()
 
     @property
+    def spare_until(self) -> float:
+        """When what only bears on certainty ends, so that records and report come in time."""
+        return self.over - KEPT * self._budget
+
+    @property
     def late(self) -> bool:
         """Whether the time for confirming is over, too."""
         return time.process_time() > self.confirm_until

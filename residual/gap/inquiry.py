@@ -96,7 +96,7 @@ class Inquiry:
         answer = known.answer
         search, found = answer.found.search, answer.found
         claims = with_other_answers(
-            search, answer.key, answer.claims, found.adequate, found.floor, self.clock.over
+            search, answer.key, answer.claims, found.adequate, found.floor, self.clock.spare_until
         )
         claims = with_twins(search, answer.key, claims)
         return dataclasses.replace(known, answer=dataclasses.replace(answer, claims=claims))
