@@ -243,3 +243,15 @@ def test_classes_in_the_current_folder_need_no_registration(logs, tmp_path):
         done.stdout.strip().startswith("No gap above the noise")
         and "my arm" in (tmp_path / "gap" / "report.html").read_text()
     )
+
+
+def test_that_a_step_shows_stays_in_the_answer(settings, tmp_path, monkeypatch):
+    says = "the integration step shows in this log; run again with a finer one"
+    monkeypatch.setattr("studies.find_gap.advice", lambda simulator, runs: [says])
+    lines = []
+    answer = run(settings | {"effects": ["mass"]}, tmp_path / "gap", progress=lines.append)
+    assert any(says in line for line in lines)
+    assert any(says in one.words for one in answer.quality)
+    record = json.loads((tmp_path / "gap" / "gap.json").read_text())
+    assert [one["says"] for one in record["quality"] if one["kind"] == "step"] == [says]
+    assert says in words_of(tmp_path / "gap" / "report.html")
