@@ -84,7 +84,8 @@ def claims(
                 other_than(twins, rivals),
                 twins,
                 needed(search, key, number, adequate) and not (adequate and taken[1] < 0),
-                all(steady(search, key, j, least) and not scattered[j] for j in strengths)
+                all(steady(search, key, j, least) for j in strengths)
+                and (compound or not scattered[strengths].any())
                 and (compound or not any(map(far_apart, along.values()))),
                 all(
                     survives(fit.theta[j], half[j], [n[j] for n in limits], least)
