@@ -223,13 +223,6 @@ class Empty(Good):
     state_channels = ()
 
 
-class Negative(PendulumEquation):
-    def __init__(self, **options):
-        super().__init__(**options)
-        mass = Parameter(-0.1, "kg", "of the pendulum", low=0.0)
-        self.parameters = self.parameters | {"mass": mass}
-
-
 class Bent(PendulumEquation):
     def acceleration(self, q, v, u, force, p):
         return super().acceleration(q, v, u, force * np.abs(force), p)
@@ -249,7 +242,6 @@ class Undefined(PendulumEquation):
         (BreakingFarOut, "finite to the bounds"),
         (Timeless, "period"),
         (Empty, "channels"),
-        (Negative, "parameters"),
         (Bent, "linear in forces"),
     ],
 )
@@ -288,26 +280,3 @@ def test_findings_print_as_a_table():
     assert len(lines) == len(findings) and all(finding.ok for finding in findings)
     starts = {line.index(f.says) for line, f in zip(lines, findings, strict=True)}
     assert len(starts) == 1
-
-
-class Hoist(EquationOfMotion):
-    """Its drive tells a force for every row of every row where the gear is a number by row."""
-
-    dt = 0.02
-    state_channels = (
-        Channel("height", "m", "position", scale=1.0),
-        Channel("speed", "m/s", "rate", rate_of="height", scale=1.0),
-    )
-    action_channels = (Channel("torque", "N m", "input", low=-20.0, high=20.0),)
-    parameters: ClassVar = {"drum": Parameter(0.1, "m", "radius of the drum", low=0.01)}
-
-    def acceleration(self, q, v, u, force, p):
-        return ((u[:, 0] / p.drum + force[:, 0]) / 50.0 - 9.81)[:, None]
-
-    def drive_force(self, q, v, u, p):
-        return u / p.drum
-
-
-def test_a_drive_force_that_mixes_rows_is_refused_before_anything_is_computed():
-    with pytest.raises(Unsound, match=r"drive_force: .*drum is one number for each row"):
-        refuse_unsound(Hoist())
