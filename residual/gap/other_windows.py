@@ -67,10 +67,10 @@ class OtherWindows:
         and then goes another way after a while for the least difference, and hides its cause.
         """
         answer, search = known.answer, known.answer.found.search
+        if not self._nothing_named(known) or search.simulator.has_contacts:
+            return known
         horizon = PART * self.log.horizon
         step = np.median(np.concatenate([run.durations for run in self.log.recorded]))
-        if self.log.by_user or answer.key or search.beside or search.simulator.has_contacts:
-            return known
         if answer.left.ratio < FAR or horizon < SAMPLES * step or self.inquiry.clock.searched:
             return known
         ready, found = self.over(known, horizon, "much shorter forecasts")
@@ -89,7 +89,7 @@ class OtherWindows:
         They are tried where nothing could be named.
         """
         search = known.answer.found.search
-        if self.log.by_user or known.answer.key or search.beside:
+        if not self._nothing_named(known):
             return known
         horizon = longer_horizon(search.simulator, self.log, known.answer)
         if horizon is None or self.inquiry.clock.searched:
@@ -108,7 +108,7 @@ class OtherWindows:
         """The same, or what is found over forecasts as long as the records where these alone show
         that something is missing, even if nothing can be named from so few."""
         search = known.answer.found.search
-        if self.log.by_user or known.answer.key or search.beside or self.inquiry.clock.searched:
+        if not self._nothing_named(known) or self.inquiry.clock.searched:
             return known
         slow = None if search.simulator.has_contacts else slow_error(self.log, known.answer)
         if slow is None:
@@ -117,6 +117,11 @@ class OtherWindows:
         what = "the longest forecasts, where a slow error shows"
         ready, answer = self.over(known, horizon, what)
         return dataclasses.replace(known, prepared=ready, answer=answer, why=says)
+
+    def _nothing_named(self, known: Confirmed) -> bool:
+        """Whether nothing could be named over the usual length, parameters at their values."""
+        answer = known.answer
+        return not (self.log.by_user or answer.key or answer.found.search.beside)
 
     def slow(self, known: Confirmed) -> Confirmed:
         """The same, or what is found beside it over longer forecasts, of which the records hold as

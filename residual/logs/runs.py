@@ -142,8 +142,7 @@ def _si(table: Table, column: Column, channel: Channel, decimal: str) -> Array:
         unit = find_unit(column.unit, channel.unit)
     except ValueError as error:
         raise LogError(str(error), table.path, column=column.column) from None
-    table.values(column.column, channel.name)
-    numbers = table.numbers(column.column, decimal)
+    numbers = table.numbers(column.column, decimal, channel.name)
     values = column.scale * (unit.factor * numbers + unit.offset) + column.offset
     wild = np.flatnonzero(~np.isnan(numbers) & ~(np.abs(values) < _LARGEST))
     if wild.size:

@@ -102,17 +102,18 @@ class Table:
             )
         return self.columns[column]
 
-    def numbers(self, column: str | int, decimal: str = ".") -> Array:
+    def numbers(self, column: str | int, decimal: str = ".", channel: str = "") -> Array:
         """One column as numbers; a missing value is NaN.
 
         Args:
             column: Name, or position from 1.
             decimal: The decimal sign, if the file is text.
+            channel: What it was said to hold.
 
         Raises:
             LogError: The column is not there, holds text or something infinite.
         """
-        values = self.values(column)
+        values = self.values(column, channel)
         if isinstance(values, np.ndarray):
             numbers = self._from_array(values, column)
         else:

@@ -50,10 +50,7 @@ def run(
     for level in range(1, effort.most + 1):
         if search.error(search.best()) < effort.enough:
             break
-        fresh: list[Key] = []
-        for key in frontier:
-            more = grow(search, key, quiet)
-            fresh += more + together(search, key, more)
+        fresh = grow_each(search, frontier, quiet)
         grown.update(frontier)
         if not fresh or search.late:
             break
@@ -110,6 +107,15 @@ def _pays(search: Search, key: Key, reached: float) -> bool:
     own = search.currency.by_group(search.validated[key].squares)
     its = search.currency.by_group(search.validated[before].squares)
     return bool((own < (1 - 2 * search.effort.stale) * its).any())
+
+
+def grow_each(search: Search, frontier: list[Key], quiet: Callable[[Key], bool]) -> list[Key]:
+    """Fit sets one effect larger than each of some, and those with one more at every joint."""
+    fresh: list[Key] = []
+    for key in frontier:
+        more = grow(search, key, quiet)
+        fresh += more + together(search, key, more)
+    return fresh
 
 
 def grow(search: Search, key: Key, quiet: Callable[[Key], bool] = lambda _: False) -> list[Key]:

@@ -27,11 +27,12 @@ def by_points(search: Search) -> list[int]:
 
 
 def doubles(search: Search, key: Key) -> bool:
-    """Whether a set holds an effect twice: under two names, or a curve beside a case of it."""
+    """Whether a set holds an effect twice: under two names, a curve beside a case of it, or beside
+    a sensor that only moves its points."""
     effects = [search.candidates[i].effect for i in key]
-    if any(one.covers(other) for one in effects for other in effects):
-        return True
-    if any(_misplaces(search, one, other) for one in effects for other in effects):
+    if any(
+        one.covers(other) or _misplaces(search, one, other) for one in effects for other in effects
+    ):
         return True
     points = [number for number in by_points(search) if number in key]
     if len(key) < 2 or not points:

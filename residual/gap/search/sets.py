@@ -42,6 +42,7 @@ class Search(Pool):
             is charged for: parameters within their tolerance.
         nominal: The simulator as it was given; ``before``: its forecasts.
         tried: Every fitted set: sorted candidate numbers -> fit; ``unfit``: not converged.
+        barred: Candidates that no set may hold for now; ``at_most``: numbers that one may have.
         refused: Sets that cannot be right whatever they take off, and why.
         nearly: Those of them that could be, as far as their numbers are known; ``extreme``: sets
             with numbers as large, that explain what moved.

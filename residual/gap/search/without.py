@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 
-from residual.gap.search.beam import best_of, grow, together
+from residual.gap.search.beam import best_of, grow_each
 from residual.gap.search.exchange import add_exchanged, add_pairs_exchanged
 from residual.gap.search.pool import Key
 from residual.gap.search.sets import Search
@@ -39,11 +39,7 @@ def add_answers_without(
     with _barring(search, akin(search, number), search.numbers(key), until):
         frontier: list[Key] = [()]
         for _ in key:
-            fresh: list[Key] = []
-            for base in frontier:
-                more = grow(search, base, quiet)
-                fresh += more + together(search, base, more)
-            frontier = best_of(search, fresh)
+            frontier = best_of(search, grow_each(search, frontier, quiet))
             if not frontier:
                 break
         for _ in range(ROUNDS):
