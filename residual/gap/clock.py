@@ -13,7 +13,7 @@ from sims.host import HostSimulator
 #: times as long there.
 USUAL, AT_IMPACTS = 2.0, 6.0
 #: Part of the time budget that the first search may take.
-SEARCHING = 0.5
+SEARCHING = 0.4
 #: Part of it that is kept for weighing and confirming what later searches find, and times what that
 #: took first.
 KEPT, AGAIN = 0.2, 1.5

@@ -82,6 +82,7 @@ class Search(Pool):
         self.extreme: set[Key] = set()
         self.halved: dict[Key, Fit] = {}
         self.unasked: set[tuple[Key, int]] = set()
+        self._in_vain: dict[tuple[int, str], float] = {}
         self._noise, self.globally = noise, GlobalSearch(noise, until)
         self._from_longer_leads: dict[Key, Array] = {}
         self._signatures: dict[Key, Signatures] = {}
@@ -238,8 +239,8 @@ class Search(Pool):
                 self.refused[key] = reason
                 if nearly(found, number, self.fitter):
                     self.nearly.add(key)
-            for twin in self.twins_of(key[number]) if number < len(key) else ():
-                self.add_twin(key, key[number], twin)
+            if number < len(key):
+                self._add_twins_of_absurd(key, key[number])
         for gone in absent(found.model, key, found.theta):
             smaller, start = self.merged(key, (), drop=(gone,))
             if smaller:  # the same motion with fewer numbers
@@ -253,12 +254,29 @@ class Search(Pool):
         for known in (self.refused, self.halved, *by_fit):
             known.pop(key, None)
 
-    def add_twin(self, key: Key, gone: int, twin: Candidate) -> None:
-        """Fit a set with an exact twin of a member in its place."""
+    def _add_twins_of_absurd(self, key: Key, gone: int) -> None:
+        """Fit a set with each exact twin of a member that would be absurd in its place.
+
+        A twin that came to nothing where the member was less absurd comes to nothing here, too: a
+        tenth of a strength is ten times the inertia.
+        """
+        fit = self.tried[key]
+        own = fit.theta[fit.model.owner == key.index(gone)]
+        for twin in self.twins_of(gone):
+            least = self._in_vain.get((gone, twin.label))
+            if least is not None and len(own) == 1 and own[0] / least >= 1:
+                continue
+            made = self.add_twin(key, gone, twin)
+            if len(own) == 1 and (made in self.refused or made in self.unfit):
+                self._in_vain[gone, twin.label] = own[0]
+
+    def add_twin(self, key: Key, gone: int, twin: Candidate) -> Key:
+        """Fit a set with an exact twin of a member in its place; returns that set."""
         place = [candidate.effect for candidate in self.candidates].index(twin.effect)
         start = 0.01 * twin.trials[0].values[0]
         fresh, theta = self.merged(key, [(place, start)], drop=(gone,))
         self.add({fresh: theta})
+        return fresh
 
     def same_motion(self, rest: Key, one: int, other: int) -> bool:
         """Whether two effects make the same motion in these data beside some others, if known."""
