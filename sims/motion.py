@@ -81,7 +81,7 @@ class Motion:
     @property
     def even(self) -> bool:
         """Whether dry friction is of the same size at every rate."""
-        return all(type(effect) is CoulombFriction for _, effect in self.dry)
+        return all(isinstance(effect, CoulombFriction) for _, effect in self.dry)
 
     def load(self, q: Array, v: Array, force: Array | None = None) -> Array:
         """Force of the smooth effects on every joint, what flows between them, a further force."""

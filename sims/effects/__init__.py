@@ -28,6 +28,7 @@ from sims.effects.curves import SymmetricInputCurve as SymmetricInputCurve
 from sims.effects.exchange import Exchange as Exchange
 from sims.effects.flexible import FlexibleJoint as FlexibleJoint
 from sims.effects.flexible import FlexiblePart as FlexiblePart
+from sims.effects.friction import ConstantLoss as ConstantLoss
 from sims.effects.friction import CoulombFriction as CoulombFriction
 from sims.effects.friction import DirectionalFriction as DirectionalFriction
 from sims.effects.friction import DryFriction as DryFriction

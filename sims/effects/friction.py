@@ -64,6 +64,31 @@ class CoulombFriction(DryFriction):
 
 
 @dataclasses.dataclass(frozen=True)
+class ConstantLoss(CoulombFriction):
+    """Loss of constant size on the state x of a first-order system: ``-level sign(x)``.
+
+    The dead time of an inverter and a motor's brushes take a constant voltage from a current,
+    whichever way it flows. At zero it holds against whatever is smaller. On a speed it is
+    ``CoulombFriction``.
+    """
+
+    name: ClassVar[str] = "constant_loss"
+    sentence: ClassVar[str] = "A loss of constant size against what flows: brushes, a dead time."
+    needs: ClassVar[str] = "values of both signs"
+    subfamily: ClassVar[str] = ""
+    mechanical: ClassVar[bool] = False
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """See ``JointEffect.measures``; a joint that moves has Coulomb friction for it."""
+        if any(joint.name == self.joint and joint.rate is not None for joint in simulator.joints):
+            raise ValueError(
+                f"{self.name} needs the state of a first-order system, and {self.joint!r} moves: "
+                "there it is coulomb_friction"
+            )
+        return super().measures(simulator)
+
+
+@dataclasses.dataclass(frozen=True)
 class StribeckFriction(DryFriction):
     """Dry friction that drops from ``breakaway`` at rest to ``sliding`` beyond ``speed``.
 

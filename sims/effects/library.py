@@ -26,6 +26,7 @@ from sims.effects.curves import CURVES
 from sims.effects.exchange import Exchange, like_states
 from sims.effects.flexible import FlexibleJoint, FlexiblePart
 from sims.effects.friction import (
+    ConstantLoss,
     CoulombFriction,
     DirectionalFriction,
     LoadDependentFriction,
@@ -160,13 +161,17 @@ def parts_in(simulator: HostSimulator) -> tuple[FlexiblePart, ...]:
 
 def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     """What is rarer than the library, at zero strength: friction by load of every joint that the
-    inputs move by themselves, states that fall at another pace than they rise or act on others,
-    inputs that act otherwise below zero or through a play, and inputs, but goals, that are followed
-    at a limited pace."""
+    inputs move by themselves, states that fall at another pace than they rise, lose a constant or
+    act on others, inputs that act otherwise below zero or through a play, and inputs, but goals,
+    that are followed at a limited pace."""
     found: list[Effect] = list(_geared(simulator))
     inputs = [channel.name for channel in simulator.action_channels]
     inputs += [AND.join(names) for names in like_inputs(simulator)]
-    both: list[Effect] = [AsymmetricResponse(joint.name) for joint in simulator.joints]
+    both: list[Effect] = [
+        kind(joint.name)
+        for kind in (AsymmetricResponse, ConstantLoss)
+        for joint in simulator.joints
+    ]
     both += [Coupling(BY.join(names)) for names in coupled_states(simulator)]
     slow = [name for name in inputs if name not in goals(simulator)]
     at_inputs = [kind(name) for kind in (AsymmetricActuator, Hysteresis) for name in inputs]

@@ -24,6 +24,7 @@ from sims.effects.coupling import Coupling
 from sims.effects.curve import Curve
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import FlexiblePart
+from sims.effects.friction import ConstantLoss
 from sims.effects.joint import JointEffect, Unbalance
 from sims.effects.library import typical
 from sims.effects.limit import RateLimit
@@ -33,6 +34,9 @@ from sims.effects.store import SecondStore
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
+
+#: Part of the samples above zero, and below it, from which on a loss against the sign shows.
+EITHER = 0.05
 
 
 @dataclasses.dataclass(frozen=True)
@@ -167,6 +171,8 @@ def candidates(
             reach = BEYOND * greatest_rate(effect, simulator, samples)
         if _follows_unseen(effect, simulator, measured):
             continue
+        if isinstance(effect, ConstantLoss) and not _of_both_signs(samples, columns[effect.where]):
+            continue
         if isinstance(effect, Unbalance) and not shows_weight(effect, simulator, samples):
             continue
         known = within_reach(effect, simulator, samples, seconds)
@@ -186,6 +192,12 @@ def one_way(
         for effect, sign in changes
         for candidate in candidates(simulator, [effect], samples)
     ]
+
+
+def _of_both_signs(samples: Samples, column: int) -> bool:
+    """Whether a channel is above zero for a part of the time, and below it for another."""
+    seen = samples.seen[:, column]
+    return bool(min(np.mean(seen > 0), np.mean(seen < 0)) > EITHER)
 
 
 def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]) -> bool:
