@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 from residual.gap.answer.confirmed import Answer, confirm
 from residual.gap.answer.curves import over_the_log
+from residual.gap.answer.varying import with_parameters_as_twins
 from residual.gap.clock import Clock, seldom
 from residual.gap.confirmation.instead import with_other_answers
 from residual.gap.confirmation.twins import exact_twins, with_twins
@@ -93,7 +94,7 @@ class Inquiry:
         known = Confirmed(prepared, answer, ())
         if matters:
             known = OnceMore(self, log, tolerance).of(known)
-        answer = known.answer
+        answer = with_parameters_as_twins(known.answer, self.offered.by_label)
         search, found = answer.found.search, answer.found
         claims = with_other_answers(
             search, answer.key, answer.claims, found.adequate, found.floor, self.clock.spare_until

@@ -36,6 +36,7 @@ from sims.effects.friction import LoadDependentFriction as LoadDependentFriction
 from sims.effects.friction import StribeckFriction as StribeckFriction
 from sims.effects.hysteresis import Hysteresis as Hysteresis
 from sims.effects.inertia import AddedInertia as AddedInertia
+from sims.effects.joint import AsymmetricDamping as AsymmetricDamping
 from sims.effects.joint import Cogging as Cogging
 from sims.effects.joint import ConstantLoad as ConstantLoad
 from sims.effects.joint import CubicSpring as CubicSpring

@@ -86,6 +86,26 @@ class ViscousFriction(JointEffect):
 
 
 @dataclasses.dataclass(frozen=True)
+class AsymmetricDamping(JointEffect):
+    """Viscous friction that is larger one way, and as much smaller the other: ``-forward |v|``.
+
+    A shock absorber is several times as hard in rebound as in compression, see Dixon, "The Shock
+    Absorber Handbook", 2007.
+    """
+
+    forward: Value = number(force=1, rate=-1)
+
+    name: ClassVar[str] = "asymmetric_damping"
+    sentence: ClassVar[str] = "Damping that is harder one way than the other: a shock absorber."
+    needs: ClassVar[str] = "motion at several speeds in both directions"
+    family: ClassVar[str] = "dissipation"
+
+    def force(self, q: Value, v: Value) -> Value:
+        """Force by the size of the rate."""
+        return -self.forward * abs(v)
+
+
+@dataclasses.dataclass(frozen=True)
 class QuadraticDrag(JointEffect):
     """Drag of a body in a fluid: ``-coefficient v |v|``."""
 

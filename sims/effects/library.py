@@ -35,6 +35,7 @@ from sims.effects.friction import (
 from sims.effects.hysteresis import Hysteresis
 from sims.effects.inertia import AddedInertia
 from sims.effects.joint import (
+    AsymmetricDamping,
     Cogging,
     ConstantLoad,
     CubicSpring,
@@ -161,17 +162,14 @@ def parts_in(simulator: HostSimulator) -> tuple[FlexiblePart, ...]:
 
 def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     """What is rarer than the library, at zero strength: friction by load of every joint that the
-    inputs move by themselves, states that fall at another pace than they rise, lose a constant or
-    act on others, inputs that act otherwise below zero or through a play, and inputs, but goals,
-    that are followed at a limited pace."""
+    inputs move by themselves, states that fall at another pace than they rise, rub otherwise
+    backwards, lose a constant or act on others, inputs that act otherwise below zero or through a
+    play, and inputs, but goals, that are followed at a limited pace."""
     found: list[Effect] = list(_geared(simulator))
     inputs = [channel.name for channel in simulator.action_channels]
     inputs += [AND.join(names) for names in like_inputs(simulator)]
-    both: list[Effect] = [
-        kind(joint.name)
-        for kind in (AsymmetricResponse, ConstantLoss)
-        for joint in simulator.joints
-    ]
+    kinds = AsymmetricResponse, AsymmetricDamping, ConstantLoss
+    both: list[Effect] = [kind(joint.name) for kind in kinds for joint in simulator.joints]
     both += [Coupling(BY.join(names)) for names in coupled_states(simulator)]
     slow = [name for name in inputs if name not in goals(simulator)]
     at_inputs = [kind(name) for kind in (AsymmetricActuator, Hysteresis) for name in inputs]

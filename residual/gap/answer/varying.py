@@ -16,6 +16,7 @@ from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
+from residual.gap.model.model import Model
 from residual.gap.search.pool import Key
 from sims.effects.curve import Curve
 from sims.effects.parameter_curve import ParameterCurve
@@ -26,6 +27,8 @@ Array = NDArray[np.float64]
 NEARLY, MOST = 2.0, 4
 #: Part of what one does that lies beyond a curve by points, below which it is that curve.
 BEYOND = 0.1
+#: Loss over that of a law up to which a parameter that follows a channel does the same.
+AS_WELL = 1.1
 
 
 def worth_varying(
@@ -112,6 +115,56 @@ def no_surer(answer: Answer, earlier: Answer) -> Answer:
         for claim in answer.claims
     )
     return dataclasses.replace(answer, claims=claims)
+
+
+def with_parameters_as_twins(answer: Answer, offered: Collection[str]) -> Answer:
+    """An answer whose curves by points have the parameters as twins that would do the same if they
+    followed a channel: a curve of the speed is a wheelbase that grows with it.
+
+    Args:
+        answer: What was found.
+        offered: Labels of the effects that may be missing.
+    """
+    search = answer.found.search
+    fitter, simulator = search.fitter, search.simulator
+    if not (isinstance(fitter, SmoothFitter) and simulator.written_out):
+        return answer
+    claims = []
+    for claim in answer.claims:
+        law = search.candidates[claim.number].effect
+        if isinstance(law, Curve) and not isinstance(law, ParameterCurve) and claim.sure:
+            families = {name: p.family for name, p in simulator.parameters.items()}
+            others = [
+                ParameterCurve(name, level.channel).suited_to(*level.reach)
+                for level in levels(simulator, fitter.samples)
+                for name in simulator.parameters
+                if name in offered and not level.of_size
+                if not (law.family and families[name] == law.family)
+            ]
+            found = [str(one) for one in others if _moves_as(answer, claim.number, one)]
+            claim = dataclasses.replace(claim, twins=(*claim.twins, *found[:MOST]))
+        claims.append(claim)
+    return dataclasses.replace(answer, claims=tuple(claims))
+
+
+def _moves_as(answer: Answer, number: int, other: Curve) -> bool:
+    """Whether a curve fits as well in place of a law of the answer."""
+    search, key = answer.found.search, answer.key
+    fitter, fit = search.fitter, search.tried[key]
+    assert isinstance(fitter, SmoothFitter)
+    law = search.candidates[number].effect
+    assert isinstance(law, Curve)
+    does, moved = _moved(fitter, fit, law), _moved(fitter, fit, other)
+    if not _is_one_of(moved, [does]):
+        return False
+    place = key.index(number)
+    own = fit.model.owner == place
+    start = np.linalg.lstsq(moved, does @ fit.theta[own], rcond=1e-10)[0]
+    rest = [one for i, one in enumerate(fit.model.chosen) if i != place]
+    pool = candidates(search.simulator, [other], fitter.samples)
+    model = Model(search.simulator, [*rest, *pool])
+    found = fitter.fit(model, np.append(fit.theta[~own], start), fit)
+    return found.merit <= AS_WELL * fit.merit + fitter.tie(search.nominal)
 
 
 def _moved(fitter: SmoothFitter, fit: Fit, curve: Curve) -> Array:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from sims.checks import check_simulator
 from sims.effects import (
+    AsymmetricDamping,
     Cogging,
     ConstantLoad,
     CoulombFriction,
@@ -96,7 +97,7 @@ def test_effects_on_joints_at_zero_strength_change_no_bit_beside_rows_that_have_
     plain = simulator.step(states, actions)
     for kind in (
         ViscousFriction, QuadraticDrag, CoulombFriction, StribeckFriction, DirectionalFriction,
-        LinearSpring, CubicSpring, ConstantLoad, Cogging,
+        LinearSpring, CubicSpring, ConstantLoad, Cogging, AsymmetricDamping,
     ):  # fmt: skip
         strengths = {key: np.zeros(len(states)) for key in kind.strengths()}
         for values in strengths.values():
