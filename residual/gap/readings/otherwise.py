@@ -7,6 +7,7 @@ import contextlib
 from residual.gap.clock import Clock, OutOfTime
 from residual.gap.readings.from_rest import begun_from_rest
 from residual.gap.readings.held import held_the_other_way
+from residual.gap.readings.out_of_range import without_an_end
 from residual.gap.readings.read import Asked, Read
 from residual.gap.readings.reversed_sign import a_sign_reversed
 from residual.gap.readings.row_late import a_row_earlier
@@ -25,8 +26,10 @@ def read_otherwise(read: Read, asked: Asked, clock: Clock, hold_is_known: bool) 
         hold_is_known: Whether the user said how inputs run between their rows.
     """
     with clock.once_more(), contextlib.suppress(OutOfTime):
+        read = without_an_end(read, asked)
+    with clock.once_more(), contextlib.suppress(OutOfTime):
         read = a_sign_reversed(read, asked)
-    if read.conventions is None:
+    if read.conventions is None and not read.says:
         with clock.once_more(), contextlib.suppress(OutOfTime):
             read = a_row_earlier(read, asked)
     if read.conventions is None and not read.says:
