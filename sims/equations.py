@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sims.authored import beyond_rest, by_joint, force_is_added, joint_of, mobility, push_of_inputs
+from sims.declared import refuse_declarations
 from sims.effects.base import Effect
 from sims.effects.pull import ELSEWHERE
 from sims.host import HostSimulator
@@ -26,7 +27,7 @@ class _Equations(HostSimulator):
     """What systems that are written out as equations have in common.
 
     Attributes:
-        written: Name of the method that a subclass writes, and ``takes`` what it is given.
+        written, takes: Name of the method that a subclass writes, and what it is given.
     """
 
     written: ClassVar[str]
@@ -42,6 +43,7 @@ class _Equations(HostSimulator):
         effects: Sequence[Effect] = (),
     ) -> None:
         cls = type(self)
+        refuse_declarations(self)
         self.name = getattr(cls, "name", cls.__name__)
         self.dt = cls.dt if dt is None else dt
         if not self.dt > 0:
@@ -50,11 +52,6 @@ class _Equations(HostSimulator):
         if problem := cannot_call(getattr(self, cls.written), *cls.takes):
             wanted = f"{cls.written}(self, {', '.join(cls.takes)})"
             raise ValueError(f"{cls.__name__}.{cls.written}: {problem}; expected {wanted}")
-        if own := [c.name for c in self.state_channels if c.kind == "memory"]:
-            raise ValueError(
-                f"{cls.__name__}: channel {own[0]!r} is of kind 'memory', which effects append; a "
-                "state of its own is of kind 'other', 'position' or 'rate', logged or not"
-            )
         if not hasattr(cls, "joints"):
             self.joints = self._own_joints()
         self._arrange()
@@ -64,7 +61,7 @@ class _Equations(HostSimulator):
             self.effects, self.state_channels = hosted.effects, hosted.state_channels
 
     def with_scales(self, scales: Mapping[str, float]) -> Self:
-        """See ``HostSimulator.with_scales``; joints that are not named go with their states."""
+        """See ``HostSimulator``; joints that are not named go with their states."""
         changed = super().with_scales(scales)
         if not hasattr(type(self), "joints"):
             changed.joints = changed._own_joints()

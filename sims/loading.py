@@ -136,7 +136,12 @@ def _parsed(source: str | Path | Mapping[str, Any]) -> jsonargparse.Namespace:
 
 
 def in_file(source: str) -> str:
-    """How to write what names a class by its file, ``arm.py:Arm``; or nothing if it does not."""
+    """How to write what names a class by its file, ``arm.py:Arm``, or calls it; or nothing."""
+    if called := re.fullmatch(r"([\w.]+)\(.*\)", source):
+        return (
+            f"{source!r} is a call, expected the class alone: {called[1]}; its settings are "
+            "options of their own, as in --simulator.NAME VALUE"
+        )
     found = re.fullmatch(r"(.*[/\\])?(\w+)(?:\.py(?::(\w+))?|:(\w+))", source)
     if not found:
         return ""

@@ -48,8 +48,8 @@ class Channel:
             may be summed up from a yaw rate: its noise is then a random walk.
 
     Raises:
-        ValueError: There is no such kind; or ``angle=True`` of a channel that is not in rad, so
-            that its turns are not those of 2 pi.
+        ValueError: There is no such kind or hold; or ``angle=True`` of a channel that is not in
+            rad, so that its turns are not those of 2 pi.
     """
 
     name: str
@@ -65,11 +65,12 @@ class Channel:
     integrates: str | None = None
 
     def __post_init__(self) -> None:
-        if self.kind not in get_args(Kind):
-            expected = ", ".join(map(repr, get_args(Kind)))
-            raise ValueError(
-                f"channel {self.name!r} has kind={self.kind!r}, expected one of {expected}"
-            )
+        for name, known in (("kind", get_args(Kind)), ("hold", get_args(Hold))):
+            if getattr(self, name) not in known:
+                raise ValueError(
+                    f"channel {self.name!r} has {name}={getattr(self, name)!r}, expected one of "
+                    f"{', '.join(map(repr, known))}"
+                )
         if self.angle and self.unit != "rad":
             raise ValueError(
                 f"channel {self.name!r} has angle=True and unit={self.unit!r}, expected 'rad': "

@@ -7,6 +7,7 @@ scikit-learn had the 60 iterations of a Gaussian process.
 
 from __future__ import annotations
 
+import importlib.util
 import pydoc
 import re
 import sys
@@ -25,6 +26,13 @@ def class_of_word(word: str) -> dict[str, str]:
     """The option by which a word of the command line names a class, if it does."""
     name = word.partition("=")[0]
     return {name.removeprefix("--"): word} if name in CLASSES else {}
+
+
+def no_class(word: str) -> str:
+    """What is to be said of the name of a module where a class of it was expected; or nothing."""
+    if not word.isidentifier() or importlib.util.find_spec(word) is None:
+        return ""
+    return f"{word} is a module, expected a class in it: {word}.CLASS"
 
 
 def no_simulator(path: str) -> str:

@@ -27,11 +27,12 @@ from studies.running.classes import (
     IMPORT_PATH,
     SIMULATORS,
     class_of_word,
+    no_class,
     no_simulator,
     unfinished,
     without_replaced,
 )
-from studies.running.counted import check_number, check_numbers
+from studies.running.counted import check_number, check_numbers, check_settings
 from studies.running.ending import DEBUG, DEBUG_VARIABLE, TRUST, typed
 from studies.running.spelling import spelled
 
@@ -97,6 +98,11 @@ class Parser(jsonargparse.ArgumentParser):
                 path: inside for path, (option, inside) in _READ.items() if option == "config"
             }
             check_numbers(configs, kinds)
+            for path, (option, inside) in _READ.items():
+                if f"--{option}" in FILES and option != "config":
+                    start = f"--{option}."
+                    below = {n.removeprefix(start): k for n, k in kinds.items() if start in n}
+                    check_settings(path, inside, below)
             contents = list(configs.values())
             self._without_usual([*map(class_of_word, given), *contents])
             return super().parse_args(given, *rest, **options)
@@ -274,7 +280,7 @@ def _check_given(name: str, value: str) -> None:
         path = Path(value).is_dir() or (IMPORT_PATH.fullmatch(value) and not Path(value).exists())
         if lacking := in_file(value) or (not_found(value) if path else ""):
             raise ValueError(f"{name}: {lacking}")
-        if name in SIMULATORS and path and (other := no_simulator(value)):
+        if name in SIMULATORS and (other := no_simulator(value) if path else no_class(value)):
             raise ValueError(f"{name}: {other}")
 
 

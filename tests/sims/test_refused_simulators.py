@@ -1,5 +1,6 @@
 """What is refused before anything is computed, beside what the checker finds."""
 
+import re
 from typing import ClassVar
 
 import pytest
@@ -44,3 +45,39 @@ class Negative(PendulumEquation):
 def test_a_parameter_outside_its_own_bounds_is_refused():
     with pytest.raises(Unsound, match=r"parameters: 'mass' is -0.1, outside its own bounds 0 and"):
         refuse_unsound(Negative())
+
+
+POSITION = Channel("height", "m", "position")
+WRONG = {
+    "state_channels": (
+        (POSITION, "Odd.state_channels is one Channel, expected a tuple: (Channel("),
+        (("height",), "Odd.state_channels holds 'height', expected state_channels = (Channel("),
+        ("height", "Odd.state_channels is 'height', expected"),
+        ((Channel("past", "m", "memory"),), "channel 'past' is of kind 'memory', which effects"),
+    ),
+    "parameters": (
+        ({"mass": 2.4}, "Odd.parameters: 'mass' is 2.4, expected Parameter(2.4, "),
+        ({"mass": Parameter("2.4", "kg", "load")}, "'mass' has the value '2.4', expected a number"),
+        (["mass"], "Odd.parameters is ['mass'], expected {"),
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [(name, value, says) for name, cases in WRONG.items() for value, says in cases],
+)
+def test_what_a_class_declares_wrongly_is_one_line(name, value, says):
+    with pytest.raises(ValueError, match=re.escape(says)):
+        type("Odd", (Hoist,), {name: value})()
+
+
+def test_a_misspelt_declaration_is_told_by_the_name_that_is_near():
+    body = {"dt": 0.1, "state_chanels": (), "acceleration": Hoist.acceleration}
+    with pytest.raises(ValueError, match=r"Odd has no state_channels.*by state_chanels\?"):
+        type("Odd", (EquationOfMotion,), body)()
+
+
+def test_a_channel_of_no_hold_is_refused():
+    with pytest.raises(ValueError, match="hold='linaer', expected one of 'zero', 'linear'"):
+        Channel("push", "N", "input", hold="linaer")

@@ -184,6 +184,8 @@ SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
         ("find_gap", ("--simulator", "gone.xml"), "--simulator: there is no file gone.xml"),
         ("find_gap", ("--simulator", "no_such.X"), "there is no module 'no_such' for no_such"),
         ("find_gap", ("--simulator", "arm.py:Arm"), "is no import path; write arm.Arm"),
+        ("find_gap", ("--simulator", "sims.Pendulum()"), "expected the class alone: sims.Pe"),
+        ("find_gap", ("--simulator", "sims"), "is a module, expected a class in it: sims.CLASS"),
         ("find_gap", ("--simulator", "."), "--simulator: . is a folder; expected MODULE.CLASS"),
         ("find_gap", ("--simulator", "sims.tasks.SwingUp"), "SwingUp is no Simulator, expec"),
         ("find_gap", (*SIMULATOR, "--columns", "."), "--columns . is a folder, expected a YAML"),

@@ -159,3 +159,30 @@ def test_an_option_may_be_spelt_with_either_joint(joint):
         ["--simulator", "sims.Pendulum", "--logs", "c.csv", "--output", "gap", *words]
     )
     assert given.held_out == ["a.csv", "b.csv"] and given.parameter_tolerance == 0.1
+
+
+@pytest.mark.parametrize(
+    ("holds", "says"),
+    [
+        ("states: {angle: {offset: 90 deg}}", "states: angle: offset: '90 deg', expected a number"),
+        ("actions: {voltage: {scale: minus one}}", "scale: 'minus one', expected a number"),
+        ("minimum_samples: many", "minimum_samples: 'many', expected a whole number"),
+        ("[time, angle]", "expected names with values, as in `time: t`, not ['time', 'angle']"),
+    ],
+)
+def test_a_column_map_of_the_wrong_kind_is_told_with_file_and_key(
+    holds, says, logs, tmp_path, capsys
+):
+    path = tmp_path / "columns.yaml"
+    path.write_text(holds)
+    with pytest.raises(SystemExit, match="2"):
+        main(["--simulator", EQUATION, "--logs", *logs, "--columns", str(path)])
+    (said,) = capsys.readouterr().err.strip().splitlines()
+    assert said.startswith(f"error: {path}: ") and says in said
+
+
+def test_a_column_map_may_say_numbers_as_yaml_does_not(logs, tmp_path):
+    path = tmp_path / "columns.yaml"
+    path.write_text("states: {angle: {offset: 1e-3, scale: -1}}\nperiod: null\n")
+    given = ["--simulator", EQUATION, "--logs", *logs, "--columns", str(path), "--output", "out"]
+    assert build_parser().parse_args(given).columns.states["angle"].offset == 0.001

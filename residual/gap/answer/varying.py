@@ -54,7 +54,10 @@ def worth_varying(
     fitter, fit = search.fitter, search.tried[answer.key]
     laws = [_moved(fitter, fit, curve) for curve in curves] if found else []
     own = [one for one in found if not _is_one_of(_moved(fitter, fit, one), laws)]
-    return own[:MOST]
+    # Beside what was named another parameter may show that alone would explain all.
+    names = [name for name in search.simulator.parameters if name in offered]
+    others = [dataclasses.replace(one, parameter=name) for one in own for name in names]
+    return list(dict.fromkeys([*own, *others]))[:MOST]
 
 
 def _beside(answer: Answer, key: Key) -> list[Course]:
