@@ -163,12 +163,17 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         elif verdict.label in result.nearly_late:
             found.append(f"{effect.looks_like} would look nearly the same")
     for other in verdict.beside:
-        twin = next(v for v in result.verdicts if other.effect in v.same_motion)
-        meant, named = effect_name(other.effect), effect_name(twin.label)
-        found.append(f"{values_of(other)} if {meant} is meant, not {named}")
+        twin = next((v for v in result.verdicts if is_meant(other.effect, v)), None)
+        named = f", not {effect_name(twin.label)}" if twin else ""
+        found.append(f"{values_of(other)} if {effect_name(other.effect)} is meant{named}")
     if verdict.provisional:
         found.append(provisional(result))
     return found
+
+
+def is_meant(twin: str, verdict: Verdict) -> bool:
+    """Whether a twin, by label, may be meant in place of the effect of a verdict."""
+    return twin in verdict.same_motion or twin in (one.effect for one in verdict.meant)
 
 
 def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
