@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +15,8 @@ from sims.effects.parameter import ParameterChange
 from sims.equation_contract import (
     acceleration_keeps,
     forces_act,
+    linear_in_forces,
     parameters_by_row,
-    positions_and_rates,
 )
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.findings import Finding, Findings, draw, example
@@ -90,7 +89,7 @@ def _checks(
         acts = forces_act(simulator, states, actions)
         yield acts
         if acts.ok:
-            yield _linear(simulator, states, actions)
+            yield linear_in_forces(simulator, states, actions)
     yield from _parameters(simulator, states, actions)
     if isinstance(simulator, EquationOfMotion | FirstOrderSystem):
         yield parameters_by_row(simulator, states, actions)
@@ -120,26 +119,6 @@ def _to_the_bounds(simulator: Simulator, rng: np.random.Generator) -> Iterator[F
     if bad.size:
         says = example("within the channels' bounds", bad, states, actions, following, following)
     yield Finding("finite to the bounds", not bad.size, says)
-
-
-def _linear(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:
-    """Effects add forces, so twice the force must give twice the change of acceleration."""
-    q, v = positions_and_rates(simulator, states)
-    values = SimpleNamespace(**simulator.parameter_values())
-    for j, joint in enumerate(simulator.joints):
-        force = np.zeros((3, *q.shape))
-        force[1:, :, j] = np.array([[1.0], [2.0]]) * simulator.force_scale(joint)
-        rest, once, twice = (
-            np.asarray(simulator.acceleration(q.copy(), v.copy(), actions.copy(), each, values))
-            for each in force
-        )
-        error = np.abs((twice - rest) - 2 * (once - rest)).max()
-        if not error <= 1e-8 * np.abs([rest, once, twice]).max():
-            says = (
-                f"twice the force on {joint.name} does not change the acceleration by twice as much"
-            )
-            return Finding("linear in forces", False, says)
-    return Finding("linear in forces", True, "twice the force, twice the change of acceleration")
 
 
 def _parameters(simulator: Simulator, states: Array, actions: Array) -> Iterator[Finding]:

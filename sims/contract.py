@@ -11,6 +11,7 @@ from sims.equation_contract import (
     acceleration_keeps,
     drive_tells,
     forces_act,
+    linear_in_forces,
     parameters_by_row,
 )
 from sims.equations import EquationOfMotion, FirstOrderSystem
@@ -21,7 +22,7 @@ from sims.unsound import Unsound
 #: What makes every number of a simulator worthless.
 _GRAVE = (
     "period", "channels", "parameters", "shape", "arguments", "repeatable", "pure", "rows",
-    "arguments of acceleration", "forces", "parameters by row", "drive_force",
+    "arguments of acceleration", "forces", "linear in forces", "parameters by row", "drive_force",
 )  # fmt: skip
 
 
@@ -68,6 +69,7 @@ def _sound(simulator: Simulator) -> Iterator[Finding]:
     if isinstance(simulator, EquationOfMotion):
         yield acceleration_keeps(simulator, states, actions)
         yield forces_act(simulator, states, actions)
+        yield linear_in_forces(simulator, states, actions)
     if isinstance(simulator, EquationOfMotion | FirstOrderSystem):
         yield parameters_by_row(simulator, states, actions)
         yield drive_tells(simulator, states, actions)

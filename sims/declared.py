@@ -9,6 +9,9 @@ import numpy as np
 
 from sims.simulator import Channel, Parameter
 
+#: What effects that differ in form more than in kind have in common, see ``sims.effects.Effect``.
+FAMILIES = ("dissipation", "spring", "constant push", "delay or lag", "elasticity")
+
 
 def refuse_declarations(simulator: object) -> None:
     """Refuse a simulator of which channels or parameters are not what they have to be.
@@ -46,6 +49,17 @@ def refuse_declarations(simulator: object) -> None:
     _refuse_parameters(kind.__name__, getattr(simulator, "parameters", {}))
 
 
+def refuse_period(simulator: object, dt: object) -> None:
+    """Refuse a control period that is none.
+
+    Raises:
+        ValueError: The message names the class, and what was expected.
+    """
+    if isinstance(dt, bool) or not isinstance(dt, int | float | np.number) or not dt > 0:
+        name = type(simulator).__name__
+        raise ValueError(f"{name}: dt is {dt!r}, expected the control period in s, above zero")
+
+
 def _refuse_parameters(whose: str, parameters: object) -> None:
     if not isinstance(parameters, Mapping):
         expected = 'expected {"mass": Parameter(1.0, "kg", "what it is"), ...}'
@@ -55,6 +69,12 @@ def _refuse_parameters(whose: str, parameters: object) -> None:
             raise ValueError(
                 f"{whose}.parameters: {name!r} is {parameter!r}, expected "
                 f'Parameter({parameter!r}, "unit", "what it is")'
+            )
+        near = difflib.get_close_matches(parameter.family, FAMILIES, 1)
+        if near and parameter.family not in FAMILIES:
+            raise ValueError(
+                f"{whose}.parameters: {name!r} is of the family {parameter.family!r}; did you mean "
+                f"{near[0]!r}?"
             )
         if not np.issubdtype(np.asarray(parameter.value).dtype, np.number):
             raise ValueError(

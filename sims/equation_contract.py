@@ -12,6 +12,8 @@ from sims.simulator import Array
 
 #: Relative difference of a row alone from the same one in a batch that libraries may make.
 ROUNDING = 1e-6
+#: Part of an acceleration that is none.
+LINEAR = 1e-8
 #: Forces that are tried, in the joints' units: one is large enough for whatever is moved.
 _FORCES = (1.0, 1e6, 1e12)
 
@@ -90,6 +92,31 @@ def forces_act(simulator: EquationOfMotion, states: Array, actions: Array) -> Fi
                 )
                 return Finding("forces", False, says)
     return Finding("forces", True, "a force on each joint accelerates it")
+
+
+def linear_in_forces(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:
+    """Effects add forces, so twice the force must give twice the change of acceleration."""
+    q, v = positions_and_rates(simulator, states)
+    values = SimpleNamespace(**simulator.parameter_values())
+    for j, joint in enumerate(simulator.joints):
+        force = np.zeros((3, *q.shape))
+        force[1:, :, j] = np.array([[1.0], [2.0]]) * simulator.force_scale(joint)
+        rest, once, twice = (
+            np.asarray(simulator.acceleration(q.copy(), v.copy(), actions.copy(), each, values))
+            for each in force
+        )
+        bend = np.abs((twice - rest) - 2 * (once - rest))
+        whole = np.isfinite(bend).all(axis=1)  # what is not finite is another fault
+        if (
+            bend[whole].size
+            and bend[whole].max() > LINEAR * np.abs([rest, once, twice])[:, whole].max()
+        ):
+            says = (
+                f"twice the force on {joint.name} does not change the acceleration by twice as "
+                f"much: add force[:, {j}] to the sum of forces as it is"
+            )
+            return Finding("linear in forces", False, says)
+    return Finding("linear in forces", True, "twice the force, twice the change of acceleration")
 
 
 def positions_and_rates(simulator: EquationOfMotion, states: Array) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sims.authored import beyond_rest, by_joint, force_is_added, joint_of, mobility, push_of_inputs
-from sims.declared import refuse_declarations
+from sims.declared import refuse_declarations, refuse_period
 from sims.effects.base import Effect
 from sims.effects.pull import ELSEWHERE
 from sims.host import HostSimulator
@@ -46,8 +46,7 @@ class _Equations(HostSimulator):
         refuse_declarations(self)
         self.name = getattr(cls, "name", cls.__name__)
         self.dt = cls.dt if dt is None else dt
-        if not self.dt > 0:
-            raise ValueError(f"dt is {self.dt}, expected the control period in s, above zero")
+        refuse_period(self, self.dt)
         self.substeps = cls.substeps if substeps is None else substeps
         if problem := cannot_call(getattr(self, cls.written), *cls.takes):
             wanted = f"{cls.written}(self, {', '.join(cls.takes)})"

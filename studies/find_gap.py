@@ -168,7 +168,7 @@ def run(
     tell("checking the integration step")
     for line in advice(simulator, data.trajectories):
         tell(line)
-        findings.append(Finding("step", simulator.name, line, severity="warning"))
+        findings.append(Finding("step", "", line, severity="warning"))
     moved = simulator.for_motion([run.states for run in data.trajectories])
     minutes = study.minutes or usual_minutes(moved)
     budget(60 * minutes)
@@ -188,6 +188,9 @@ def run(
         progress=tell,
     )
     tell("writing the report")
+    steps = tuple(found for found in findings if found.kind == "step")
+    findings = [found for found in findings if found not in steps]
+    result = dataclasses.replace(result, quality=(*steps, *result.quality))
     write_gap(result, output, config, findings, time.perf_counter() - begin)
     grave = found_in_data([found for found in findings if found.severity == "warning"])
     first = tuple(Finding("log", "", line) for line in grave)
@@ -252,7 +255,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(f"\n{summary(result, settings['tolerance'])}\n\nreport:              {output / REPORT}")
     print(f"corrected simulator: {output / CORRECTED}")
     if strange := needs_trust(settings["simulator"]):
-        print(f"  names a class of yours: load it with --trust {strange.partition('.')[0]}")
+        package = strange.partition(".")[0]
+        print(f"  names a class of yours: as --simulator it needs --trust {package}, in Python")
+        print(f"  load_simulator({str(output / CORRECTED)!r}, trusted=[{package!r}])")
     for name in result.corrected.own_files():
         print(f"corrected model:     {output / name}")
     for line in result.corrected.not_in_own_files():

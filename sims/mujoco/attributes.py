@@ -20,6 +20,8 @@ Index = tuple[int, ...]
 DISSIPATION = ViscousFriction.family
 #: Change of a contact's friction, as a share of it, that should make it slip where it holds.
 SLIPPING = -0.5
+#: Times the whole of gravity that a part of it may be.
+MOST_G = 1.2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -275,7 +277,9 @@ def _of_the_world(model: Any) -> Iterator[Attribute]:
     size = float(np.linalg.norm(model.opt.gravity)) or 9.81
     for k, axis in enumerate("xyz"):
         full = f"gravity {axis}"
-        parameter = Parameter(float(model.opt.gravity[k]), "m/s^2", full, scale=0.1 * size)
+        value = float(model.opt.gravity[k])
+        # However a base leans, no part of gravity is larger than the whole.
+        parameter = Parameter(value, "m/s^2", full, -MOST_G * size, MOST_G * size, 0.1 * size)
         yield Attribute(full, parameter, (Slot("opt.gravity", (k,)),))
 
 

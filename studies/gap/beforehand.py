@@ -7,8 +7,9 @@ from studies.gap.words import listed
 
 
 def seen_first(result: GapResult) -> str:
-    """What the log may count otherwise than the simulator, or what that cuts off by mistake."""
-    return _conventions(result) or _cut_off(result)
+    """What the log may count otherwise than the simulator, what that cuts off by mistake, or that
+    its integration step shows."""
+    return _conventions(result) or _cut_off(result) or _step(result)
 
 
 def _conventions(result: GapResult) -> str:
@@ -45,4 +46,15 @@ def _cut_off(result: GapResult) -> str:
     return (
         f"First see whether the simulator is meant to cut {listed(list(result.cut_off))} off where "
         "it does (below): what was found may make up for it. If it is: "
+    )
+
+
+def _step(result: GapResult) -> str:
+    """That the integration step shows in the log, where something was found that may make up for
+    it."""
+    if not result.effects or all(finding.kind != "step" for finding in result.quality):
+        return ""
+    return (
+        "First see the simulator's integration step, which shows in this log (below): what was "
+        "found may make up for it. If that is not it: "
     )

@@ -131,6 +131,10 @@ def six_digits(value: float) -> str:
     return text
 
 
+#: Times its value that an end of an interval may be, beyond which it is none.
+OPEN = 1e6
+
+
 def typeset(unit: str) -> str:
     """``kg m^2`` as ``kg m\u00b2``."""
     return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(RAISED), unit)
@@ -157,6 +161,8 @@ def number_text(number: Number, sign: bool = False) -> str:
     unit = unit_text(number.unit)
     if number.at_bound:
         return minus(f"{plus}{number.value:.3g}{unit} (at its bound)")
+    if max(abs(number.low), abs(number.high)) > OPEN * abs(number.value) > 0:
+        return minus(f"{plus}{number.value:.3g}{unit} (nothing tells how large)")
     # Of a lopsided interval the near side says how well the value is known.
     half = 0.5 * (number.high - number.low)
     near = min(number.high - number.value, number.value - number.low)

@@ -157,8 +157,9 @@ class Parser(jsonargparse.ArgumentParser):
         try:
             return super().instantiate(namespace, *rest, **options)
         except Exception as error:
-            said = str(error) if isinstance(error, ValueError) else typed(error)
-            self.error(f"the settings do not make what they name: {said}", error)
+            if isinstance(error, ValueError):  # which says whose it is
+                self.error(str(error), error)
+            self.error(f"the settings do not make what they name: {typed(error)}", error)
 
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
         """Say what is wrong and how to learn more, in one line."""

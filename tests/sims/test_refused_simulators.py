@@ -58,6 +58,7 @@ WRONG = {
     "parameters": (
         ({"mass": 2.4}, "Odd.parameters: 'mass' is 2.4, expected Parameter(2.4, "),
         ({"mass": Parameter("2.4", "kg", "load")}, "'mass' has the value '2.4', expected a number"),
+        ({"b": Parameter(1.0, "N s/m", "rail", family="disipation")}, "mean 'dissipation'?"),
         (["mass"], "Odd.parameters is ['mass'], expected {"),
     ),
 }
@@ -70,6 +71,22 @@ WRONG = {
 def test_what_a_class_declares_wrongly_is_one_line(name, value, says):
     with pytest.raises(ValueError, match=re.escape(says)):
         type("Odd", (Hoist,), {name: value})()
+
+
+@pytest.mark.parametrize("dt", ["20 ms", 0, -0.1, float("nan"), True])
+def test_a_period_that_is_none_is_refused(dt):
+    with pytest.raises(ValueError, match=r"Hoist: dt is .*, expected the control period in s"):
+        Hoist(dt=dt)
+
+
+class Squared(Hoist):
+    def acceleration(self, q, v, u, force, p):
+        return ((u[:, 0] / p.drum + force[:, 0] ** 2) / 50.0 - 9.81)[:, None]
+
+
+def test_a_force_that_is_not_added_is_refused():
+    with pytest.raises(Unsound, match="twice the force on height does not change the"):
+        refuse_unsound(Squared())
 
 
 def test_a_misspelt_declaration_is_told_by_the_name_that_is_near():

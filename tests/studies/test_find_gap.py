@@ -234,7 +234,7 @@ def test_classes_in_the_current_folder_need_no_registration(logs, tmp_path):
     )
     done = command(["--config", "all.yaml", "--output", "gap"], tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "names a class of yours: load it with --trust mine" in done.stdout
+    assert "class of yours: as --simulator it needs --trust mine, in Python" in done.stdout
     record = json.loads((tmp_path / "gap" / "gap.json").read_text())
     assert record["config"]["simulator"]["init_args"]["mass"] == 0.09
     # The simulator has the true mass already, and nothing pulls.
