@@ -14,6 +14,7 @@ from residual.gap.answer.apart import NOT_JUDGED, judged_apart
 from residual.gap.answer.changing import changing, in_place
 from residual.gap.answer.confirmed import matters
 from residual.gap.answer.encoders import by_an_encoder
+from residual.gap.answer.ends import with_fitted_ends
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.out_of_proportion import out_of_proportion
 from residual.gap.answer.periodic import periodic
@@ -154,6 +155,7 @@ def find_gap(
         ask = asked and conventions is None and not clock.late
         differ = unlike(answer) if ask else ()
         over_time = changing(answer, known.in_vain) if ask else None
+        over_time = with_fitted_ends(over_time, answer, log.runs, log.horizon)
         repeats = periodic(answer) if ask else None
         clock.lap("confirm")
 

@@ -32,6 +32,8 @@ from sims.host import HostSimulator
 RIVALS, FEW = 3, 3
 #: Part by which another set errs less that is asked in place of what is left of one.
 LIKELIER = 0.1
+#: Residual over noise from which on much is left.
+FAR = 10.0
 #: Rise of the loss with inputs held the other way, as a share of it, that rules that out.
 OTHER_HOLD = 0.5
 
@@ -132,7 +134,7 @@ def confirm(
                 continue
         if not lost:
             leads = tuple(label for label in leads if label not in search.labels(key))
-            return Answer(found, key, tuple(made), leads)
+            return _in_time(Answer(found, key, tuple(made), leads))
         # The one that matters least goes first: what is left may have fewer rivals.
         gone = lost[-1].number
         leads = (search.candidates[gone].label, *leads)
@@ -143,6 +145,16 @@ def confirm(
             key = likelier(search, key, asked_before)
             add_without_each(search, key)
         asked_before.add(key)
+
+
+def _in_time(answer: Answer) -> Answer:
+    """An answer of which nothing is certain where much is left, and there was no time to ask what
+    may stand in place of one of its effects: the others may make up for that one."""
+    late = any(claim.unasked for claim in answer.claims)
+    if answer.found.adequate or not late or answer.left.ratio < FAR:
+        return answer
+    claims = (dataclasses.replace(claim, unasked=True) for claim in answer.claims)
+    return dataclasses.replace(answer, claims=tuple(claims))
 
 
 def likelier(search: Search, key: Key, asked: set[Key]) -> Key:

@@ -144,3 +144,39 @@ def test_a_wire_that_conducts_worse_as_it_warms_is_told_in_place_of_four_that_im
     changes = found.changing
     assert changes is not None and changes.instead and changes.over == "plate"
     assert not any(verdict.kind == "confirmed" for verdict in found.verdicts)
+
+
+class Sled(EquationOfMotion):
+    """A load on a spring that loses a third of its mass on the way."""
+
+    dt = 0.02
+    state_channels = (
+        Channel("place", "m", "position", scale=0.2),
+        Channel("speed", "m/s", "rate", rate_of="place", scale=0.5),
+    )
+    action_channels = (Channel("push", "N", "input", scale=10.0),)
+    parameters: ClassVar = {"mass": Parameter(14.0, "kg", "load", low=0.1)}
+
+    def acceleration(self, q, v, u, force, p):
+        pull = u[:, 0] + force[:, 0] - 4.0 * v[:, 0] - 60.0 * q[:, 0]
+        return (pull / p.mass)[:, None]
+
+
+def losing(seed, rows=1500, dt=0.02):
+    rng, state, seen = np.random.default_rng(seed), np.zeros(2), []
+    pushes = np.repeat(rng.uniform(-15, 15, rows // 50), 50)
+    for row, push in enumerate(pushes):
+        seen.append(state + rng.normal(0, (1e-3, 3e-3)))
+        mass = 14.0 - 4.5 * row / rows
+        for _ in range(20):
+            speed = state[1] + dt / 40 * (push - 4 * state[1] - 60 * state[0]) / mass
+            pull = (push - 4 * speed - 60 * (state[0] + dt / 40 * state[1])) / mass
+            state = state + dt / 20 * np.array([speed, pull])
+    return Trajectory(str(seed), dt * np.arange(rows), np.array(seen), pushes[:-1, None])
+
+
+@pytest.mark.long
+def test_both_ends_of_a_mass_that_falls_by_a_third_are_near():
+    found = find_gap(Sled(), [losing(seed) for seed in range(3)]).changing
+    assert found is not None and found.label == "mass"
+    assert (found.begin, found.end) == (pytest.approx(14, abs=0.7), pytest.approx(9.5, abs=0.7))
