@@ -158,7 +158,7 @@ def where(result: GapResult, folder: Path) -> list[Section]:
     ]
     sections: list[Section] = [
         Table(
-            ["channel", "nominal", "corrected", "noise floor", "residual / noise"],
+            ["channel", "nominal", "corrected", "noise floor", "nominal's residual / noise"],
             rows,
             f"Root mean square errors, {CROSS_VALIDATED}; and the residual of the nominal "
             "simulator over the noise in windows with free start states (1 is noise).",
@@ -190,8 +190,8 @@ def where(result: GapResult, folder: Path) -> list[Section]:
         high, low = worst[0], worst[-1]
         sections.append(
             Prose(
-                f"By run, residual over noise goes from {low[1]:.3g} ({low[0]}) to {high[1]:.3g} "
-                f"({high[0]})."
+                "By run, the nominal simulator's residual over the noise, of all channels "
+                f"together, goes from {low[1]:.3g} ({low[0]}) to {high[1]:.3g} ({high[0]})."
             )
         )
     return sections

@@ -71,8 +71,11 @@ def _of_half(told: Changing, answer: Answer, runs: Sequence[Trajectory], horizon
     ready = prepare(simulator, runs, horizon)
     effect = next(one for one in library(simulator) if str(one) == told.label)
     (one,) = candidates(simulator, [effect], ready.fitter.samples)
-    kept = [] if told.instead else [c for c in fit.model.chosen if c.label != told.label]
-    places = [j for j, i in enumerate(fit.model.owner) if fit.model.chosen[i] in kept]
+    kept, places = [], []
+    for i, candidate in enumerate(fit.model.chosen):
+        if not told.instead and candidate.label != told.label:
+            kept.append(candidate)
+            places += np.flatnonzero(fit.model.owner == i).tolist()
     start = np.append(fit.theta[places], 0.5 * (told.begin + told.end) - told.nominal)
     nominal = ready.fitter.fit(Model(simulator), np.zeros(0))
     found = ready.fitter.fit(Model(simulator, [*kept, one]), start, nominal)
