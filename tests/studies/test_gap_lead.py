@@ -12,6 +12,7 @@ from residual.gap.result import (
     ChannelGap,
     Span,
 )  # fmt: skip
+from residual.logs.checks import Finding
 from sims import Channel
 from studies.gap.answer import headline
 from studies.gap.lead import lead
@@ -36,6 +37,16 @@ def test_what_the_log_may_count_otherwise_comes_first():
     assert "with `scale: -1` for voltage or `unit: mV` for voltage in the column map" in first
     assert first.endswith("errs 19 times less.")
     assert rest == lead(result(MASS))
+
+
+def test_an_integration_step_that_shows_comes_first_where_something_was_found():
+    shows = Finding("step", "", "the integration step shows in this log", severity="warning")
+    found = dataclasses.replace(result(MASS), quality=(shows,))
+    first, after = lead(found).split(" If that is not it: ")
+    assert first.startswith("First see the simulator's integration step, which shows in this log")
+    assert after == lead(result(MASS))
+    nothing = dataclasses.replace(result(NO_GAP, effects=()), quality=(shows,))
+    assert lead(nothing) == lead(result(NO_GAP, effects=()))
 
 
 def test_a_gap_without_a_name_that_lies_in_one_stretch_leads_to_it():
