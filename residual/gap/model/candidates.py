@@ -25,7 +25,7 @@ from sims.effects.curve import Curve
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import FlexiblePart
 from sims.effects.friction import ConstantLoss
-from sims.effects.joint import JointEffect, Unbalance
+from sims.effects.joint import AsymmetricDamping, JointEffect, Unbalance
 from sims.effects.library import typical
 from sims.effects.limit import RateLimit
 from sims.effects.pull import ELSEWHERE
@@ -35,7 +35,7 @@ from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
-#: Part of the samples above zero, and below it, from which on a loss against the sign shows.
+#: Part of the samples above zero, and below it, from which on what goes by the sign shows.
 EITHER = 0.05
 
 
@@ -171,8 +171,10 @@ def candidates(
             reach = BEYOND * greatest_rate(effect, simulator, samples)
         if _follows_unseen(effect, simulator, measured):
             continue
-        if isinstance(effect, ConstantLoss) and not _of_both_signs(samples, columns[effect.where]):
-            continue
+        if isinstance(effect, ConstantLoss | AsymmetricDamping):
+            joint = next(j for j in simulator.joints if j.name == effect.joint)
+            if not _both_ways(samples, columns[joint.position], columns.get(str(joint.rate))):
+                continue
         if isinstance(effect, Unbalance) and not shows_weight(effect, simulator, samples):
             continue
         known = within_reach(effect, simulator, samples, seconds)
@@ -194,10 +196,13 @@ def one_way(
     ]
 
 
-def _of_both_signs(samples: Samples, column: int) -> bool:
-    """Whether a channel is above zero for a part of the time, and below it for another."""
-    seen = samples.seen[:, column]
-    return bool(min(np.mean(seen > 0), np.mean(seen < 0)) > EITHER)
+def _both_ways(samples: Samples, position: int, rate: int | None) -> bool:
+    """Whether a joint moves forward for a part of the time and back for another; a state of a
+    first-order system: whether it is above zero and below."""
+    seen = samples.seen[:, position if rate is None else rate]
+    if not np.isfinite(seen).any():
+        seen = np.diff(samples.seen[:, position])
+    return bool(min(np.nanmean(seen > 0), np.nanmean(seen < 0)) > EITHER)
 
 
 def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]) -> bool:
