@@ -34,7 +34,7 @@ def now(monkeypatch):
 
 def test_later_searches_share_what_is_left_until_confirming_has_to_begin(now):
     clock = Clock(100 / 60)
-    assert clock.search_until == 50
+    assert clock.search_until == 40
     now.seconds = 30
     with clock.once_more():
         assert clock.search_until == pytest.approx(30 + 0.65 * (80 - 30))
@@ -47,14 +47,14 @@ def test_later_searches_share_what_is_left_until_confirming_has_to_begin(now):
 def test_what_weighing_and_confirming_took_first_is_kept_for_later(now):
     clock = Clock(100 / 60)
     with clock.searching():
-        now.seconds = 60  # ten beyond its time
+        now.seconds = 50  # ten beyond its time
     with clock.confirming():
-        now.seconds = 64
+        now.seconds = 54
     # 1.5 times 14 are kept: until 79.
     with clock.once_more():
-        assert clock.search_until == pytest.approx(64 + 0.65 * (79 - 64))
+        assert clock.search_until == pytest.approx(54 + 0.65 * (79 - 54))
     with clock.searching():
-        now.seconds = 70  # twenty beyond
+        now.seconds = 70  # thirty beyond
     with clock.once_more():
         assert clock.searched
         with clock.once_more(worth_it=True):

@@ -13,7 +13,7 @@ def test_what_cannot_be_right_without_the_others_goes_too(monkeypatch):
     """A gain that switches its input off where nothing else of the set makes up for that."""
 
     def claims(search, key, *_):
-        return [SimpleNamespace(number=number, needed=True) for number in key]
+        return [SimpleNamespace(number=number, needed=True, unasked=False) for number in key]
 
     monkeypatch.setattr(confirmed, "claims", claims)
     monkeypatch.setattr(confirmed, "nameable", lambda search, claim, *_: claim.number != 2)
@@ -93,7 +93,9 @@ def test_what_would_take_much_but_may_not_be_named_takes_no_little():
 
 def test_what_fits_down_to_the_noise_and_forecasts_worse_than_nothing_is_not_named(monkeypatch):
     for name, found in {
-        "claims": lambda search, key, *_: [SimpleNamespace(number=n, needed=True) for n in key],
+        "claims": lambda search, key, *_: [
+            SimpleNamespace(number=n, needed=True, unasked=False) for n in key
+        ],
         "nameable": lambda *_: True,
         "allow_for_parameters": lambda search, key, made, *_: made,
         "other_numerics": lambda *_: [],
