@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sims.declared import Values
 from sims.motion import Acceleration, DriveForce
 from sims.simulator import Array, Channel, Joint
 
@@ -56,7 +57,7 @@ def force_is_added(
     rest, u = np.zeros_like(force), np.zeros((joints + 1, inputs))
     try:
         with np.errstate(all="ignore"):
-            moved = np.asarray(acceleration(rest, rest, u, force, SimpleNamespace(**values)))
+            moved = np.asarray(acceleration(rest, rest, u, force, Values(**values)))
             if moved.shape == force.shape:
                 return np.isclose(np.diag(moved[1:] - moved[0]), 1.0, rtol=1e-9)
     except Exception:  # what is wrong with it is told where a simulator is checked
@@ -81,7 +82,7 @@ def mobility(
     force = rest.copy()
     force[n:, j] = 1.0
     with np.errstate(all="ignore"):
-        moved = acceleration(q, rest, np.zeros((2 * n, inputs)), force, SimpleNamespace(**values))
+        moved = acceleration(q, rest, np.zeros((2 * n, inputs)), force, Values(**values))
     return np.asarray(moved[n:] - moved[:n])
 
 

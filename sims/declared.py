@@ -4,10 +4,23 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
+from typing import NoReturn
 
 import numpy as np
 
 from sims.simulator import Channel, Parameter
+
+
+class Values(SimpleNamespace):
+    """Parameters as attributes, ``p.mass``; one that there is not is told with those that are."""
+
+    def __getattr__(self, name: str) -> NoReturn:
+        there = ", ".join(vars(self)) or "none"
+        near = difflib.get_close_matches(name, vars(self), 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"there is {there}"
+        raise AttributeError(f"no parameter {name!r}; {hint}")
+
 
 #: What effects that differ in form more than in kind have in common, see ``sims.effects.Effect``.
 FAMILIES = ("dissipation", "spring", "constant push", "delay or lag", "elasticity")

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
+from sims.declared import Values
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.findings import Finding
 from sims.simulator import Array
@@ -59,7 +58,7 @@ def acceleration_keeps(simulator: EquationOfMotion, states: Array, actions: Arra
     given = (q, v, actions.copy(), np.zeros_like(q))
     before = [array.copy() for array in given]
     with np.errstate(all="ignore"):
-        values = SimpleNamespace(**simulator.parameter_values())
+        values = Values(**simulator.parameter_values())
         simulator.acceleration(*given, values)
     kept = all(map(np.array_equal, given, before))
     says = "are left as they were" if kept else "are overwritten"
@@ -69,7 +68,7 @@ def acceleration_keeps(simulator: EquationOfMotion, states: Array, actions: Arra
 def forces_act(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:
     """Does a force on each joint accelerate it? Friction, loads and springs are such forces."""
     q, v = positions_and_rates(simulator, states)
-    values = SimpleNamespace(**simulator.parameter_values())
+    values = Values(**simulator.parameter_values())
 
     def accelerations(force: Array, joint: int) -> Array:
         found = simulator.acceleration(q.copy(), v.copy(), actions.copy(), force, values)
@@ -97,7 +96,7 @@ def forces_act(simulator: EquationOfMotion, states: Array, actions: Array) -> Fi
 def linear_in_forces(simulator: EquationOfMotion, states: Array, actions: Array) -> Finding:
     """Effects add forces, so twice the force must give twice the change of acceleration."""
     q, v = positions_and_rates(simulator, states)
-    values = SimpleNamespace(**simulator.parameter_values())
+    values = Values(**simulator.parameter_values())
     for j, joint in enumerate(simulator.joints):
         force = np.zeros((3, *q.shape))
         force[1:, :, j] = np.array([[1.0], [2.0]]) * simulator.force_scale(joint)

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sims.authored import beyond_rest, by_joint, force_is_added, joint_of, mobility, push_of_inputs
-from sims.declared import refuse_declarations, refuse_period
+from sims.declared import Values, refuse_declarations, refuse_period
 from sims.effects.base import Effect
 from sims.effects.pull import ELSEWHERE
 from sims.host import HostSimulator
@@ -144,7 +144,7 @@ class EquationOfMotion(_Equations):
     def drive_forces(self, states: Array, inputs: Array) -> Array:
         """See ``HostSimulator.drive_forces``."""
         q, v = states[:, self._positions], states[:, self._rates]
-        return self.drive_force(q, v, inputs, SimpleNamespace(**self.parameter_values()))
+        return self.drive_force(q, v, inputs, Values(**self.parameter_values()))
 
     def force_scale(self, joint: Joint) -> float:
         """The joint's own scale, or the force that sets up a typical rate in ten periods."""
@@ -254,7 +254,7 @@ class FirstOrderSystem(_Equations):
 
     def drive_forces(self, states: Array, inputs: Array) -> Array:
         """See ``HostSimulator.drive_forces``."""
-        return self.drive_force(states, inputs, SimpleNamespace(**self.parameter_values()))
+        return self.drive_force(states, inputs, Values(**self.parameter_values()))
 
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
         """See ``HostSimulator.integrate``: the states are rates of positions that are not used."""

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
+from sims.declared import Values
 from sims.effects.coupling import Coupling
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import flexible_parts
@@ -84,7 +85,7 @@ def motion_of(
             follow.in_place(acceleration), {name: names.index(e.joint) for name, e in added.items()}
         ),
         follow.in_place(drive_force),
-        SimpleNamespace(**host.parameter_values(), **inertia, **follow.numbers()),
+        Values(**host.parameter_values(), **inertia, **follow.numbers()),
         smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
         dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
         plays=tuple((names.index(e.joint), e) for e in host.plays()),
@@ -144,4 +145,4 @@ class _Following:
             values[curve.parameter] = curve.with_values(**own).changed(
                 values[curve.parameter], at[kind][row], self._host
             )
-        return SimpleNamespace(**values)
+        return Values(**values)

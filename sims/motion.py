@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from sims.declared import Values
 from sims.effects.backlash import Backlash
 from sims.effects.coupling import Coupling
 from sims.effects.exchange import Exchange
@@ -265,6 +266,4 @@ def substep_ends(inputs: Array) -> Array:
 
 
 def _some(parameters: SimpleNamespace, rows: Rows) -> SimpleNamespace:
-    return SimpleNamespace(
-        **{name: p[rows] if np.ndim(p) else p for name, p in vars(parameters).items()}
-    )
+    return Values(**{name: p[rows] if np.ndim(p) else p for name, p in vars(parameters).items()})

@@ -144,7 +144,8 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         together = listed([effect_name(name) for name in verdict.instead])
         found.append(f"not certain: {together} would do as well as all that is named here")
     if doubts:
-        found.append(f"not certain: {listed(doubts)}")
+        # A reason has commas of its own.
+        found.append(f"not certain: {'; '.join(doubts)}")
     if verdict.form:
         found.append(f"of the same family, {names_of(verdict.form)} would do as well")
     if verdict.same_motion:

@@ -186,6 +186,8 @@ def users_code(error: BaseException) -> str:
         path = Path(frame.filename)
         if not path.is_file() or any(path.is_relative_to(place) for place in _LIBRARIES):
             continue
+        if frame.name == "__getattr__":  # of ours, for a name that the user wrote
+            continue
         if not _ours(path):
             return f"{path}, line {frame.lineno}, in {frame.name}"
         break

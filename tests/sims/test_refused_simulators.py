@@ -79,6 +79,16 @@ def test_a_period_that_is_none_is_refused(dt):
         Hoist(dt=dt)
 
 
+class Misspelt(Hoist):
+    def acceleration(self, q, v, u, force, p):
+        return ((u[:, 0] / p.drumm + force[:, 0]) / 50.0 - 9.81)[:, None]
+
+
+def test_a_parameter_that_is_misspelt_is_told_by_the_one_that_there_is():
+    with pytest.raises(AttributeError, match=r"no parameter 'drumm'; did you mean 'drum'\?"):
+        Misspelt().step([[0.0, 0.0]], [[0.0]])
+
+
 class Squared(Hoist):
     def acceleration(self, q, v, u, force, p):
         return ((u[:, 0] / p.drum + force[:, 0] ** 2) / 50.0 - 9.81)[:, None]
