@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sims.declared import Values
 from sims.motion import Acceleration, DriveForce
 from sims.simulator import Array, Channel, Joint
+from sims.values import Values
 
 
 def by_joint(found: Any, shape: tuple[int, ...], what: str, column: str = "q") -> Array:

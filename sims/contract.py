@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from sims.declared import is_period
 from sims.equation_contract import (
     ROUNDING,
     acceleration_keeps,
@@ -78,7 +79,7 @@ def _sound(simulator: Simulator) -> Iterator[Finding]:
 def declared(simulator: Simulator) -> Iterator[Finding]:
     """Is there a period, and a channel?"""
     dt = simulator.dt
-    good = isinstance(dt, int | float | np.number) and bool(np.isfinite(dt) and dt > 0)
+    good = is_period(dt)
     says = f"every {dt:g} s" if good else f"dt is {dt!r}, expected seconds > 0"
     yield Finding("period", good, says)
     wrong = _wrong_channels(simulator)

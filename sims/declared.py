@@ -4,26 +4,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from types import SimpleNamespace
-from typing import NoReturn
 
 import numpy as np
 
+from sims import effects
 from sims.simulator import Channel, Parameter
-
-
-class Values(SimpleNamespace):
-    """Parameters as attributes, ``p.mass``; one that there is not is told with those that are."""
-
-    def __getattr__(self, name: str) -> NoReturn:
-        there = ", ".join(vars(self)) or "none"
-        near = difflib.get_close_matches(name, vars(self), 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"there is {there}"
-        raise AttributeError(f"no parameter {name!r}; {hint}")
-
-
-#: What effects that differ in form more than in kind have in common, see ``sims.effects.Effect``.
-FAMILIES = ("dissipation", "spring", "constant push", "delay or lag", "elasticity")
 
 
 def refuse_declarations(simulator: object) -> None:
@@ -62,13 +47,18 @@ def refuse_declarations(simulator: object) -> None:
     _refuse_parameters(kind.__name__, getattr(simulator, "parameters", {}))
 
 
+def is_period(dt: object) -> bool:
+    """Whether it is a finite number above zero."""
+    return isinstance(dt, int | float | np.number) and bool(np.isfinite(dt) and dt > 0)
+
+
 def refuse_period(simulator: object, dt: object) -> None:
     """Refuse a control period that is none.
 
     Raises:
         ValueError: The message names the class, and what was expected.
     """
-    if isinstance(dt, bool) or not isinstance(dt, int | float | np.number) or not dt > 0:
+    if not is_period(dt) or isinstance(dt, bool):
         name = type(simulator).__name__
         raise ValueError(f"{name}: dt is {dt!r}, expected the control period in s, above zero")
 
@@ -83,8 +73,9 @@ def _refuse_parameters(whose: str, parameters: object) -> None:
                 f"{whose}.parameters: {name!r} is {parameter!r}, expected "
                 f'Parameter({parameter!r}, "unit", "what it is")'
             )
-        near = difflib.get_close_matches(parameter.family, FAMILIES, 1)
-        if near and parameter.family not in FAMILIES:
+        families = _families()
+        near = difflib.get_close_matches(parameter.family, families, 1)
+        if near and parameter.family not in families:
             raise ValueError(
                 f"{whose}.parameters: {name!r} is of the family {parameter.family!r}; did you mean "
                 f"{near[0]!r}?"
@@ -93,3 +84,9 @@ def _refuse_parameters(whose: str, parameters: object) -> None:
             raise ValueError(
                 f"{whose}.parameters: {name!r} has the value {parameter.value!r}, expected a number"
             )
+
+
+def _families() -> set[str]:
+    """What effects that differ in form more than in kind have in common, see ``Effect``."""
+    kinds = (kind for kind in vars(effects).values() if isinstance(kind, type))
+    return {kind.family for kind in kinds if issubclass(kind, effects.Effect) and kind.family}

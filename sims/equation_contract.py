@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sims.declared import Values
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.findings import Finding
 from sims.simulator import Array
+from sims.values import Values
 
 #: Relative difference of a row alone from the same one in a batch that libraries may make.
 ROUNDING = 1e-6

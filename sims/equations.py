@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sims.authored import beyond_rest, by_joint, force_is_added, joint_of, mobility, push_of_inputs
-from sims.declared import Values, refuse_declarations, refuse_period
+from sims.declared import refuse_declarations, refuse_period
 from sims.effects.base import Effect
 from sims.effects.pull import ELSEWHERE
 from sims.host import HostSimulator
@@ -21,6 +21,7 @@ from sims.rows import State
 from sims.simulator import Array, Joint, Parameter
 from sims.sliding import move
 from sims.unsound import cannot_call
+from sims.values import Values
 
 
 class _Equations(HostSimulator):

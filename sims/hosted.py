@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
-from sims.declared import Values
 from sims.effects.coupling import Coupling
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import flexible_parts
@@ -26,6 +25,7 @@ from sims.effects.store import stores
 from sims.host import HostSimulator
 from sims.motion import Acceleration, DriveForce, Flow, Motion, carrying
 from sims.simulator import Array
+from sims.values import Values
 
 #: What a thread asked for last: a path asks for the same motion at every step.
 _last = threading.local()

@@ -11,7 +11,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sims.declared import Values
 from sims.effects.backlash import Backlash
 from sims.effects.coupling import Coupling
 from sims.effects.exchange import Exchange
@@ -23,6 +22,7 @@ from sims.effects.response import AsymmetricResponse
 from sims.effects.store import SecondStore
 from sims.rows import Mask, Rows, State
 from sims.simulator import Array
+from sims.values import Values
 
 Acceleration = Callable[[Array, Array, Array, Array, SimpleNamespace], Array]
 DriveForce = Callable[[Array, Array, Array, SimpleNamespace], Array]

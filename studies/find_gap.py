@@ -166,9 +166,9 @@ def run(
     for line in found_in_data(findings):
         tell(f"data: {line}")
     tell("checking the integration step")
-    for line in advice(simulator, data.trajectories):
+    steps = advice(simulator, data.trajectories)
+    for line in steps:
         tell(line)
-        findings.append(Finding("step", "", line, severity="warning"))
     moved = simulator.for_motion([run.states for run in data.trajectories])
     minutes = study.minutes or usual_minutes(moved)
     budget(60 * minutes)
@@ -188,9 +188,8 @@ def run(
         progress=tell,
     )
     tell("writing the report")
-    steps = tuple(found for found in findings if found.kind == "step")
-    findings = [found for found in findings if found not in steps]
-    result = dataclasses.replace(result, quality=(*steps, *result.quality))
+    shows = (Finding("step", "", line, severity="warning") for line in steps)
+    result = dataclasses.replace(result, quality=(*shows, *result.quality))
     write_gap(result, output, config, findings, time.perf_counter() - begin)
     grave = found_in_data([found for found in findings if found.severity == "warning"])
     first = tuple(Finding("log", "", line) for line in grave)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -14,7 +13,7 @@ from sims.effects.curve import Along, CurveBetween, CurveFromZero
 from sims.effects.joint import JointEffect, Value
 
 if TYPE_CHECKING:
-    from sims.host import HostSimulator
+    pass
 
 
 #: What a curve by command can do, or nearly: the last two have a kink.
@@ -96,19 +95,11 @@ class StateCurve(ForceCurve):
     follows_rate: ClassVar[bool] = True
     by: ClassVar[str] = "state"
     gives: ClassVar[str] = "rate of change"
+    if_it_moves: ClassVar[str] = "force_curve, or friction_curve"
 
     def force(self, q: Value, v: Value) -> Value:
         """Rate of change; the state of a first-order system counts as a rate."""
         return self.at(v)
-
-    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
-        """See ``JointEffect.measures``; what moves has a force curve for it."""
-        if any(joint.name == self.joint and joint.rate is not None for joint in simulator.joints):
-            raise ValueError(
-                f"{self.name} needs the state of a first-order system, and {self.joint!r} moves: "
-                "there it is force_curve, or friction_curve"
-            )
-        return super().measures(simulator)
 
 
 @dataclasses.dataclass(frozen=True)

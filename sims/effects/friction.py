@@ -77,15 +77,7 @@ class ConstantLoss(CoulombFriction):
     needs: ClassVar[str] = "values of both signs"
     subfamily: ClassVar[str] = ""
     mechanical: ClassVar[bool] = False
-
-    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
-        """See ``JointEffect.measures``; a joint that moves has Coulomb friction for it."""
-        if any(joint.name == self.joint and joint.rate is not None for joint in simulator.joints):
-            raise ValueError(
-                f"{self.name} needs the state of a first-order system, and {self.joint!r} moves: "
-                "there it is coulomb_friction"
-            )
-        return super().measures(simulator)
+    if_it_moves: ClassVar[str] = "coulomb_friction"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -29,6 +29,7 @@ class JointEffect(Effect):
         mechanical: False if the law makes sense without a rate, so that a first-order
             system can host it as a constant rate of change.
         follows_rate: True if the force depends on the rate.
+        if_it_moves: What it is on a joint that moves, which hosts that in its place; empty if this.
     """
 
     joint: str
@@ -36,6 +37,7 @@ class JointEffect(Effect):
     enters: ClassVar = "joint"
     mechanical: ClassVar[bool] = True
     follows_rate: ClassVar[bool] = True
+    if_it_moves: ClassVar[str] = ""
 
     def parts(self) -> tuple[JointEffect, ...]:
         """The simpler effects that it is the sum of, or itself alone."""
@@ -57,6 +59,11 @@ class JointEffect(Effect):
                 f"{self.name} needs a joint with a rate; {joint.name!r} is the state of a "
                 "first-order system, which hosts constant_load, proportional_loss and exchange; "
                 'a speed is a channel of kind="rate"'
+            )
+        if joint.rate is not None and self.if_it_moves:
+            raise ValueError(
+                f"{self.name} needs the state of a first-order system, and {self.joint!r} moves: "
+                f"there it is {self.if_it_moves}"
             )
         speed = joint.position == joint.rate
         if speed and self.mechanical and not self.follows_rate:
@@ -191,19 +198,11 @@ class ProportionalLoss(JointEffect):
     sentence: ClassVar[str] = "A loss in proportion to what is there: a leak, a decay."
     needs: ClassVar[str] = "small and large values"
     mechanical: ClassVar[bool] = False
+    if_it_moves: ClassVar[str] = "viscous_friction"
 
     def force(self, q: Value, v: Value) -> Value:
         """Rate of change by the loss; the state of a first-order system counts as a rate."""
         return -self.rate * v
-
-    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
-        """See ``JointEffect.measures``; a joint that moves has viscous friction for it."""
-        if any(joint.name == self.joint and joint.rate is not None for joint in simulator.joints):
-            raise ValueError(
-                f"{self.name} needs the state of a first-order system, and {self.joint!r} moves: "
-                "there it is viscous_friction"
-            )
-        return super().measures(simulator)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -40,6 +40,8 @@ DIVIDED = re.compile(r"(rad|[mVKNA])(?![\w^])")
 PEOPLE = ("Coulomb", "Stribeck")
 #: Pairs of words with a hyphen, in the names of effects.
 PAIRS = ("load-dependent",)
+#: Times its value that an end of an interval may be, beyond which it is none.
+OPEN = 1e6
 #: Effects that act between two places.
 BETWEEN = ("exchange",)
 
@@ -129,10 +131,6 @@ def six_digits(value: float) -> str:
     if "e-" in text and abs(value) > 1e-7:
         return f"{value:.{5 - math.floor(math.log10(abs(value)))}f}".rstrip("0")
     return text
-
-
-#: Times its value that an end of an interval may be, beyond which it is none.
-OPEN = 1e6
 
 
 def typeset(unit: str) -> str:

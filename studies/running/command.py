@@ -99,10 +99,8 @@ class Parser(jsonargparse.ArgumentParser):
             }
             check_numbers(configs, kinds)
             for path, (option, inside) in _READ.items():
-                if f"--{option}" in FILES and option != "config":
-                    start = f"--{option}."
-                    below = {n.removeprefix(start): k for n, k in kinds.items() if start in n}
-                    check_settings(path, inside, below)
+                if option == "columns":
+                    check_settings(path, inside, kinds, f"--{option}.")
             contents = list(configs.values())
             self._without_usual([*map(class_of_word, given), *contents])
             return super().parse_args(given, *rest, **options)

@@ -48,13 +48,14 @@ def check_numbers(configs: Mapping[str, Any], kinds: Mapping[str, Any]) -> None:
                 check_number(f"{path}: {key}", value, kinds.get(f"--{key}"))
 
 
-def check_settings(path: str, inside: Any, kinds: Mapping[str, Any]) -> None:
+def check_settings(path: str, inside: Any, kinds: Mapping[str, Any], start: str) -> None:
     """Refuse what stands in a file of settings where numbers, or names with values, have to.
 
     Args:
         path: The file.
         inside: What it holds.
-        kinds: The type of every setting, by name.
+        kinds: The type of every option.
+        start: How the options of its settings begin.
 
     Raises:
         ValueError: The message names the file and the key, what stands there, what was expected.
@@ -62,7 +63,7 @@ def check_settings(path: str, inside: Any, kinds: Mapping[str, Any]) -> None:
     if not isinstance(inside, Mapping):
         raise ValueError(f"{path}: expected names with values, as in `time: t`, not {inside!r:.60}")
     for name, value in inside.items():
-        _check_kind(f"{path}: {name}", value, kinds.get(str(name)))
+        _check_kind(f"{path}: {name}", value, kinds.get(f"{start}{name}"))
 
 
 def _check_kind(place: str, inside: Any, kind: Any) -> None:

@@ -17,6 +17,7 @@ from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
+from residual.gap.search.continuation import in_place
 from residual.gap.search.pool import Key
 from sims.effects.curve import Curve
 from sims.effects.parameter_curve import ParameterCurve
@@ -136,38 +137,39 @@ def with_parameters_as_twins(answer: Answer, offered: Collection[str]) -> Answer
     for claim in answer.claims:
         law = search.candidates[claim.number].effect
         if isinstance(law, Curve) and not isinstance(law, ParameterCurve) and claim.sure:
-            families = {name: p.family for name, p in simulator.parameters.items()}
             others = [
                 ParameterCurve(name, level.channel).suited_to(*level.reach)
                 for level in levels(simulator, fitter.samples)
-                for name in simulator.parameters
+                for name, parameter in simulator.parameters.items()
                 if name in offered and not level.of_size
-                if not (law.family and families[name] == law.family)
+                if not (law.family and parameter.family == law.family)
             ]
-            found = [str(one) for one in others if _moves_as(answer, claim.number, one)]
+            found = _that_move_as(answer, claim.number, law, others)
             claim = dataclasses.replace(claim, twins=(*claim.twins, *found[:MOST]))
         claims.append(claim)
     return dataclasses.replace(answer, claims=tuple(claims))
 
 
-def _moves_as(answer: Answer, number: int, other: Curve) -> bool:
-    """Whether a curve fits as well in place of a law of the answer."""
+def _that_move_as(
+    answer: Answer, number: int, law: Curve, others: Sequence[ParameterCurve]
+) -> list[str]:
+    """Labels of the curves that fit as well in place of a law of the answer."""
     search, key = answer.found.search, answer.key
     fitter, fit = search.fitter, search.tried[key]
     assert isinstance(fitter, SmoothFitter)
-    law = search.candidates[number].effect
-    assert isinstance(law, Curve)
-    does, moved = _moved(fitter, fit, law), _moved(fitter, fit, other)
-    if not _is_one_of(moved, [does]):
-        return False
-    place = key.index(number)
-    own = fit.model.owner == place
-    start = np.linalg.lstsq(moved, does @ fit.theta[own], rcond=1e-10)[0]
-    rest = [one for i, one in enumerate(fit.model.chosen) if i != place]
-    pool = candidates(search.simulator, [other], fitter.samples)
-    model = Model(search.simulator, [*rest, *pool])
-    found = fitter.fit(model, np.append(fit.theta[~own], start), fit)
-    return found.merit <= AS_WELL * fit.merit + fitter.tie(search.nominal)
+    does, own = _moved(fitter, fit, law), fit.model.owner == key.index(number)
+    found = []
+    for other in others:
+        moved = _moved(fitter, fit, other)
+        if not _is_one_of(moved, [does]):
+            continue
+        (heir,) = candidates(search.simulator, [other], fitter.samples)
+        values = np.linalg.lstsq(moved, does @ fit.theta[own], rcond=1e-10)[0]
+        chosen, theta = in_place(search, key, number, heir, values)
+        again = fitter.fit(Model(search.simulator, chosen), theta, fit)
+        if again.merit <= AS_WELL * fit.merit + fitter.tie(search.nominal):
+            found.append(str(other))
+    return found
 
 
 def _moved(fitter: SmoothFitter, fit: Fit, curve: Curve) -> Array:

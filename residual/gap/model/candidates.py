@@ -202,7 +202,7 @@ def _both_ways(samples: Samples, position: int, rate: int | None) -> bool:
     seen = samples.seen[:, position if rate is None else rate]
     if not np.isfinite(seen).any():
         seen = np.diff(samples.seen[:, position])
-    return bool(min(np.nanmean(seen > 0), np.nanmean(seen < 0)) > EITHER)
+    return bool(min(np.mean(seen > 0), np.mean(seen < 0)) > EITHER)
 
 
 def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]) -> bool:
