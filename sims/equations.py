@@ -36,6 +36,7 @@ class _Equations(HostSimulator):
     parameters: Mapping[str, Parameter] = {}
     advances_rows_at_once = True
     written_out = True
+    hosts_links = True
 
     def __init__(
         self,

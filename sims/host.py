@@ -38,7 +38,7 @@ class HostSimulator(Simulator):
         effects, joints: The effects, in any order, and where generalized forces can act.
         substeps: Sub-steps in one control period.
         has_drive_force: True if ``drive_forces`` is known, so that backlash can be hosted.
-        written_out: True if given by equations, which host rate limits, exchanges, stores, parts.
+        written_out, hosts_links: Whether equations give it; whether it hosts links between joints.
         has_contacts, bonds: Whether motion jumps at impacts (``for_motion``), what binds positions.
         advances_rows_at_once: True if ``integrate`` advances rows together, each its own values.
         lagged: How an input with a lag acts in sub-steps, see ``sims.followers.lagged``.
@@ -49,6 +49,7 @@ class HostSimulator(Simulator):
     substeps: int
     has_drive_force: bool = False
     written_out: bool = False
+    hosts_links: bool = False
     has_contacts: bool = False
     bonds: Bonds | None = None
     advances_rows_at_once: bool = False
@@ -226,9 +227,8 @@ class HostSimulator(Simulator):
         states[:, 0] = start
         last = actions.shape[1] - 1
         for k in range(last + 1):
-            now = self.check_rows(states[:, k], actions[:, k])
             upcoming = clipped(self, actions[:, min(k + 1, last)])
-            states[:, k + 1] = self._step(*now, upcoming)
+            states[:, k + 1] = self._step(*self.check_rows(states[:, k], actions[:, k]), upcoming)
         return states[0] if single else states
 
     def _step(self, states: Array, actions: Array, upcoming: Array | None = None) -> Array:

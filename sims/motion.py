@@ -18,6 +18,7 @@ from sims.effects.flexible import FlexiblePart
 from sims.effects.friction import CoulombFriction, DryFriction
 from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
+from sims.effects.link import Link
 from sims.effects.response import AsymmetricResponse
 from sims.effects.store import SecondStore
 from sims.rows import Mask, Rows, State
@@ -26,7 +27,7 @@ from sims.values import Values
 
 Acceleration = Callable[[Array, Array, Array, Array, SimpleNamespace], Array]
 DriveForce = Callable[[Array, Array, Array, SimpleNamespace], Array]
-Flow = Exchange | SecondStore | Coupling
+Flow = Exchange | SecondStore | Coupling | Link
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Motion:
         parameters: Each a scalar or (n,).
         smooth, dry, plays, capped: Effects with the number of the joint they act on.
         returns: The same, and whether the state is a speed.
-        flows: The same with the numbers of both states that something flows between.
+        flows: The same with the numbers of both joints or states that something acts between.
         parts: The same with the number of the joint and the part's own, after all joints.
         span: Time in s, by row, in which a rate comes back to its limit; None of a first-order
             system, whose limit is of what ``acceleration`` tells.
@@ -90,7 +91,7 @@ class Motion:
         for j, effect in self.smooth:
             total[j] += effect.force(q[j], v[j])
         for i, j, flow in self.flows:
-            inward, outward = flow.flows(v[i], v[j])
+            inward, outward = flow.flows((q[i], q[j]), (v[i], v[j]))
             total[i] += inward
             total[j] += outward
         return total

@@ -51,7 +51,7 @@ class Inquiry:
         free = {candidate.label for candidate in beside}
         samples = ready.fitter.samples
         less = one_way(simulator, self.offered.less, samples)
-        offered = [*self.offered.kept, *more]
+        offered = [*self.offered.kept, *more, *self._kept(earlier, more)]
         if isinstance(ready.fitter, SmoothFitter):
             for curve in self.offered.asked:
                 if str(curve) not in map(str, more):
@@ -59,6 +59,7 @@ class Inquiry:
         there = candidates(simulator, offered, samples, ready.fitter.seconds)
         pool = ready.pool([*there, *less])
         pool = [candidate for candidate in pool if candidate.label not in free]
+        further = self._further(simulator, ready, earlier, more)
         others = {label: e for label, e in self.offered.by_label.items() if label not in free}
         twins = exact_twins(simulator, samples, self.offered.groups, others)
         # What several make together is tried in place of them.
@@ -73,8 +74,28 @@ class Inquiry:
             return explain(
                 simulator, pool, ready.fitter, ready.floor, ready.weigh, ready.effort,
                 self.clock.checked(seldom(self.tell)), self.clock.search_until, beside, earlier,
-                twins, every_pair=earlier is None and not more,
+                twins, earlier is None and not more, further,
             )  # fmt: skip
+
+    def _further(
+        self,
+        simulator: HostSimulator,
+        ready: Prepared,
+        earlier: Search | None,
+        more: Sequence[Effect],
+    ) -> list[Candidate]:
+        """The rarer effects that may stand out in a first search."""
+        if earlier is not None or not isinstance(ready.fitter, SmoothFitter):
+            return []
+        asked = set(map(str, more))
+        rest = [effect for effect in self.offered.further if str(effect) not in asked]
+        return candidates(simulator, rest, ready.fitter.samples)
+
+    def _kept(self, earlier: Search | None, more: Sequence[Effect]) -> list[Effect]:
+        """The rarer effects that stood out in an earlier search."""
+        there = {candidate.label for candidate in earlier.candidates} if earlier else set()
+        there -= set(map(str, more))
+        return [effect for effect in self.offered.further if str(effect) in there]
 
     def confirmed(
         self, log: Log, prepared: Prepared, found: Explanation, matters: bool, tolerance: float

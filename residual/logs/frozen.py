@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from residual.logs.faults import RARE, WILD, in_full_motion, rounding, stretches
+from residual.logs.faults import RARE, WILD, in_full_motion, noise, rounding, stretches
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -17,13 +17,16 @@ Mask = NDArray[np.bool_]
 _STILL = 10
 # Part of the samples before that have to differ, and usual changes that make a way, of what moved.
 _MOVING, _CLEAR = 0.8, 4.0
-# Changes that say how a channel scatters, and the part of them that turn back where it is noise.
-_KNOWN, _TURNS = 50, 0.3
+# Changes that say how a channel scatters, and the part of them that turn back where it is noise; of
+# second differences, to which motion adds less, three quarters do.
+_KNOWN, _TURNS, _BENDS = 50, 0.3, 0.6
 # Noise by steps of rounding from which on readings are hardly ever equal for long, and the odds of
 # as many equal ones, once in a whole log.
 _SHAKES, _ODDS = 0.6, 1e-6
 # A sensor that thaws leaps so many times as far as it moves after that; what breaks away speeds up.
 _CATCHES_UP = 2.0
+# Missing samples in a row that do not part equal ones.
+_HOLE = 2
 # Samples before and after a stop at which another sensor would notice it, part of the pace that it
 # keeps there where it does not, and at the end of the stop.
 _ABOUT, _PACE, _LATE = 5, 0.7, 0.2
@@ -47,6 +50,32 @@ def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) 
     Returns:
         True where a value repeats the one before and should not.
     """
+    kept = [_without_holes(values) for values in runs]
+    others = moved or [np.zeros(max(len(values) - 1, 0)) for values in runs]
+    # What another sensor says of the change over a hole is the sum of what it says inside.
+    there = [
+        np.add.reduceat(other, index[:-1]) if len(index) > 1 else np.zeros(0)
+        for other, index in zip(others, kept, strict=True)
+    ]
+    known = [values[index] for values, index in zip(runs, kept, strict=True)]
+    found = [np.zeros(len(values), bool) for values in runs]
+    for mask, index, own in zip(found, kept, _frozen(known, there), strict=True):
+        mask[index] = own
+    return found
+
+
+def _without_holes(values: Array) -> NDArray[np.intp]:
+    """Places of samples, without those that are missing alone, or next to another one."""
+    short = np.zeros(len(values), bool)
+    missing = np.isnan(values)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]])))
+    for first, end in edges.reshape(-1, 2):
+        short[first:end] = end - first <= _HOLE and first > 0 and end < len(values)
+    return np.flatnonzero(~short)
+
+
+def _frozen(runs: Sequence[Array], others: Sequence[Array]) -> list[Mask]:
+    """``frozen_samples`` of runs without holes."""
     changes = [np.abs(np.diff(values)) for values in runs]
     moving = np.concatenate([change[change > 0] for change in changes] or [np.zeros(0)])
     found = [np.zeros(len(values), bool) for values in runs]
@@ -55,7 +84,6 @@ def frozen_samples(runs: Sequence[Array], moved: Sequence[Array] | None = None) 
     typical, step = float(np.median(moving)), rounding(runs)
     known = np.concatenate(list(runs))
     chance, ends = _equal_by_chance(runs), (0.0, np.nanmin(known), np.nanmax(known))
-    others = moved or [np.zeros(len(change)) for change in changes]
     for values, change, other, mask in zip(runs, changes, others, found, strict=True):
         for a, b in stretches(change == 0):  # samples a to b are equal
             if b - a < _STILL or a < 3:
@@ -123,9 +151,11 @@ def _equal_by_chance(runs: Sequence[Array]) -> float:
     loose = loose[np.isfinite(loose)]
     pairs = loose[1:] * loose[:-1]
     pairs = pairs[pairs != 0.0]
-    if len(loose) < _KNOWN or len(pairs) < _KNOWN / 2 or np.mean(pairs < 0) < _TURNS:
+    if len(loose) < _KNOWN or len(pairs) < _KNOWN / 2:
         return np.inf
     equal = float(np.mean(loose == 0))
+    if np.mean(pairs < 0) < _TURNS:
+        return _STILL - 1 if equal <= RARE and _shakes(runs, changes, step) else np.inf
     if equal <= RARE:
         return _STILL - 1
     if not step:
@@ -134,9 +164,19 @@ def _equal_by_chance(runs: Sequence[Array]) -> float:
     # are equal less often the larger it is. Motion adds to both, so the lesser counts.
     bends = np.concatenate([np.diff(change) for change in changes])
     variance = float(np.nanmean(bends**2)) / 6 - step**2 / 12
-    noise = min(np.sqrt(max(0.0, variance)), step / (2 * np.sqrt(np.pi) * equal))
-    if noise < _SHAKES * step:
+    sigma = min(np.sqrt(max(0.0, variance)), step / (2 * np.sqrt(np.pi) * equal))
+    if sigma < _SHAKES * step:
         return np.inf
     # They are most often so if what is measured lies in the middle of a step.
-    shares = np.diff(ndtr((np.arange(-20, 21) - 0.5) * step / noise))
+    shares = np.diff(ndtr((np.arange(-20, 21) - 0.5) * step / sigma))
     return float(np.log(_ODDS / len(loose)) / np.log(np.sum(shares**2)))
+
+
+def _shakes(runs: Sequence[Array], changes: Sequence[Array], step: float) -> bool:
+    """Whether readings that mostly move shake as well, by more than rounding makes of motion."""
+    bends = [np.diff(change) for change in changes]
+    pairs = np.concatenate([bend[1:] * bend[:-1] for bend in bends])
+    pairs = pairs[np.isfinite(pairs)]
+    if len(pairs) < _KNOWN or np.mean(pairs < 0) < _BENDS:
+        return False
+    return noise(runs) ** 2 - step**2 / 12 > (_SHAKES * step) ** 2

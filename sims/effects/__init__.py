@@ -49,6 +49,9 @@ from sims.effects.joint import ViscousFriction as ViscousFriction
 from sims.effects.library import library as library
 from sims.effects.library import typical as typical
 from sims.effects.limit import RateLimit as RateLimit
+from sims.effects.link import CouplingDamper as CouplingDamper
+from sims.effects.link import CouplingSpring as CouplingSpring
+from sims.effects.link import Link as Link
 from sims.effects.parameter import ParameterChange as ParameterChange
 from sims.effects.parameter_curve import ParameterCurve as ParameterCurve
 from sims.effects.response import AsymmetricResponse as AsymmetricResponse

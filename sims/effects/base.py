@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from sims.host import HostSimulator
 
 Role = Literal["strength", "shape", "fixed"]
+#: What two joints have, or feel: numbers, or arrays with one entry per row.
+Both = tuple[Any, Any]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -155,6 +157,11 @@ class Effect(abc.ABC):
     def where(self) -> str:
         """The joint, actuator, channel or parameter that it acts on."""
         return getattr(self, dataclasses.fields(self)[0].name)
+
+    @property
+    def pair(self) -> tuple[str, ...]:
+        """Names of the two joints that it acts between; empty if it acts on one place."""
+        return ()
 
     @property
     def surprising(self) -> bool:

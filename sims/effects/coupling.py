@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
-from sims.effects.base import Effect, number, place
+from sims.effects.base import Both, Effect, number, place
 from sims.effects.joint import Value
 
 if TYPE_CHECKING:
@@ -42,9 +42,9 @@ class Coupling(Effect):
         """Names of what is acted on and of what acts."""
         return tuple(self.joint.split(BY))
 
-    def flows(self, first: Value, second: Value) -> tuple[Value, Value]:
+    def flows(self, positions: Both, rates: Both) -> Both:
         """Forces on both joints, by row, from their rates."""
-        return self.strength * second, 0.0 * second
+        return self.strength * rates[1], 0.0 * rates[1]
 
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of the force on the first and of the rate of the second."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 from sims.effects.actuator import AND
-from sims.effects.base import Effect, number, place
+from sims.effects.base import Both, Effect, number, place
 from sims.effects.joint import Value
 from sims.effects.store import is_stored
 
@@ -41,8 +41,9 @@ class Exchange(Effect):
         """Names of the two states."""
         return tuple(self.joint.split(AND))
 
-    def flows(self, first: Value, second: Value) -> tuple[Value, Value]:
+    def flows(self, positions: Both, rates: Both) -> Both:
         """Rates of change of both states, by row."""
+        first, second = rates
         lead = second - first
         return self.into_first * lead, -self.into_second * lead
 

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
-from sims.effects.base import Effect, number, place
+from sims.effects.base import Both, Effect, number, place
 from sims.effects.joint import Value
 from sims.simulator import Channel
 
@@ -35,8 +35,9 @@ class SecondStore(Effect):
     enters: ClassVar = "joint"
     needs: ClassVar[str] = "fast changes, and long rests after them"
 
-    def flows(self, first: Value, second: Value) -> tuple[Value, Value]:
+    def flows(self, positions: Both, rates: Both) -> Both:
         """Rates of change of the state and of the store, by row."""
+        first, second = rates
         lead = second - first
         return self.rate * lead, -lead / self.time
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -18,11 +19,12 @@ from sims.effects.actuator import (
 from sims.effects.backlash import Backlash
 from sims.effects.base import Effect
 from sims.effects.joint import ConstantLoad, JointEffect
+from sims.effects.link import CouplingDamper, CouplingSpring, Link
 from sims.effects.sensor import SensorEffect
 from sims.mujoco import elements, payload
 from sims.mujoco.actuators import Circuit, written
 from sims.mujoco.attributes import nominal_field
-from sims.mujoco.compiled import HARD_FRICTION, model_text
+from sims.mujoco.compiled import HARD_FRICTION, INTEGRATORS, model_text
 from sims.mujoco.forces import native
 from sims.mujoco.markup import Document
 from sims.mujoco.places import Places
@@ -86,6 +88,8 @@ class _Writer:
                     expressible.append(effect)
                 else:
                     self._cannot(effect, "MJCF has no such force")
+            elif isinstance(effect, Link):
+                self._tendon(effect)
             elif not isinstance(effect, ActuatorEffect):
                 expressible.append(effect)
         fields = self.simulator.with_effects(expressible).row_fields(1)
@@ -131,6 +135,27 @@ class _Writer:
                 values["springref"] = written([rest])
             if values:
                 self.places.set("joint", j, values)
+
+    def _tendon(self, link: Link) -> None:
+        """A link as a fixed tendon, whose length is the position of one joint to the other's."""
+        if link.absent:
+            return
+        pulls = ""
+        for name, arm in zip(link.pair, (1.0, -float(link.ratio)), strict=True):
+            self.places.set("joint", self.simulator.joint_index(name), {"name": name})
+            pulls += f"<joint joint={quoteattr(name)} coef={quoteattr(written([arm]))}/>"
+        if isinstance(link, CouplingSpring):
+            # MJCF takes -1 for a length that it finds out itself.
+            rest = float(link.rest) if link.rest != -1.0 else np.nextafter(-1.0, 0.0)
+            values = f'stiffness="{written([link.stiffness])}" springlength="{written([rest] * 2)}"'
+        else:
+            assert isinstance(link, CouplingDamper)
+            values = f'damping="{written([link.coefficient])}"'
+        if self.model.opt.integrator != INTEGRATORS["Euler"]:
+            self.rough.append(f"{link}: MuJoCo follows a tendon inside a step too")
+        name = quoteattr(f"{link.name} at {link.joint}")
+        fixed = f"<fixed name={name} {values}>{pulls}</fixed>"
+        self.places.root.insert(self.places.root.tags[0], f"\n  <tendon>{fixed}</tendon>")
 
     def _bodies(self, fields: dict[str, Array]) -> None:
         model = self.model

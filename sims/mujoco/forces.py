@@ -16,22 +16,35 @@ from sims.effects.joint import (
     QuadraticDrag,
     ViscousFriction,
 )
+from sims.effects.link import Link
 from sims.mujoco.attributes import repeated
+from sims.mujoco.compiled import INTEGRATORS
 from sims.mujoco.rows import Law
 from sims.simulator import Array
 
+RK4 = INTEGRATORS["RK4"]
+
+#: A joint and its degree of freedom.
+Place = tuple[int, int]
 #: An effect, its joint and the joint's degree of freedom.
 Placed = tuple[JointEffect, int, int]
+#: A link with the places of both its joints.
+Linked = tuple[Link, Place, Place]
 
 
 def place(
-    model: Any, effects: Sequence[Placed], fields: dict[str, Array], rows: int
+    model: Any,
+    effects: Sequence[Placed],
+    links: Sequence[Linked],
+    fields: dict[str, Array],
+    rows: int,
 ) -> tuple[Array | None, Law | None]:
     """Put effects into the model's fields; what has no field becomes a force.
 
     Args:
         model: The compiled nominal.
         effects: What acts on which joint.
+        links: What acts between which joints.
         fields: Fields with an entry per row; those that effects change are added or changed.
         rows: Number of rows.
 
@@ -47,7 +60,7 @@ def place(
             applied[:, d] += effect.load
         elif not _native(model, placed, fields, rows):
             rest.append(placed)
-    return applied, _law(model, rest, fields, rows) if rest else None
+    return applied, _law(model, rest, links, fields, rows) if rest or links else None
 
 
 def native(model: Any, effect: JointEffect, j: int) -> bool:
@@ -100,16 +113,33 @@ def _reference(model: Any, j: int) -> float:
     return float(model.qpos_spring[int(model.jnt_qposadr[j])])
 
 
-def _law(model: Any, effects: Sequence[Placed], fields: dict[str, Array], rows: int) -> Law:
+def _law(
+    model: Any,
+    effects: Sequence[Placed],
+    links: Sequence[Linked],
+    fields: dict[str, Array],
+    rows: int,
+) -> Law:
     dry = [placed for placed in effects if isinstance(placed[0], DryFriction)]
     smooth = [placed for placed in effects if not isinstance(placed[0], DryFriction)]
     friction = "dof_frictionloss"
     held = fields.get(friction, repeated(model, friction, rows)) if dry else None
 
+    # Held over a step that Runge-Kutta follows inside, a force is best that of its middle.
+    half = 0.5 * float(model.opt.timestep) if model.opt.integrator == RK4 else 0.0
+
+    def position(q: Array, v: Array, j: int, d: int) -> Array:
+        return q[:, int(model.jnt_qposadr[j])] + half * v[:, d]
+
     def law(q: Array, v: Array) -> tuple[Array, dict[str, Array]]:
         force = np.zeros((len(q), model.nv))
         for effect, j, d in smooth:
-            force[:, d] += effect.force(q[:, int(model.jnt_qposadr[j])], v[:, d])
+            force[:, d] += effect.force(position(q, v, j, d), v[:, d])
+        for link, (i, a), (j, b) in links:
+            there = position(q, v, i, a), position(q, v, j, b)
+            both = link.flows(there, (v[:, a], v[:, b]))
+            force[:, a] += both[0]
+            force[:, b] += both[1]
         if held is None:
             return force, {}
         # Dry friction of a size that follows the rate: the solver's own, with a new limit.

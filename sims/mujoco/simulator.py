@@ -18,6 +18,7 @@ from sims.effects.actuator import (
 )
 from sims.effects.base import Effect
 from sims.effects.joint import ConstantLoad, LinearSpring
+from sims.effects.link import Link
 from sims.effects.sensor import SensorOffset
 from sims.followers import lagged
 from sims.host import HostSimulator
@@ -28,7 +29,7 @@ from sims.mujoco.compiled import INTEGRATORS, Source, compiled, control_period
 from sims.mujoco.contacts import touches, touching_geoms
 from sims.mujoco.corrected import corrected_files
 from sims.mujoco.effects import AttributeChange
-from sims.mujoco.forces import Placed, place
+from sims.mujoco.forces import Linked, Placed, place
 from sims.mujoco.lag import lagged_at_ends
 from sims.mujoco.poses import any_states, free_states
 from sims.mujoco.render import MujocoRenderer
@@ -71,6 +72,7 @@ class MujocoSimulator(HostSimulator):
 
     #: One call of ``integrate`` with many rows is efficient, each with its own numbers.
     advances_rows_at_once = True
+    hosts_links = True
 
     def __init__(
         self,
@@ -158,7 +160,7 @@ class MujocoSimulator(HostSimulator):
         if n == 0:
             return states.copy()
         fields = row_fields(self.model, self.attributes, self.parameter_values(), n)
-        applied, law = place(self.model, self._placed(), fields, n)
+        applied, law = place(self.model, self._placed(), self._linked(), fields, n)
         own = float(self.model.opt.timestep)
         h = durations / steps
         h = np.where(np.abs(h - own) < SAME * own, own, h)
@@ -283,11 +285,15 @@ class MujocoSimulator(HostSimulator):
     def row_fields(self, rows: int) -> dict[str, Array]:
         """Fields of the model that attributes and effects on joints change, (rows, ...)."""
         fields = row_fields(self.model, self.attributes, self.parameter_values(), rows)
-        place(self.model, self._placed(), fields, rows)
+        place(self.model, self._placed(), (), fields, rows)
         return fields
 
     def _placed(self) -> list[Placed]:
         return [(effect, *self._dofs[effect.joint]) for effect in self.joint_effects()]
+
+    def _linked(self) -> list[Linked]:
+        links = [e for e in self.effects if isinstance(e, Link) and not e.absent]
+        return [(e, self._dofs[e.pair[0]], self._dofs[e.pair[1]]) for e in links]
 
     def smooth_states(self, n: int, rng: np.random.Generator) -> Array:
         """Random physical states without contact, (n, n_physical), about the reference pose."""

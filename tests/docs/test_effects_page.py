@@ -46,13 +46,14 @@ class Coupled(EquationOfMotion):
 def row(effect: Effect) -> str:
     """The effect's row of the table; units are those of a joint that turns, driven by a voltage."""
     first_order = effect.where.startswith("level")
-    coupled = effect.name in ("added_inertia", "coupling")
+    between = isinstance(effect, effects.Coupling | effects.Link)
+    coupled = between or effect.name == "added_inertia"
     host = Coupled() if coupled else PendulumEquation()
     known = effect.quantities(Tank() if first_order else host)
     numbers = ", ".join(f"`{name}` {quantity.unit}" for name, quantity in known.items())
     place = PLACES[next(iter(inspect.signature(type(effect)).parameters))]
     place = "two states" if " and " in effect.where else place
-    place = "two joints" if effect.name == "coupling" else place
+    place = "two joints" if between else place
     family = effect.family + (f", {effect.subfamily}" if effect.subfamily else "")
     cells = (f"`{effect.name}`", place, numbers, family, effect.sentence, effect.needs)
     return f"| {' | '.join(cells)} |"
@@ -73,6 +74,7 @@ OTHERS = [
     effects.ConstantLoss("level"), effects.AsymmetricDamping("pivot"),
     effects.AsymmetricActuator("voltage"), effects.SlewLimit("voltage"),
     effects.Hysteresis("voltage"), effects.Coupling("pivot by elbow"),
+    effects.CouplingSpring("pivot and elbow"), effects.CouplingDamper("pivot and elbow"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}

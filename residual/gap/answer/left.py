@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,9 +14,9 @@ from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.model.model import Model
+from residual.gap.search.at_sight import of_one_pair
 from residual.gap.search.pool import Key
 from sims.effects.base import Effect
-from sims.effects.coupling import Coupling
 from sims.effects.flexible import FlexiblePart
 
 #: Part of the squared forecast error of the library's laws, less what noise makes, that further
@@ -57,25 +56,20 @@ def worth_asking_for(answer: Answer, further: Sequence[Effect]) -> list[Effect]:
     if not isinstance(fitter, SmoothFitter) or not much_is_left(answer):
         return []
     most = half_beyond_noise(answer, fit.merit)
-    pool = candidates(fit.model.simulator, further, fitter.samples)
+    offered = {candidate.label for candidate in search.candidates}
+    rest = [effect for effect in further if str(effect) not in offered]
+    pool = candidates(fit.model.simulator, rest, fitter.samples)
     moved = [beside_starts(fit, fitter.columns(fit, [one])) for one in pool]
 
     def takes_most(*numbers: int) -> bool:
         return beside(fit, [moved[n] for n in numbers], fitter.cap).loss < most
 
     worth = {n for n in range(len(pool)) if takes_most(n)}
-    for two in _both_ways(pool):
+    for two in of_one_pair(pool):
         worth |= set(two) if takes_most(*two) else set()
     return [
         one.effect for n, one in enumerate(pool) if n in worth or _fits_in_place(one, fitter, fit)
     ]
-
-
-def _both_ways(pool: Sequence[Candidate]) -> list[tuple[int, int]]:
-    """Numbers of couplings of one pair of joints: a gyroscope couples its axes both ways."""
-    pairs = [one.effect.pair if isinstance(one.effect, Coupling) else () for one in pool]
-    both = itertools.combinations(range(len(pool)), 2)
-    return [(a, b) for a, b in both if pairs[a] and pairs[a] == pairs[b][::-1]]
 
 
 def _fits_in_place(one: Candidate, fitter: SmoothFitter, fit: Fit) -> bool:

@@ -28,10 +28,12 @@ from sims.effects.friction import ConstantLoss
 from sims.effects.joint import AsymmetricDamping, JointEffect, Unbalance
 from sims.effects.library import typical
 from sims.effects.limit import RateLimit
+from sims.effects.link import Link
 from sims.effects.pull import ELSEWHERE
 from sims.effects.sensor import SensorEffect
 from sims.effects.store import SecondStore
 from sims.host import HostSimulator
+from sims.simulator import Joint
 
 Array = NDArray[np.float64]
 
@@ -215,10 +217,13 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
         return not set(effect.pair) <= measured
     if isinstance(effect, SecondStore):
         return effect.joint not in measured
+    if isinstance(effect, Link):
+        linked = [joint for joint in simulator.joints if joint.name in effect.pair]
+        return any(_unseen(joint, measured, effect.by_position) for joint in linked)
     where = effect.pair[1] if isinstance(effect, Coupling) else effect.where
     joint = next((j for j in simulator.joints if j.name == where), None)
     if isinstance(effect, (FlexiblePart, Coupling)) and joint is not None:
-        return not {joint.position, joint.rate} & measured
+        return _unseen(joint, measured)
     if not isinstance(effect, JointEffect) or joint is None or joint.position in measured:
         return False
     if joint.position == joint.rate:  # a speed, which shows in what it moves
@@ -232,6 +237,12 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     # The state of a first-order system counts as a rate.
     rates = np.zeros(4) if joint.rate else places
     return bool(np.ptp(there.force(places, rates)) > 0)
+
+
+def _unseen(joint: Joint, measured: set[str], by_position: bool = False) -> bool:
+    """Whether nothing of a joint was measured, or not the position that something goes by."""
+    seen = joint.position in measured
+    return not seen and (by_position or joint.rate not in measured)
 
 
 def _candidate(effect: Effect, known: dict[str, Quantity], reach: float) -> Candidate:

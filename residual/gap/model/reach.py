@@ -11,6 +11,7 @@ from sims.effects.base import Effect, Quantity
 from sims.effects.flexible import FlexiblePart
 from sims.effects.joint import Unbalance
 from sims.effects.limit import RateLimit
+from sims.effects.link import CouplingSpring
 from sims.effects.store import SecondStore
 from sims.host import HostSimulator
 from sims.simulator import Channel
@@ -110,6 +111,8 @@ def within_reach(
         fast = min(float(np.median(samples.durations)), starts[0])
         time = dataclasses.replace(known["time"], low=fast, high=longest, starts=starts)
         return {**known, "time": time}
+    if isinstance(effect, CouplingSpring):
+        return {**known, "rest": _between(effect, known["rest"], simulator, samples)}
     joint = next((j for j in simulator.joints if j.name == effect.where), None)
     if effect.enters != "joint" or joint is None:
         return known
@@ -144,3 +147,16 @@ def within_reach(
             quantity, scale=factor * quantity.scale, starts=starts
         )
     return found
+
+
+def _between(
+    effect: CouplingSpring, rest: Quantity, simulator: HostSimulator, samples: Samples
+) -> Quantity:
+    """Where a spring between two joints may rest: about as they lay to each other."""
+    names = [channel.name for channel in simulator.physical_channels]
+    places = {joint.name: names.index(joint.position) for joint in simulator.joints}
+    first, second = (samples.seen[:, places[name]] for name in effect.pair)
+    lay = np.concatenate([first - second, first + second])
+    low, high = min(float(np.nanmin(lay)), 0.0), max(float(np.nanmax(lay)), 0.0)
+    beyond = max(high - low, rest.scale)
+    return dataclasses.replace(rest, low=low - beyond, high=high + beyond)

@@ -16,6 +16,7 @@ from residual.gap.fitting.forecasts import noise_floor
 from residual.gap.fitting.noise import Noise
 from residual.gap.model.candidates import Candidate
 from residual.gap.preparation.effort import Effort
+from residual.gap.search.at_sight import at_sight
 from residual.gap.search.beam import extend, improves, run
 from residual.gap.search.choice import Choice, choose
 from residual.gap.search.continuation import add_handed_over
@@ -107,6 +108,7 @@ def explain(
     earlier: Search | None = None,
     twins: Twins | None = None,
     every_pair: bool = True,
+    further: Sequence[Candidate] = (),
 ) -> Explanation:
     """Search, weigh the channels by what is left, search again, until nothing changes.
 
@@ -124,6 +126,7 @@ def explain(
             so that none of them loses for not being asked, and what it lacked beside them.
         twins: Exact twins of what may be missing, by label.
         every_pair: Whether every two effects are tried where there are few.
+        further: What is on offer, too, if it stands out, see ``at_sight``.
     """
 
     def begun(fitter: Fitter, floor: Noise, before: Search | None) -> Search:
@@ -144,6 +147,9 @@ def explain(
     before = earlier
     for _ in range(ROUNDS):
         search = begun(fitter, floor, before)
+        if before is None and (standing_out := at_sight(search, further)):
+            pool = [*pool, *standing_out]
+            search = begun(fitter, floor, before)
         if not seeds:
             if earlier is not None:
                 search.add(carried(earlier, search))

@@ -13,6 +13,7 @@ from sims.effects import (
     Cogging,
     ConstantLoad,
     CoulombFriction,
+    CouplingSpring,
     CubicSpring,
     DeadZone,
     Delay,
@@ -294,3 +295,21 @@ def test_a_free_body_falls(tmp_path):
     after = simulator.step(start, np.empty((1, 0)))[0]
     fallen = -9.81 * simulator.dt
     assert np.allclose(after[[0, 7, 9]], [2 * simulator.dt, 2, fallen])
+
+
+@pytest.mark.parametrize("rest", [0.3, -1.0])
+@pytest.mark.parametrize(("integrator", "near"), [("Euler", 1e-12), ("RK4", 5e-3)])
+def test_a_link_between_two_joints_is_a_tendon(tmp_path, integrator, near, rest):
+    model = robot("arm2", integrator=integrator)
+    first, second = (joint.name for joint in model.joints[:2])
+    band = CouplingSpring(f"{first} and {second}", -0.7, 0.4, rest)
+    linked = model.with_effects([band])
+    corrected, path = saved(linked, tmp_path)
+    assert not corrected.missing
+    assert bool(corrected.rough) == (integrator == "RK4")
+    plain = MujocoSimulator(str(path))
+    inputs = np.zeros((40, len(model.action_channels)))
+    start = model.smooth_states(1, np.random.default_rng(0))[0]
+    moved = linked.rollout(start, inputs)
+    assert moved == pytest.approx(plain.rollout(start, inputs), abs=near)
+    assert np.abs(moved - model.rollout(start, inputs)).max() > 20 * near

@@ -273,3 +273,31 @@ def test_a_single_wild_reading_makes_no_frozen_sensor_of_a_rest():
     assert not frozen_samples([angle])[0].any()
     angle[100:] = angle[100]  # what it would have gone meanwhile: it did stick
     assert frozen_samples([angle])[0][61:100].all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("missing", [0.0, 0.03])
+def test_a_frozen_reading_amid_motion_larger_than_its_noise_is_told_with_holes_in_it(seed, missing):
+    rng = np.random.default_rng(seed)
+    goals = np.repeat(rng.uniform(-15, 15, 12), 100)
+    speed = np.zeros(len(goals))
+    for k, goal in enumerate(goals[:-1]):
+        speed[k + 1] = speed[k] + 0.02 * (goal - speed[k])
+    seen = speed + 0.05 * rng.standard_normal(len(speed))
+    (whole,) = frozen_samples([seen])
+    assert not whole.any()
+    seen[601:701] = seen[600]
+    gone = rng.random(len(seen)) < missing
+    gone[[600, 700]] = False
+    seen[gone] = np.nan
+    (frozen,) = frozen_samples([seen])
+    assert set(np.flatnonzero(frozen)) == set(range(601, 701)) - set(np.flatnonzero(gone))
+
+
+def test_a_rounded_axis_that_stops_and_goes_on_is_not_frozen_for_its_holes():
+    rng = np.random.default_rng(0)
+    pace = np.repeat(rng.choice([0.0, 0.4, -0.7, 1.1], 24), 50)
+    seen = np.round(np.cumsum(np.convolve(pace, np.ones(8) / 8, "same")))
+    seen[rng.random(len(seen)) < 0.03] = np.nan
+    (frozen,) = frozen_samples([seen])
+    assert not frozen.any()
