@@ -42,7 +42,6 @@ from sims.effects.joint import ConstantLoad as ConstantLoad
 from sims.effects.joint import CubicSpring as CubicSpring
 from sims.effects.joint import JointEffect as JointEffect
 from sims.effects.joint import LinearSpring as LinearSpring
-from sims.effects.joint import ProportionalLoss as ProportionalLoss
 from sims.effects.joint import QuadraticDrag as QuadraticDrag
 from sims.effects.joint import Unbalance as Unbalance
 from sims.effects.joint import ViscousFriction as ViscousFriction
@@ -52,6 +51,8 @@ from sims.effects.limit import RateLimit as RateLimit
 from sims.effects.link import CouplingDamper as CouplingDamper
 from sims.effects.link import CouplingSpring as CouplingSpring
 from sims.effects.link import Link as Link
+from sims.effects.loss import PowerLoss as PowerLoss
+from sims.effects.loss import ProportionalLoss as ProportionalLoss
 from sims.effects.parameter import ParameterChange as ParameterChange
 from sims.effects.parameter_curve import ParameterCurve as ParameterCurve
 from sims.effects.response import AsymmetricResponse as AsymmetricResponse

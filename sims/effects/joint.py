@@ -185,27 +185,6 @@ class ConstantLoad(JointEffect):
 
 
 @dataclasses.dataclass(frozen=True)
-class ProportionalLoss(JointEffect):
-    """Loss of what is there, on the state x of a first-order system: ``-rate x``.
-
-    A leak, an outflow, a decay, heat that goes to surroundings at zero. Together with a constant
-    load it draws to any other value. On a speed it is ``ViscousFriction``.
-    """
-
-    rate: Value = number(low=0.0, force=1, position=-1)
-
-    name: ClassVar[str] = "proportional_loss"
-    sentence: ClassVar[str] = "A loss in proportion to what is there: a leak, a decay."
-    needs: ClassVar[str] = "small and large values"
-    mechanical: ClassVar[bool] = False
-    if_it_moves: ClassVar[str] = "viscous_friction"
-
-    def force(self, q: Value, v: Value) -> Value:
-        """Rate of change by the loss; the state of a first-order system counts as a rate."""
-        return -self.rate * v
-
-
-@dataclasses.dataclass(frozen=True)
 class Cogging(JointEffect):
     """Torque of a motor's magnets: ``sine sin(order q) + cosine cos(order q)``."""
 

@@ -42,13 +42,13 @@ from sims.effects.joint import (
     CubicSpring,
     JointEffect,
     LinearSpring,
-    ProportionalLoss,
     QuadraticDrag,
     Unbalance,
     ViscousFriction,
 )
 from sims.effects.limit import RateLimit, follows_command, goals
 from sims.effects.link import CouplingDamper, CouplingSpring, linked_joints
+from sims.effects.loss import PowerLoss, ProportionalLoss
 from sims.effects.parameter import ParameterChange
 from sims.effects.pull import pulled_by_position, pulled_by_turn
 from sims.effects.response import AsymmetricResponse
@@ -163,14 +163,17 @@ def parts_in(simulator: HostSimulator) -> tuple[FlexiblePart, ...]:
 
 
 def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
-    """What is rarer than the library, at zero strength: friction by load of every joint that the
-    inputs move by themselves, states that fall at another pace than they rise, rub otherwise
-    backwards, lose a constant, act on others or are linked to them, inputs that act otherwise below
-    zero or through a play, and inputs, but goals, that are followed at a limited pace."""
+    """What is rarer than the library, at zero strength.
+
+    Friction by load of every joint that the inputs move by themselves; states that fall at another
+    pace than they rise, rub otherwise backwards, lose a constant or by a power, act on others or
+    are linked to them; inputs that act otherwise below zero or through a play, and, but for goals,
+    inputs that are followed at a limited pace.
+    """
     found: list[Effect] = list(_geared(simulator))
     inputs = [channel.name for channel in simulator.action_channels]
     inputs += [AND.join(names) for names in like_inputs(simulator)]
-    kinds = AsymmetricResponse, AsymmetricDamping, ConstantLoss
+    kinds = AsymmetricResponse, AsymmetricDamping, ConstantLoss, PowerLoss
     both: list[Effect] = [kind(joint.name) for kind in kinds for joint in simulator.joints]
     both += [Coupling(BY.join(names)) for names in coupled_states(simulator)]
     links = itertools.product((CouplingSpring, CouplingDamper), linked_joints(simulator))

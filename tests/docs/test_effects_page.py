@@ -71,7 +71,7 @@ OTHERS = [
     effects.FlexiblePart("pivot"), effects.FlexibleJoint("pivot"), effects.AddedInertia("pivot"),
     effects.ParameterCurve("mass", "voltage"), effects.Unbalance("pivot"),
     effects.LoadDependentFriction("pivot"), effects.AsymmetricResponse("level"),
-    effects.ConstantLoss("level"), effects.AsymmetricDamping("pivot"),
+    effects.ConstantLoss("level"), effects.PowerLoss("level"), effects.AsymmetricDamping("pivot"),
     effects.AsymmetricActuator("voltage"), effects.SlewLimit("voltage"),
     effects.Hysteresis("voltage"), effects.Coupling("pivot by elbow"),
     effects.CouplingSpring("pivot and elbow"), effects.CouplingDamper("pivot and elbow"),

@@ -14,7 +14,8 @@ from sims.effects.actuator import ActuatorGain
 from sims.effects.aliases import exact_aliases, linear_columns, probes
 from sims.effects.base import Effect
 from sims.effects.combinations import made_by
-from sims.effects.joint import ConstantLoad, ProportionalLoss
+from sims.effects.joint import ConstantLoad
+from sims.effects.loss import ProportionalLoss
 from sims.effects.parameter import ParameterChange
 from sims.host import HostSimulator
 from sims.simulator import Array

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from residual.gap.data.samples import Samples
 from residual.gap.search.sets import Search
 from sims.effects.actuator import ActuatorBias, ActuatorGain
-from sims.effects.joint import LinearSpring, ProportionalLoss, ViscousFriction
+from sims.effects.joint import LinearSpring, ViscousFriction
+from sims.effects.loss import ProportionalLoss
 from sims.effects.sensor import ScaledSensor
 
 Array = NDArray[np.float64]

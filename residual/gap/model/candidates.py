@@ -29,6 +29,7 @@ from sims.effects.joint import AsymmetricDamping, JointEffect, Unbalance
 from sims.effects.library import typical
 from sims.effects.limit import RateLimit
 from sims.effects.link import Link
+from sims.effects.loss import PowerLoss
 from sims.effects.pull import ELSEWHERE
 from sims.effects.sensor import SensorEffect
 from sims.effects.store import SecondStore
@@ -173,6 +174,8 @@ def candidates(
             reach = BEYOND * greatest_rate(effect, simulator, samples)
         if _follows_unseen(effect, simulator, measured):
             continue
+        if isinstance(effect, PowerLoss) and effect.joint in measured:
+            effect = effect.suited_to(*measured_range(samples, columns[effect.joint]))
         if isinstance(effect, ConstantLoss | AsymmetricDamping):
             joint = next(j for j in simulator.joints if j.name == effect.joint)
             if not _both_ways(samples, columns[joint.position], columns.get(str(joint.rate))):

@@ -12,7 +12,8 @@ from residual.gap.search.pool import Key
 from residual.gap.search.sets import Search
 from sims.effects.actuator import ActuatorGain
 from sims.effects.combinations import made_by
-from sims.effects.joint import ConstantLoad, ProportionalLoss
+from sims.effects.joint import ConstantLoad
+from sims.effects.loss import ProportionalLoss
 from sims.effects.parameter import ParameterChange
 
 #: Effects that may make a loss together.
