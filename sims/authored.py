@@ -19,6 +19,8 @@ def by_joint(found: Any, shape: tuple[int, ...], what: str, column: str = "q") -
     plain = type(found) is np.ndarray and found.dtype == np.float64
     if not plain and np.iscomplexobj(found):
         raise ValueError(f"{what} returned complex numbers, expected real ones")
+    if found is None:
+        raise ValueError(f"{what} returned nothing: does it end with a return?")
     found = np.asarray(found, dtype=float)
     if found.shape != shape[::-1]:
         raise ValueError(

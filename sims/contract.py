@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import traceback
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -49,8 +51,16 @@ def refuse_unsound(simulator: Simulator) -> None:
     except Unsound:
         raise
     except Exception as error:
-        raise Unsound(f"{name} raised {type(error).__name__}: {error}; try "
-                      "sims.check_simulator") from error  # fmt: skip
+        then = _of_one_number(error) or "try sims.check_simulator"
+        raise Unsound(f"{name} raised {type(error).__name__}: {error}; {then}") from error
+
+
+def _of_one_number(error: Exception) -> str:
+    """What to do if a line failed that has a function of the module ``math``."""
+    frames = traceback.extract_tb(error.__traceback__)
+    failed = frames[-1].line or "" if frames else ""
+    arrays = isinstance(error, TypeError) and re.search(r"\bmath\.", failed)
+    return "it is given arrays, a row for each state: np.sin, not math.sin" if arrays else ""
 
 
 def _sound(simulator: Simulator) -> Iterator[Finding]:

@@ -61,7 +61,8 @@ def acceleration_keeps(simulator: EquationOfMotion, states: Array, actions: Arra
         values = Values(**simulator.parameter_values())
         simulator.acceleration(*given, values)
     kept = all(map(np.array_equal, given, before))
-    says = "are left as they were" if kept else "are overwritten"
+    changed = "are overwritten: compute with copies, q = q.copy(), and not in place"
+    says = "are left as they were" if kept else changed
     return Finding("arguments of acceleration", kept, says)
 
 

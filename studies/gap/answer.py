@@ -41,14 +41,13 @@ from studies.gap.words import (
     percent,
     quantity_text,
     six_digits,
+    titled,
     told,
     unit_text,
 )
 
 #: Verdicts that name no effect.
 NAMELESS = ("unexplained", "calibrated", "needs_data", "no_gap")
-#: Letters of a parameter's name up to which it is a symbol: l and L are two.
-SYMBOL = 2
 #: Error over that by noise from which on there is a gap, however few blocks of data show it.
 PLAINLY = 10.0
 
@@ -71,16 +70,16 @@ def headline(verdict: Verdict, result: GapResult) -> str:
     if verdict.kind == "needs_data":
         hidden = by_place([effect_name(label) for label in verdict.alternatives])
         plain = not any(" and " in name for name in hidden)
-        return capitalized(listed(hidden) if plain else "; ".join(hidden)) + "."
+        first, *_ = verdict.alternatives
+        beginning = titled(first)[:1] + hidden[0][1:]
+        return (listed if plain else "; ".join)([beginning, *hidden[1:]]) + "."
     if verdict.kind == "calibrated":
         moved = [
             minus(f"{effect_name(name)} {change.value:+.3g}{unit_text(change.unit)}")
             for name, change in verdict.parameters.items()
         ]
         return f"Parameters moved within their tolerance: {listed(moved)}."
-    name = effect_name(verdict.label)
-    if len(name) > SYMBOL:
-        name = capitalized(name)
+    name = titled(verdict.label)
     if verdict.kind == "minor":
         return f"{name}: {percent(verdict.share.value)} of the gap, not added."
     parameter = result.corrected.parameters.get(verdict.where)

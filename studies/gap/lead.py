@@ -12,6 +12,7 @@ from studies.gap.answer import cannot_tell, rivals
 from studies.gap.beforehand import seen_first
 from studies.gap.records import beside_lead
 from studies.gap.words import (
+    FOOTNOTE,
     ahead,
     by_place,
     capitalized,
@@ -34,8 +35,6 @@ LITTLE = 0.1
 #: Error on records set aside, over that of the nominal simulator, from which on a channel is worse
 #: that is not the main one.
 MUCH_WORSE = 1.1
-#: Part of the gap without a name that is told where it is no more than noise.
-REST = 0.1
 #: Difference between channels' shares from which on they are told one by one, so many at most.
 UNLIKE, FEW_CHANNELS = 0.2, 3
 
@@ -84,7 +83,7 @@ def _named_share(result: GapResult, tolerance: float | None) -> str:
 def _noise_for_the_rest(gap: Gap, kinds: Container[str]) -> str:
     """What is to be said of the rest where nothing else is: forecasts never err less than noise."""
     rest = 1 - gap.share.value
-    if "unexplained" in kinds or rest < REST:
+    if "unexplained" in kinds or rest < FOOTNOTE:
         return ""
     return f" The other {percent(rest)} cannot be told from noise."
 

@@ -8,12 +8,12 @@ from residual.gap import GapResult
 from residual.gap.beside import Changing, Periodic, Unlike
 from studies.gap.words import (
     FOOTNOTE,
-    capitalized,
     effect_name,
     minus,
     names_of,
     percent,
     quantity_text,
+    titled,
     unit_text,
 )
 
@@ -48,7 +48,7 @@ def beside_lead(result: GapResult) -> str:
 def headline(result: GapResult) -> str:
     """Sizes by record of the effect that helps most."""
     first = result.unlike[0]
-    return f"{capitalized(effect_name(first.label))}: {_sizes(first)}."
+    return f"{titled(first.label)}: {_sizes(first)}."
 
 
 def notes(result: GapResult) -> list[str]:

@@ -43,7 +43,7 @@ PAIRS = ("load-dependent",)
 #: Times its value that an end of an interval may be, beyond which it is none.
 OPEN = 1e6
 #: Effects that act between two places.
-BETWEEN = ("exchange",)
+BETWEEN = ("exchange", "coupling_spring", "coupling_damper")
 
 
 def effect_name(label: str) -> str:
@@ -78,6 +78,13 @@ def listed(words: Sequence[str], last: str = "and") -> str:
 def capitalized(text: str) -> str:
     """A text as the beginning of a sentence, the rest of it as it is."""
     return text[:1].upper() + text[1:]
+
+
+def titled(label: str) -> str:
+    """An effect in words as the beginning of a line; what a user gave a name keeps its letters."""
+    name = effect_name(label)
+    kind, _, where = label.partition("@")
+    return capitalized(name) if where and kind != ParameterCurve.name else name
 
 
 def names_of(labels: Sequence[str], last: str = "or") -> str:

@@ -67,6 +67,7 @@ class Parser(jsonargparse.ArgumentParser):
             name = options["prog"].removeprefix("python -m studies.").replace("_", "-")
             options["prog"] = f"simgap {name}"
         options.setdefault("formatter_class", HelpFormatter)
+        options.setdefault("allow_abbrev", False)
         options.setdefault("epilog", says)
         super().__init__(*given, **options)
         self._given: Any = None

@@ -68,7 +68,7 @@ def test_a_first_try_confirms_the_mass_with_default_options(tmp_path):
     assert done.returncode == 0, done.stderr
     first, _, verdict = done.stdout.strip().splitlines()[:3]
     assert re.fullmatch(r"(More than )?99\.\d % of the gap is mass.*\.", first)
-    assert verdict.startswith("CONFIRMED") and "Mass: +0.0" in verdict
+    assert verdict.startswith("CONFIRMED") and "mass: +0.0" in verdict
     record = json.loads((tmp_path / "gap" / "gap.json").read_text())
     change = record["verdicts"][0]["parameters"]["change"]
     assert change["low"] <= 0.035 <= change["high"] and record["says"] == first
@@ -184,8 +184,8 @@ def test_the_report_is_one_page_with_the_share_first(found, record):
     page = words_of(folder / "report.html")
     assert "http://" not in page.replace("http://www.w3.org", "") and 'src="/' not in page
     for earlier, later in (
-        (record["says"], "Mass: +0.0"),
-        ("Mass: +0.0", "noise alone"),
+        (record["says"], "mass: +0.0"),
+        ("mass: +0.0", "noise alone"),
         ("noise alone", "step by step</h2>"),
         ("step by step</h2>", "Records set aside</h2>"),
     ):

@@ -39,5 +39,6 @@ def bounded_step(
         if free.any():
             factor = np.linalg.cholesky(matrix[np.ix_(free, free)])
             aim, bounds = np.linalg.solve(factor, right), (least[free], most[free])
-            step[free] = lsq_linear(factor.T, aim, bounds, method="bvls").x
+            with np.errstate(over="ignore", invalid="ignore"):  # of a trial that ran away
+                step[free] = lsq_linear(factor.T, aim, bounds, method="bvls").x
     return np.clip(step / size, low, high)

@@ -45,5 +45,5 @@ def test_a_hole_is_told_from_a_loss_in_proportion():
     (sure,) = [one for one in found.verdicts if one.kind == "confirmed"]
     assert sure.label == "power_loss@level"
     assert sure.parameters["power"].value == pytest.approx(0.5, abs=0.06)
-    true = HOLE * np.sqrt(sure.effect.full) / AREA
+    true = HOLE * np.sqrt(sure.shape["full"]) / AREA
     assert sure.parameters["level"].value == pytest.approx(true, rel=0.03)

@@ -52,7 +52,7 @@ def test_a_payload_of_each_record_is_found_with_its_size(payloads):
 def test_the_answer_says_so(payloads):
     assert "The records differ: if mass may have its own size in each of them" in lead(payloads)
     told = " ".join(summary(payloads).split())
-    assert "RECORDS DIFFER Mass: " in told and "search the records one by one" in told
+    assert "RECORDS DIFFER mass: " in told and "search the records one by one" in told
     days = [told.index(f" in day {i}") for i in (1, 2, 3, 4)]
     assert days == sorted(days)
 
