@@ -113,6 +113,7 @@ def check_layout(columns: LogFormat, states: Sequence[Channel], actions: Sequenc
                     f"{kind} {name!r} has value {value!r}: only an action can have a constant "
                     "value in place of a column, and it must be finite"
                 )
+    _refuse_shared(columns, states, actions)
     named = [named_column(c, "") for c in (*columns.states.values(), *columns.actions.values())]
     named = [named_column(columns.time, ""), *(c for c in named if c.value is None)]
     if not columns.header and any(isinstance(column.column, str) for column in named):
@@ -129,6 +130,22 @@ def check_layout(columns: LogFormat, states: Sequence[Channel], actions: Sequenc
     ):
         if not fits:
             raise LogError(f"{setting} is {said!r}, expected {expected}")
+
+
+def _refuse_shared(
+    columns: LogFormat, states: Sequence[Channel], actions: Sequence[Channel]
+) -> None:
+    """Refuse a column that is read for a state and for another channel; actions may share one."""
+    read: dict[str | int, str] = {}
+    for given, channels in ((columns.actions, actions), (columns.states, states)):
+        for channel in channels:
+            column = named_column(given.get(channel.name, ""), channel.name)
+            first = read.setdefault(column.column, channel.name)
+            if first != channel.name and given is columns.states:
+                raise LogError(
+                    f"column {column.column!r} is read for {first!r} and for {channel.name!r}, "
+                    f"expected one of its own: name that of {channel.name!r} under states:"
+                )
 
 
 def named_column(given: str | int | Column, name: str) -> Column:

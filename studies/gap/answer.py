@@ -11,7 +11,7 @@ from residual.gap.confirmation.rivals import FEW
 from residual.gap.preparation.horizon import SAMPLES
 from residual.gap.result import OFF, Gap, Verdict
 from residual.trajectories import duration_text
-from sims.effects import Curve
+from sims.effects import Curve, SensorOffset
 from sims.effects.actuator import ActuatorEffect
 from studies.gap.numbers import (
     as_commanded,
@@ -162,6 +162,8 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
             found.append(f"{effect.looks_like} would look the same")
         elif verdict.label in result.nearly_late:
             found.append(f"{effect.looks_like} would look nearly the same")
+    if isinstance(effect, SensorOffset) and _against_a_medium(effect, result):
+        found.append("a current or a wind of that speed would look the same")
     for other in verdict.beside:
         twin = next((v for v in result.verdicts if is_meant(other.effect, v)), None)
         named = f", not {effect_name(twin.label)}" if twin else ""
@@ -169,6 +171,13 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.provisional:
         found.append(provisional(result))
     return found
+
+
+def _against_a_medium(effect: SensorOffset, result: GapResult) -> bool:
+    """Whether what is read is a speed, and no position with it: drag may be against what flows."""
+    channels = {channel.name: channel for channel in result.corrected.physical_channels}
+    read = channels[effect.channel]
+    return read.kind == "rate" and not read.rate_of and read.unit == "m/s"
 
 
 def is_meant(twin: str, verdict: Verdict) -> bool:

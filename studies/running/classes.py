@@ -36,15 +36,16 @@ def no_class(word: str) -> str:
 
 
 def no_simulator(path: str) -> str:
-    """What is to be said of an import path that leads to a class which is no simulator."""
+    """What is to be said of an import path that leads to what is no class of a simulator."""
     try:
         found = pydoc.locate(path)
     except pydoc.ErrorDuringImport:
         return ""  # which is told by whoever loads it
-    if not isinstance(found, type) or issubclass(found, Simulator):
+    if found is None or (isinstance(found, type) and issubclass(found, Simulator)):
         return ""
+    what = "no Simulator" if isinstance(found, type) else f"a {type(found).__name__}"
     return (
-        f"{path} is no Simulator, expected a class that derives from sims.EquationOfMotion, "
+        f"{path} is {what}, expected a class that derives from sims.EquationOfMotion, "
         "sims.FirstOrderSystem or sims.Simulator"
     )
 

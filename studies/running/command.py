@@ -163,6 +163,9 @@ class Parser(jsonargparse.ArgumentParser):
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
         """Say what is wrong and how to learn more, in one line."""
         unknown = self._unknown() if isinstance(ex, KeyError) else ""
+        for action in self._actions if isinstance(ex, TypeError) else ():
+            if action.required and action.option_strings:  # an option is known by its dashes
+                message = re.sub(rf"(?<= ){action.dest}\b", action.option_strings[0], message)
         reason = unknown or re.sub(r"\s*\n\s*-?\s*", " ", str(message).strip())
         if ex is None:  # of the words that were given, not of what one of them means
             reason += self._likely(message)

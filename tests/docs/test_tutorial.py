@@ -67,5 +67,5 @@ def test_the_heater_has_a_longer_time_constant_and_a_delay(tmp_path):
         if "heater" in name:
             (tmp_path / name).write_text(code)
     says = script("ask_heater.py", tmp_path)
-    assert re.search(r"CONFIRMED +Time constant: \+(29|30)[.\d]* s", says)
+    assert re.search(r"CONFIRMED +time constant: \+(29|30)[.\d]* s", says)
     assert re.search(r"CONFIRMED +Delay at power: time (5\.9|6\.[01])\d* s", says)

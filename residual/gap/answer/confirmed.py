@@ -122,7 +122,7 @@ def confirm(
             lost = made  # it only switches off what the simulator has wrong
         if not lost:
             made = allow_for_parameters(
-                search, key, made, found.adequate, parameter_tolerance, until
+                search, key, made, found.adequate, parameter_tolerance, until, _much(found, key)
             )
             # Now that intervals allow for the parameters, too.
             doubtful = [c for c in made if not (c.needed or c.by_fit)]
@@ -145,6 +145,12 @@ def confirm(
             key = likelier(search, key, asked_before)
             add_without_each(search, key)
         asked_before.add(key)
+
+
+def _much(found: Explanation, key: Key) -> bool:
+    """Whether what a set leaves is many times the noise."""
+    search = found.search
+    return search.fitter.left(search.tried[key], found.floor).ratio >= FAR
 
 
 def _in_time(answer: Answer) -> Answer:

@@ -45,7 +45,7 @@ DOUBTS: dict[Doubt, str] = {
     "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
     "calibration": "parameters that are a few percent off would do nearly as well",
     "within": "its interval reaches into the few percent that are allowed to every parameter",
-    "slight": "without it errors are less than 1.5 times as large, and what has no name may favour "
+    "slight": "without it errors are less than twice as large, and what has no name may favour "
     "it by as much",
     "few_blocks": "what has no name is much more than noise, and there are too few blocks of data "
     "to say that it is not what this one stands for",

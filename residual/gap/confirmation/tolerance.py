@@ -43,6 +43,8 @@ RIVALS = 4
 #: Squared residual that linear parameters promise a rival, over that of the chosen set, from which
 #: on it is not fitted with them: on a robot's logs the promise was right within a factor of 1.5.
 HOPELESS = 10.0
+#: Error over that of the chosen set from which on it is clearly larger where much is left.
+TWICE = 2.0
 #: Part of an effect's work that free parameters do without it, from which on it may be theirs.
 WORK = 0.2
 #: Parameters that are allowed for, those that matter most.
@@ -51,7 +53,7 @@ MOST = 12
 
 def allow_for_parameters(
     search: Search, key: Key, claims: Sequence[Claim], adequate: bool, tolerance: float,
-    until: float = np.inf,
+    until: float = np.inf, much_left: bool = False,
 ) -> list[Claim]:  # fmt: skip
     """The claims with parameters allowed for.
 
@@ -63,6 +65,8 @@ def allow_for_parameters(
         tolerance: How well parameters are known, as a share of each.
         until: When to ask no further, on the clock of ``time.process_time``: what was not asked
             is not certain.
+        much_left: Whether many times the noise is left: what has no name then is no small thing,
+            and may favour what comes near it.
     """
     parameters = allowed(search, tolerance) if claims else []
     if not parameters:
@@ -79,7 +83,7 @@ def allow_for_parameters(
         """Whether another set is not worth a fit with parameters free."""
         return not search.beside and promised(search, other, parameters) > HOPELESS * left
 
-    def as_good(claim: Claim, other: Key) -> bool:
+    def as_good(claim: Claim, other: Key, clearly: float = CLEARLY) -> bool:
         """Whether another set does as well as the chosen one, parameters free beside both."""
         if hopeless(other):
             return False
@@ -91,7 +95,7 @@ def allow_for_parameters(
             price = np.log(size(search)) * more + tie
             return bool(its.fit.merit <= beside.fit.merit + price)
         group = where_it_matters(search, key, claim.number)
-        return bool(its.errors[group] <= CLEARLY * beside.errors[group])
+        return bool(its.errors[group] <= clearly * beside.errors[group])
 
     def slight(claim: Claim) -> bool:
         """Whether free parameters do nothing of an effect's work, which is little as it is."""
@@ -108,7 +112,7 @@ def allow_for_parameters(
         late = claim.unasked or time.process_time() > until
         claim = dataclasses.replace(claim, unasked=late)
         if claim.sure:
-            as_well = as_good(claim, all_but(key, claim.number))
+            as_well = as_good(claim, all_but(key, claim.number), TWICE if much_left else CLEARLY)
             little = as_well and slight(claim)
             claim = dataclasses.replace(claim, calibration=as_well, slight=little)
         if claim.sure:

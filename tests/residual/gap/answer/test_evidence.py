@@ -18,6 +18,7 @@ def test_what_cannot_be_right_without_the_others_goes_too(monkeypatch):
     monkeypatch.setattr(confirmed, "claims", claims)
     monkeypatch.setattr(confirmed, "nameable", lambda search, claim, *_: claim.number != 2)
     monkeypatch.setattr(confirmed, "allow_for_parameters", lambda search, key, made, *_: made)
+    monkeypatch.setattr(confirmed, "_much", lambda *_: False)
     monkeypatch.setattr(confirmed, "other_numerics", lambda *_: [])
     monkeypatch.setattr(confirmed, "in_plain_form", lambda *_: None)
     monkeypatch.setattr(confirmed, "may_vanish", lambda *_: False)
@@ -98,6 +99,7 @@ def test_what_fits_down_to_the_noise_and_forecasts_worse_than_nothing_is_not_nam
         ],
         "nameable": lambda *_: True,
         "allow_for_parameters": lambda search, key, made, *_: made,
+        "_much": lambda *_: False,
         "other_numerics": lambda *_: [],
         "may_vanish": lambda *_: False,
         "add_exchanged": lambda *_: None,
