@@ -97,6 +97,12 @@ class SmoothFitter:
             found = again if again.merit < found.merit else found
         return self._as_fit(found)
 
+    def on_measured_path(self, model: Model) -> Fit:
+        """The linear picture of a model without unknowns around the measured path: it holds however
+        far from that its own path is, as long as little hangs on the state."""
+        nodes = model.widen(self.samples, self.nodes, np.zeros(0))
+        return self._as_fit(self._shot(model, nodes, np.zeros(0), None, 0.3, turns=0))
+
     def from_forecasts(self, model: Model, theta: Array, near: Fit) -> Fit:
         """Numbers of least loss from ``theta`` and its forecasts of all windows on: where motion
         begins and stops, the measured path tells a linear picture little."""
@@ -127,11 +133,13 @@ class SmoothFitter:
         return self._as_fit(self._shot(model, nodes, theta, None, 0.05))
 
     def _shot(
-        self, model: Model, nodes: Array, theta: Array, by_state: Array | None, widths: float
-    ) -> ShootingFit:
+        self, model: Model, nodes: Array, theta: Array, by_state: Array | None, widths: float,
+        turns: int | None = None,
+    ) -> ShootingFit:  # fmt: skip
         return shooting.fit(
             model, self.samples, self.blocks.windows, nodes, theta, self.sigma,
-            model.scales(self.scale), self.turns, self.cap, widths, by_state=by_state,
+            model.scales(self.scale), self.turns if turns is None else turns, self.cap, widths,
+            by_state=by_state,
         )  # fmt: skip
 
     def _as_fit(self, found: ShootingFit) -> Fit:

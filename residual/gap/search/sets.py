@@ -7,6 +7,7 @@ that does not help.
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Iterable, Sequence
 
@@ -23,6 +24,7 @@ from residual.gap.model.nested import absent, from_nested
 from residual.gap.preparation.effort import Effort
 from residual.gap.search.currency import Currency, groups
 from residual.gap.search.global_search import GlobalSearch
+from residual.gap.search.measured_path import along_measured_path
 from residual.gap.search.pool import Key, Pool, Twins
 from residual.gap.search.redundant import doubles
 from sims.host import HostSimulator
@@ -168,6 +170,11 @@ class Search(Pool):
             columns = self._columns[around]
             self._signatures[key] = signatures(self.tried[key], trials(screened), columns)
         return self._signatures[key]
+
+    @functools.cached_property
+    def on_measured_path(self) -> Signatures:
+        """What every candidate would add to the nominal simulator along the measured path."""
+        return along_measured_path(self, self.candidates[: self.screened])
 
     def from_longer_leads(self, key: Key) -> Array:
         """Mean squared errors of blocks, forecasts begun from twice as much data, (B, m)."""

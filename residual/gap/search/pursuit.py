@@ -1,0 +1,70 @@
+"""Sets of effects by orthogonal matching pursuit, around the measured path.
+
+Where several effects make a large gap, none of them takes much off forecasts alone. Along the
+measured path what each of them does adds up.
+
+See Pati, Rezaiifar, Krishnaprasad, "Orthogonal matching pursuit", Asilomar Conference, 1993.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.fitting.screening import Signatures, Variant, constrained, gains, project_out
+from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.search.redundant import by_points
+from residual.gap.search.sets import Proposals, Search
+
+Array = NDArray[np.float64]
+
+#: Part of what is left that one more effect has to take off.
+PAYS = 0.2
+
+
+def pursued(search: Search) -> Proposals:
+    """Sets of one, two, ... effects with start values, as long as one more pays.
+
+    Args:
+        search: Of a system without impacts; otherwise none are proposed.
+    """
+    if not isinstance(search.fitter, SmoothFitter):
+        return {}
+    found, without = search.on_measured_path, set(by_points(search))
+    residual, matrix = found.residual, found.matrix
+    chosen: list[Variant] = []
+    proposed: Proposals = {}
+    while len(chosen) < search.effort.most:
+        taken = without | {variant.candidate for variant in chosen}
+        ranked = gains(found, residual, matrix)
+        left = float(residual @ residual)
+        for gain in ranked:
+            variant = found.variants[gain.variants[0]]
+            key = tuple(sorted([*(v.candidate for v in chosen), variant.candidate]))
+            if variant.candidate not in taken and search.fits_in(key):
+                break
+        else:
+            return proposed
+        if gain.value < PAYS * left:
+            return proposed
+        chosen.append(variant)
+        theta, residual = _fitted(found, chosen)
+        columns = [c for v in chosen for c in v.columns]
+        matrix = project_out(found.matrix[:, columns], found.matrix)
+        proposed[key] = theta
+    return proposed
+
+
+def _fitted(found: Signatures, chosen: list[Variant]) -> tuple[Array, Array]:
+    """Start values of some variants together, by the number of their candidates, and what they
+    leave."""
+    columns = [c for variant in chosen for c in variant.columns]
+    sides = np.concatenate([variant.trial.one_sided for variant in chosen])
+    _, size = constrained(found.matrix[:, columns], found.residual, sides)
+    starts, begin = {}, 0
+    for variant in chosen:
+        end = begin + len(variant.columns)
+        starts[variant.candidate] = variant.start(size[begin:end])
+        begin = end
+    theta = np.concatenate([starts[number] for number in sorted(starts)])
+    return theta, found.residual - found.matrix[:, columns] @ size
