@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from residual.gap.fitting.screening import Signatures, signatures, trials
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import Candidate
+from residual.gap.model.model import Model
 
 if TYPE_CHECKING:
     from residual.gap.search.sets import Search
@@ -26,5 +27,5 @@ def along_measured_path(search: Search, candidates: Sequence[Candidate]) -> Sign
     """
     fitter = search.fitter
     assert isinstance(fitter, SmoothFitter)
-    fit = fitter.on_measured_path(search.model(()))
+    fit = fitter.on_measured_path(Model(search.simulator))
     return signatures(fit, trials(candidates), fitter.columns(fit, candidates))

@@ -26,9 +26,10 @@ def pursued(search: Search) -> Proposals:
     """Sets of one, two, ... effects with start values, as long as one more pays.
 
     Args:
-        search: Of a system without impacts; otherwise none are proposed.
+        search: Of a system without impacts, with nothing free beside every set; otherwise none are
+            proposed.
     """
-    if not isinstance(search.fitter, SmoothFitter):
+    if search.beside or not isinstance(search.fitter, SmoothFitter):
         return {}
     found, without = search.on_measured_path, set(by_points(search))
     residual, matrix = found.residual, found.matrix

@@ -120,11 +120,13 @@ def test_of_a_temperature_no_share_is_known_but_one_of_its_range():
     assert first.parameters["change"].high - first.parameters["change"].low < 2.0
 
 
-def test_parameters_are_not_blamed_for_an_effect_of_which_they_do_nothing():
-    """Without the delay errors are 1.3 times as large: the oven wanders, which no library holds."""
+@pytest.mark.parametrize("wander", [0.08, 0.11])
+def test_parameters_are_not_blamed_for_an_effect_of_which_they_do_nothing(wander):
+    """Without the delay errors are 1.6 or 1.3 times as large: the oven wanders, which no library
+    holds and which is more than a hundred times the noise."""
     rng = np.random.default_rng(0)
     power = np.repeat(rng.integers(0, 2, 80), 10).astype(float)
-    base, x = 300.0 + 0.11 * np.cumsum(rng.standard_normal(800)), np.full(801, 300.0)
+    base, x = 300.0 + wander * np.cumsum(rng.standard_normal(800)), np.full(801, 300.0)
     for k in range(800):  # the exact solution
         end = base[k] + 6.0 * power[max(k - 4, 0)]
         x[k + 1] = end + (x[k] - end) * np.exp(-1.0 / 8.0)
