@@ -12,7 +12,7 @@ from residual.gap.fitting.screening import Gain, Signatures, gains, pair_gains, 
 from residual.gap.search.drives import driven
 from residual.gap.search.exchange import from_screen, of_several_numbers, spelt_out
 from residual.gap.search.pool import Key
-from residual.gap.search.pursuit import pursued
+from residual.gap.search.pursuit import add_pursued
 from residual.gap.search.redundant import by_points
 from residual.gap.search.sets import Proposals, Search
 from residual.gap.search.significance import score
@@ -51,7 +51,7 @@ def run(
     for level in range(1, effort.most + 1):
         if search.error(search.best()) < effort.enough:
             break
-        fresh = [] if level > 1 or seeds else search.add(pursued(search))
+        fresh = [] if level > 1 or seeds else add_pursued(search)
         fresh += grow_each(search, frontier, quiet)
         grown.update(frontier)
         if not fresh or search.late:

@@ -8,11 +8,14 @@ See Pati, Rezaiifar, Krishnaprasad, "Orthogonal matching pursuit", Asilomar Conf
 
 from __future__ import annotations
 
+from collections.abc import Set
+
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.fitting.screening import Signatures, Variant, constrained, gains, project_out
 from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.search.pool import Key
 from residual.gap.search.redundant import by_points
 from residual.gap.search.sets import Proposals, Search
 
@@ -22,16 +25,32 @@ Array = NDArray[np.float64]
 PAYS = 0.2
 
 
-def pursued(search: Search) -> Proposals:
-    """Sets of one, two, ... effects with start values, as long as one more pays.
+def add_pursued(search: Search) -> list[Key]:
+    """Fit sets of one, two, ... effects, as long as one more pays and none is absurd; once more
+    without gains of actuators, which stand for whatever brakes in the linear picture.
 
     Args:
-        search: Of a system without impacts, with nothing free beside every set; otherwise none are
-            proposed.
+        search: Of a system without impacts, with nothing free beside every set; otherwise nothing
+            is fitted.
     """
     if search.beside or not isinstance(search.fitter, SmoothFitter):
-        return {}
-    found, without = search.on_measured_path, set(by_points(search))
+        return []
+    without = set(by_points(search))
+    drives = {n for n, one in enumerate(search.candidates) if one.effect.drives}
+    found: list[Key] = []
+    for left_out in (without, without | drives):
+        for key, theta in pursued(search, left_out).items():
+            if search.late or not search.fits_in(key):
+                break
+            found += search.add({key: theta})
+            if key in search.refused:
+                break
+    return found
+
+
+def pursued(search: Search, without: Set[int]) -> Proposals:
+    """Sets of one, two, ... candidates, but for some, with start values."""
+    found = search.on_measured_path
     residual, matrix = found.residual, found.matrix
     chosen: list[Variant] = []
     proposed: Proposals = {}
