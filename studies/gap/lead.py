@@ -10,9 +10,8 @@ from residual.gap.result import OFF, ChannelGap, Gap, Verdict
 from residual.trajectories import moment
 from studies.gap.answer import cannot_tell, rivals
 from studies.gap.beforehand import seen_first
-from studies.gap.records import beside_lead
+from studies.gap.records import beside_lead, changes_instead
 from studies.gap.words import (
-    FOOTNOTE,
     ahead,
     by_place,
     capitalized,
@@ -35,6 +34,8 @@ LITTLE = 0.1
 #: Error on records set aside, over that of the nominal simulator, from which on a channel is worse
 #: that is not the main one.
 MUCH_WORSE = 1.1
+#: Part of the gap without a name that is told where it is no more than noise.
+REST = 0.05
 #: Difference between channels' shares from which on they are told one by one, so many at most.
 UNLIKE, FEW_CHANNELS = 0.2, 3
 
@@ -43,13 +44,16 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
     """The first sentence: the share of the gap that has a name.
 
     Before it, what the log may count otherwise than the simulator, and what the simulator may cut
-    off by mistake: no effect undoes that.
+    off by mistake, which no effect undoes, or what explains more than the effects by its change.
 
     Args:
         result: What was found.
         tolerance: Forecast error that does not matter.
     """
-    return seen_first(result) + _named_share(result, tolerance) + beside_lead(result)
+    first = seen_first(result) or changes_instead(result)
+    told = _named_share(result, tolerance)
+    told = f"{first}{told[:1].lower()}{told[1:]}" if first else told
+    return told + beside_lead(result)
 
 
 def _named_share(result: GapResult, tolerance: float | None) -> str:
@@ -83,7 +87,7 @@ def _named_share(result: GapResult, tolerance: float | None) -> str:
 def _noise_for_the_rest(gap: Gap, kinds: Container[str]) -> str:
     """What is to be said of the rest where nothing else is: forecasts never err less than noise."""
     rest = 1 - gap.share.value
-    if "unexplained" in kinds or rest < FOOTNOTE:
+    if "unexplained" in kinds or rest < REST:
         return ""
     return f" The other {percent(rest)} cannot be told from noise."
 

@@ -19,6 +19,8 @@ from studies.gap.words import (
 
 #: What the terminal and the report call it.
 LABEL = "records differ"
+#: Part of the largest of some sizes below which another one is none.
+NOTHING = 1e-3
 #: Records up to which the size in each is told.
 FEW = 8
 
@@ -27,15 +29,9 @@ def beside_lead(result: GapResult) -> str:
     """For the first sentence: how much would have a name if records may differ, or what changes
     along them."""
     if not result.unlike:
-        much = any(v.kind == "unexplained" and v.share.value >= FOOTNOTE for v in result.verdicts)
-        law = any("law" in verdict.doubts for verdict in result.verdicts)
-        if not result.changing or not (much or law):
+        if result.changing is None or result.changing.instead or not _open(result):
             return ""
-        begin, end, _ = _values(result.changing)
-        name = effect_name(result.changing.label)
-        along = _over(result.changing) or "along the records"
-        what = "It all" if result.changing.instead else "The rest"
-        return f" {what} looks like {name} that changes {along}, from about {begin} to {end}."
+        return f" The rest looks like {_change(result.changing)}."
     first = result.unlike[0]
     name, share = effect_name(first.label), percent(first.share)
     instead = ", and nothing else is added" if first.instead else ""
@@ -43,6 +39,27 @@ def beside_lead(result: GapResult) -> str:
         f" The records differ: if {name} may have its own size in each of them{instead}, {share} "
         "of the gap has a name."
     )
+
+
+def changes_instead(result: GapResult) -> str:
+    """Before the first sentence: what takes more off by its change than all that is named."""
+    changing = result.changing
+    if changing is None or not changing.instead or result.unlike or not _open(result):
+        return ""
+    taken = f"which would take {percent(changing.taken)} of the squared residual off"
+    return f"It all looks like {_change(changing)}, {taken}. If that is not it: "
+
+
+def _open(result: GapResult) -> bool:
+    """Whether something has no name, or what is named is an imitation."""
+    much = any(v.kind == "unexplained" and v.share.value >= FOOTNOTE for v in result.verdicts)
+    return much or any("law" in verdict.doubts for verdict in result.verdicts)
+
+
+def _change(changing: Changing) -> str:
+    begin, end, _ = _values(changing)
+    along = _over(changing) or "along the records"
+    return f"{effect_name(changing.label)} that changes {along}, from about {begin} to {end}"
 
 
 def headline(result: GapResult) -> str:
@@ -103,7 +120,9 @@ def _over(changing: Changing) -> str:
 
 def _values(changing: Changing) -> list[str]:
     """Where records begin, where they end, and in the simulator."""
-    sizes = (changing.begin, changing.end, changing.nominal)
+    sizes = [changing.begin, changing.end, changing.nominal]
+    largest = max(map(abs, sizes))
+    sizes = [0.0 if abs(size) < NOTHING * largest else size for size in sizes]
     return [minus(quantity_text(value, changing.unit)) for value in sizes]
 
 

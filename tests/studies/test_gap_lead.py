@@ -39,6 +39,19 @@ def test_what_the_log_may_count_otherwise_comes_first():
     assert rest == lead(result(MASS))
 
 
+def test_what_takes_more_off_by_its_change_comes_first():
+    sags = Changing("actuator_gain@voltage", -1e-5, -0.15, 0.0, "1", 0.999, instead=True)
+    found = dataclasses.replace(result(MASS, rest(0.2)), changing=sags)
+    first, after = lead(found).split(" If that is not it: ")
+    assert first == (
+        "It all looks like actuator gain at voltage that changes along the records, from about 0 "
+        "to −0.15, which would take 99.9 % of the squared residual off."
+    )
+    assert after == lead(result(MASS, rest(0.2)))
+    certain = dataclasses.replace(result(MASS), changing=sags)
+    assert lead(certain) == lead(result(MASS))
+
+
 def test_an_integration_step_that_shows_comes_first_where_something_was_found():
     shows = Finding("step", "", "the integration step shows in this log", severity="warning")
     found = dataclasses.replace(result(MASS), quality=(shows,))

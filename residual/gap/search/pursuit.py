@@ -40,7 +40,7 @@ def add_pursued(search: Search) -> list[Key]:
     found: list[Key] = []
     for left_out in (without, without | drives):
         for key, theta in pursued(search, left_out).items():
-            if search.late or not search.fits_in(key):
+            if search.late:
                 break
             found += search.add({key: theta})
             if key in search.refused:
