@@ -21,8 +21,9 @@ from residual.gap.search.sets import Proposals, Search
 
 Array = NDArray[np.float64]
 
-#: Part of what is left that one more effect has to take off.
-PAYS = 0.2
+#: Part of what is left that one more effect has to take off, and part of the whole below which the
+#: linear picture is no longer believed.
+PAYS, LITTLE = 0.2, 0.05
 
 
 def add_pursued(search: Search) -> list[Key]:
@@ -54,10 +55,10 @@ def pursued(search: Search, without: Set[int]) -> Proposals:
     residual, matrix = found.residual, found.matrix
     chosen: list[Variant] = []
     proposed: Proposals = {}
-    while len(chosen) < search.effort.most:
+    whole = left = float(residual @ residual)
+    while len(chosen) < search.effort.most and left > LITTLE * whole:
         taken = without | {variant.candidate for variant in chosen}
         ranked = gains(found, residual, matrix)
-        left = float(residual @ residual)
         for gain in ranked:
             variant = found.variants[gain.variants[0]]
             key = tuple(sorted([*(v.candidate for v in chosen), variant.candidate]))
@@ -69,6 +70,7 @@ def pursued(search: Search, without: Set[int]) -> Proposals:
             return proposed
         chosen.append(variant)
         theta, residual = _fitted(found, chosen)
+        left = float(residual @ residual)
         columns = [c for v in chosen for c in v.columns]
         matrix = project_out(found.matrix[:, columns], found.matrix)
         proposed[key] = theta
