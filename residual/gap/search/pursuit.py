@@ -28,7 +28,7 @@ PAYS, LITTLE = 0.2, 0.05
 
 def add_pursued(search: Search) -> list[Key]:
     """Fit sets of one, two, ... effects, as long as one more pays and none is absurd; once more
-    without gains of actuators, which stand for whatever brakes in the linear picture.
+    without those of inputs and sensors: without most of either there is next to no gap.
 
     Args:
         search: Of a system without impacts, with nothing free beside every set; otherwise nothing
@@ -37,9 +37,13 @@ def add_pursued(search: Search) -> list[Key]:
     if search.beside or not isinstance(search.fitter, SmoothFitter):
         return []
     without = set(by_points(search))
-    drives = {n for n, one in enumerate(search.candidates) if one.effect.drives}
+    ends = {
+        number
+        for number, one in enumerate(search.candidates)
+        if one.effect.enters in ("actuator", "sensor")
+    }
     found: list[Key] = []
-    for left_out in (without, without | drives):
+    for left_out in (without, without | ends):
         for key, theta in pursued(search, left_out).items():
             if search.late:
                 break
