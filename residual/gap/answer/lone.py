@@ -7,6 +7,8 @@ is no evidence, neither for an effect nor against all of them: so it is told, an
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,6 +32,8 @@ HARDLY = 0.7
 MUCH = 0.1
 #: Part of what is left that lies in a few blocks, how few of all that is, and how many are listed.
 NEARLY_ALL, FEW, LISTED = 0.8, 1 / 3, 4
+#: Seconds of a day, how many of them show an hour, and how near to one hour that is, in days.
+DAY, DAYS, AN_HOUR = 86_400.0, 3, 0.05
 #: Error over that by noise of a block in which a simulator is clearly off, and up to which most are
 #: as good as right.
 OFF, NEAR = 2.0, 1.3
@@ -105,10 +109,23 @@ def few_stretches(answer: Answer) -> str:
     told = sorted(worst[:LISTED], key=lambda one: (one.run, one.begin))
     places = ", ".join(f"{o.run} from {moment(o.begin)} to {moment(o.end)}" for o in told)
     more = f" and {count - LISTED} more" if count > LISTED else ""
+    asks = (
+        "They come at one hour of the day: is there something that goes by it, as the sun does?"
+        if daily(worst)
+        else "Did something happen there that the simulator does not know?"
+    )
     return (
         f"{share:.0%} of the squared error that is left lies in {count} of {len(left)} stretches: "
-        f"{places}{more}. Did something happen there that the simulator does not know?"
+        f"{places}{more}. {asks}"
     )
+
+
+def daily(stretches: Sequence[Stretch]) -> bool:
+    """Whether three stretches or more of one run come at one hour of as many days."""
+    begins = np.sort([one.begin for one in stretches])
+    days = np.diff(begins) / DAY
+    same = len({one.run for one in stretches}) == 1 and len(begins) >= DAYS
+    return bool(same and (np.abs(days - np.round(days)) < AN_HOUR).all() and (days > 0.5).all())
 
 
 def _many_blocks(answer: Answer) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from residual.gap import find_gap
+from residual.gap.answer.lone import daily
 from residual.gap.data import examine
 from residual.gap.data.stretch import Stretch
 from residual.trajectories import Trajectory
@@ -165,3 +166,17 @@ def test_what_happens_now_and_then_is_told_with_its_times():
         places = re.findall(rf"run {number} from ([\d.]+) s to ([\d.]+) s", said[0])
         assert any(float(a) < end and float(b) > begin for a, b in places), said[0]
     assert not stretches(0.0)
+
+
+@pytest.mark.parametrize(
+    ("begins", "told"),
+    [
+        ((28_800.0, 115_200.0, 202_200.0), True),
+        ((202_200.0, 28_800.0, 374_400.0), True),  # in any order, with days left out
+        ((28_800.0, 115_200.0), False),  # two are no habit
+        ((28_800.0, 100_000.0, 202_200.0), False),
+        ((28_800.0, 30_000.0, 115_200.0), False),  # two on one day
+    ],
+)
+def test_stretches_at_one_hour_of_the_day_are_told(begins, told):
+    assert daily([Stretch("room", begin, begin + 28_000.0, 0.3, 0.1) for begin in begins]) == told
