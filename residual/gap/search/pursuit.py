@@ -30,6 +30,8 @@ def add_pursued(search: Search) -> list[Key]:
     """Fit sets of one, two, ... effects, as long as one more pays and none is absurd; once more
     without those of inputs and sensors: without most of either there is next to no gap.
 
+    Returns those that may be right.
+
     Args:
         search: Of a system without impacts, with nothing free beside every set; otherwise nothing
             is fitted.
@@ -50,7 +52,7 @@ def add_pursued(search: Search) -> list[Key]:
             found += search.add({key: theta})
             if key in search.refused:
                 break
-    return found
+    return [key for key in found if search.sound(key)]
 
 
 def pursued(search: Search, without: Set[int]) -> Proposals:
