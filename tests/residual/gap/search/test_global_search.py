@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import time
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from residual.gap.find import find_gap
+from residual.gap.model.candidates import candidates
+from residual.gap.preparation.prepare import prepare
 from residual.gap.result import GapResult
+from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
+from sims.chosen import chosen_effects
 from sims.equations import FirstOrderSystem
 from sims.simulator import Channel, Parameter
 
@@ -75,3 +80,23 @@ def test_nothing_else_is_certain(motor: GapResult) -> None:
 def test_forecasts_err_by_less_than_slopes_alone_reach(motor: GapResult) -> None:
     # Coulomb friction and a gain, where slopes end, leave a third.
     assert motor.gap.after.value < 0.2 * motor.gap.before.value
+
+
+@pytest.mark.parametrize("globally", [False, True])
+def test_slopes_alone_end_in_a_wrong_minimum(globally: bool) -> None:
+    simulator, noise = Motor(), np.array([0.1])
+    ready = prepare(simulator, [ramps(20)], 3.0)
+    offered = chosen_effects(simulator, ("stribeck_friction", "gain"))
+    pool = candidates(simulator, offered, ready.fitter.samples)
+    until = time.process_time() + 40.0
+    search = Search(
+        simulator, pool, ready.fitter, until=until, noise=noise if globally else None
+    )  # fmt: skip
+    key = tuple(range(len(pool)))
+    search.add({(): np.zeros(0)})
+    search.add({key: np.concatenate([one.trials[0].values[0] for one in pool])})
+    fitted = {str(e): e for e in search.model(key).bind(search.tried[key].theta).effects}
+    # With the simulator's own time constant, in rad/s^2.
+    true = BREAKAWAY * GAIN / 0.15
+    right = fitted["stribeck_friction@speed"].breakaway == pytest.approx(true, rel=0.05)
+    assert right == globally

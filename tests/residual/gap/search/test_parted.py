@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from residual.gap import find_gap
+from residual.gap.model.candidates import candidates
+from residual.gap.preparation.prepare import prepare
+from residual.gap.search.parted import parted
+from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
+from sims.chosen import chosen_effects
 from sims.equations import EquationOfMotion
 from sims.simulator import Channel, Parameter
 
@@ -68,3 +73,30 @@ def test_it_is_no_friction_by_direction(found):
 def test_a_load_is_told_from_a_bias_behind_the_dead_zone(found):
     (bias,) = (verdict for verdict in found.verdicts if verdict.effect == "actuator_bias")
     assert "constant_load@stroke" not in bias.same_motion
+
+
+@pytest.fixture(scope="module")
+def search():
+    """The first part of the log, with a load as the exact twin of a bias."""
+    simulator, run = Cylinder(), log(800)
+    ready = prepare(simulator, [run], 1.0)
+    samples = ready.fitter.samples
+    offered = chosen_effects(simulator, ("dead_zone", "actuator_bias", "lag"))
+    (load,) = candidates(simulator, chosen_effects(simulator, ("constant_load",)), samples)
+    return Search(
+        simulator, candidates(simulator, offered, samples), ready.fitter,
+        twins={"actuator_bias@valve": [load]},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("names", "apart"),
+    [(("dead_zone@valve", "actuator_bias@valve"), True), (("actuator_bias@valve", "lag"), False)],
+)
+def test_a_load_is_a_bias_but_behind_a_dead_zone(search, names, apart):
+    labels = [candidate.label for candidate in search.candidates]
+    key = tuple(sorted(map(labels.index, names)))
+    start = {"dead_zone@valve": [0.6], "actuator_bias@valve": [0.15], "lag": [-0.01]}
+    search.add({key: np.concatenate([start[labels[number]] for number in key])})
+    told = [(labels[number], twin.label) for number, twin in parted(search, key)]
+    assert told == ([("actuator_bias@valve", "constant_load@stroke")] if apart else [])
