@@ -58,7 +58,6 @@ def test_friction_and_a_limit_are_no_certain_answer_where_a_curve_does_as_well(w
     assert sure <= curves
 
 
-@pytest.mark.long
 def test_a_curve_that_is_asked_for_by_name_is_told_and_drawn(wound, tmp_path):
     effects = ("symmetric_input_curve@duty", "slow")
     found = simgap.find_gap(Spool(), [wound], effects=effects)

@@ -49,3 +49,14 @@ def test_a_late_sensor_is_told_and_nothing_is_made_of_it(late):
     if said:
         (seconds,) = re.findall(r"about ([\d.]+) s", said[0])
         assert float(seconds) == pytest.approx(LATE, abs=0.02)
+
+
+def test_beside_friction_alone_it_is_told_of_two_runs():
+    runs = [crane(seed, LATE) for seed in range(2)]
+    found = find_gap(Crane(), runs, effects="coulomb_friction@trolley")
+    (sure,) = [v for v in found.verdicts if v.kind == "confirmed"]
+    level = sure.parameters["level"]
+    assert level.low <= FRICTION <= level.high
+    (said,) = [one.says for one in found.quality if "swing comes about" in one.says]
+    (seconds,) = re.findall(r"about ([\d.]+) s", said)
+    assert float(seconds) == pytest.approx(LATE, abs=0.02)
