@@ -50,7 +50,7 @@ def turned(rng, rows=1500, substeps=8):
 
 
 @pytest.mark.long
-def test_what_far_forecasts_hide_is_named_by_shorter_ones():
+def test_what_far_forecasts_hide_is_named():
     rng = np.random.default_rng(41)
     found = find_gap(Hub(), [turned(rng) for _ in range(4)])
     first = found.verdicts[0]
@@ -58,4 +58,3 @@ def test_what_far_forecasts_hide_is_named_by_shorter_ones():
     assert first.parameters["sine"].value == pytest.approx(SINE, rel=0.05)
     assert first.parameters["cosine"].value == pytest.approx(COSINE, rel=0.1)
     assert found.gap.after.value < 0.1 * found.gap.before.value
-    assert any("motion hangs on where it begins" in one.words for one in found.quality)
