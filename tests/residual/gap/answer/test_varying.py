@@ -70,7 +70,7 @@ def test_a_resistance_that_rises_as_it_warms_is_confirmed_at_its_size():
         assert number.low <= 1.2 * 0.0039 * (at - 45.0) <= number.high
     told = " ".join(summary(result).split())
     assert "of the gap is resistance that changes with temp" in told
-    assert "Resistance that changes with temp: change −0.1" in told and "degC" in told
+    assert "resistance that changes with temp: change −0.1" in told and "degC" in told
 
 
 @pytest.mark.long
