@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,10 +11,6 @@ from sims.effects.actuator import StaticActuatorEffect
 from sims.effects.base import number
 from sims.effects.curve import Along, CurveBetween, CurveFromZero
 from sims.effects.joint import JointEffect, Value
-
-if TYPE_CHECKING:
-    pass
-
 
 #: What a curve by command can do, or nearly: the last two have a kink.
 STATIC = ("actuator_gain", "quadratic_actuator", "dead_zone", "saturation")

@@ -150,14 +150,15 @@ def confirm(
 def _much(found: Explanation, key: Key) -> bool:
     """Whether what a set leaves is many times the noise."""
     search = found.search
-    return search.fitter.left(search.tried[key], found.floor).ratio >= FAR
+    left = search.fitter.left
+    return not found.adequate and left(search.tried[key], found.floor).ratio >= FAR
 
 
 def _in_time(answer: Answer) -> Answer:
     """An answer of which nothing is certain where much is left, and there was no time to ask what
     may stand in place of one of its effects: the others may make up for that one."""
     late = any(claim.unasked for claim in answer.claims)
-    if answer.found.adequate or not late or answer.left.ratio < FAR:
+    if not (late and _much(answer.found, answer.key)):
         return answer
     claims = (dataclasses.replace(claim, unasked=True) for claim in answer.claims)
     return dataclasses.replace(answer, claims=tuple(claims))

@@ -106,15 +106,16 @@ def _ends(simulator: HostSimulator, runs: Sequence[Trajectory]) -> Iterator[_End
     """Every end at which a channel stays, but zero, where things rest: both together first."""
     names = [channel.name for channel in simulator.physical_channels]
     for channel, values in measured(simulator, runs):
-        known, found = np.concatenate([one[np.isfinite(one)] for one in values]), []
+        known = np.concatenate([one[np.isfinite(one)] for one in values])
+        found: list[float] = []
         for value in (known.max(), known.min()):
             stays = [stay for one in values for stay in _stays(one, value)]
             there = sum(stop - start for start, stop in stays)
             often = len(stays) >= OFTEN and there > MUCH * len(known)
             if value != 0 and often and there > STANDS_OUT * _next_to(known, value):
-                found.append((float(value),))
-        both = [tuple(value for (value,) in found)] if len(found) > 1 else []
-        for ends in both + found:
+                found.append(float(value))
+        both = [tuple(found)] if len(found) > 1 else []
+        for ends in (*both, *((value,) for value in found)):
             yield _End(channel.name, channel.unit_text, names.index(channel.name), ends)
 
 

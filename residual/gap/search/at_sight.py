@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from residual.gap.fitting.screening import Signatures, gains, pair_gains
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import Candidate
-from residual.gap.search.measured_path import along_measured_path
 from residual.gap.search.sets import Search
 
 #: Part of the cost that the library's best effect may leave without others being looked at.
@@ -29,12 +28,12 @@ def at_sight(search: Search, further: Sequence[Candidate]) -> list[Candidate]:
     """
     if not (further and isinstance(search.fitter, SmoothFitter)):
         return []
-    own = search.on_measured_path
+    own = search.measured_path.offered
     cost = float(own.residual @ own.residual)
     left = cost - max((gain.value for gain in gains(own)), default=0.0)
     if left < LITTLE * cost:
         return []
-    others = along_measured_path(search, further)
+    others = search.measured_path.of(further)
     alone = dict.fromkeys(range(len(further)), 0.0)
     for gain in gains(others):
         number = others.variants[gain.variants[0]].candidate

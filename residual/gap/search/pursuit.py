@@ -57,7 +57,7 @@ def add_pursued(search: Search) -> list[Key]:
 
 def pursued(search: Search, without: Set[int]) -> Proposals:
     """Sets of one, two, ... candidates, but for some, with start values."""
-    found = search.on_measured_path
+    found = search.measured_path.offered
     residual, matrix = found.residual, found.matrix
     chosen: list[Variant] = []
     proposed: Proposals = {}
@@ -75,24 +75,21 @@ def pursued(search: Search, without: Set[int]) -> Proposals:
         if gain.value < PAYS * left:
             return proposed
         chosen.append(variant)
-        theta, residual = _fitted(found, chosen)
+        starts, residual = _fitted(found, chosen)
         left = float(residual @ residual)
         columns = [c for v in chosen for c in v.columns]
         matrix = project_out(found.matrix[:, columns], found.matrix)
+        key, theta = search.merged((), starts)
         proposed[key] = theta
     return proposed
 
 
-def _fitted(found: Signatures, chosen: list[Variant]) -> tuple[Array, Array]:
-    """Start values of some variants together, by the number of their candidates, and what they
-    leave."""
+def _fitted(found: Signatures, chosen: list[Variant]) -> tuple[list[tuple[int, Array]], Array]:
+    """Candidates of some variants with their start values together, and what they leave."""
     columns = [c for variant in chosen for c in variant.columns]
     sides = np.concatenate([variant.trial.one_sided for variant in chosen])
     _, size = constrained(found.matrix[:, columns], found.residual, sides)
-    starts, begin = {}, 0
-    for variant in chosen:
-        end = begin + len(variant.columns)
-        starts[variant.candidate] = variant.start(size[begin:end])
-        begin = end
-    theta = np.concatenate([starts[number] for number in sorted(starts)])
-    return theta, found.residual - found.matrix[:, columns] @ size
+    ends = np.cumsum([len(variant.columns) for variant in chosen])[:-1]
+    parts = zip(chosen, np.split(size, ends), strict=True)
+    starts = [(variant.candidate, variant.start(own)) for variant, own in parts]
+    return starts, found.residual - found.matrix[:, columns] @ size

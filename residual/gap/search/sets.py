@@ -24,7 +24,7 @@ from residual.gap.model.nested import absent, from_nested
 from residual.gap.preparation.effort import Effort
 from residual.gap.search.currency import Currency, groups
 from residual.gap.search.global_search import GlobalSearch
-from residual.gap.search.measured_path import along_measured_path
+from residual.gap.search.measured_path import MeasuredPath
 from residual.gap.search.pool import Key, Pool, Twins
 from residual.gap.search.redundant import doubles
 from sims.host import HostSimulator
@@ -172,9 +172,9 @@ class Search(Pool):
         return self._signatures[key]
 
     @functools.cached_property
-    def on_measured_path(self) -> Signatures:
-        """What every candidate would add to the nominal simulator along the measured path."""
-        return along_measured_path(self, self.candidates[: self.screened])
+    def measured_path(self) -> MeasuredPath:
+        """What candidates would add to the nominal simulator there; of what has no impacts."""
+        return MeasuredPath(self.simulator, self.fitter, self.candidates[: self.screened])
 
     def from_longer_leads(self, key: Key) -> Array:
         """Mean squared errors of blocks, forecasts begun from twice as much data, (B, m)."""
