@@ -158,15 +158,12 @@ class EquationOfMotion(_Equations):
         with np.errstate(all="ignore"):
             return float(abs(speed / (10 * self.dt * moved)))
 
-    def coupled_inertia(self, joint: Joint) -> float | None:
-        """See ``HostSimulator.coupled_inertia``; compared at some places."""
-        j = self.joints.index(joint)
+    def moved_by(self, joint: Joint) -> Array:
+        """See ``HostSimulator.moved_by``; at rest, at some places."""
         scales = np.array([self.state_channels[column].scale for column in self._positions])
         # Not all at the same share of their scale, where a coupling may vanish.
         shares = np.array([np.roll(ELSEWHERE, k) for k in range(len(scales))]).T
-        moved = self._mobility(j, shares * scales)
-        own, others = np.median(moved[:, j]), np.abs(np.delete(moved, j, axis=1)).sum()
-        return float(1 / own) if own > 0 and 0 < others < np.inf else None
+        return self._mobility(self.joints.index(joint), shares * scales)
 
     def _mobility(self, j: int, places: Array) -> Array:
         """Acceleration of every joint per unit force on joint ``j`` at rest, (n, n_joints)."""

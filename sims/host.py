@@ -83,8 +83,8 @@ class HostSimulator(Simulator):
             raise NotImplementedError(f"joint {joint.name!r} has no scale")
         return joint.scale
 
-    def coupled_inertia(self, joint: Joint) -> float | None:
-        """Inertia at a joint that moves others, while those are free; None where it moves none."""
+    def moved_by(self, joint: Joint) -> Array | None:
+        """Acceleration of all per unit force on a joint, (places, n_joints); None: not known."""
         return None
 
     def smooth_states(self, n: int, rng: np.random.Generator) -> Array:

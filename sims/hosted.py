@@ -16,7 +16,7 @@ from sims.effects.coupling import Coupling
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import flexible_parts
 from sims.effects.friction import DryFriction
-from sims.effects.inertia import AddedInertia
+from sims.effects.inertia import InertiaEffect
 from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
 from sims.effects.link import Link
@@ -75,16 +75,22 @@ def motion_of(
     flows += [(names.index(e.joint), len(names) + i, e) for i, e in enumerate(stores(host))]
     states = len(names) + len(stores(host))
     parts = [(names.index(e.joint), states + i, e) for i, e in enumerate(flexible_parts(host))]
-    added = {f"{e} {i}": e for i, e in enumerate(there) if isinstance(e, AddedInertia)}
+    added = {
+        f"{e} {i}": (names.index(e.joint), e.where_turn_is(_turn(host, e)))
+        for i, e in enumerate(there)
+        if isinstance(e, InertiaEffect)
+    }
     speeds = {joint.name: joint.rate is not None for joint in host.joints}
-    inertia = {name: e.inertia for name, e in added.items()}
+    inertia = {
+        f"{name} {field}": getattr(e, field)
+        for name, (_, e) in added.items()
+        for field in e.numbers()
+    }
     inputs = {channel.name: (2, k) for k, channel in enumerate(host.action_channels)}
     curves = [e for e in there if isinstance(e, ParameterCurve)]
     follow = _Following(host, curves, {**places, **inputs})
     return Motion(
-        carrying(
-            follow.in_place(acceleration), {name: names.index(e.joint) for name, e in added.items()}
-        ),
+        carrying(follow.in_place(acceleration), added),
         follow.in_place(drive_force),
         Values(**host.parameter_values(), **inertia, **follow.numbers()),
         smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
@@ -101,7 +107,7 @@ def motion_of(
     )
 
 
-def _turn(host: HostSimulator, effect: JointEffect) -> float:
+def _turn(host: HostSimulator, effect: JointEffect | InertiaEffect) -> float:
     """A whole turn in the unit of the joint that an effect acts on."""
     positions = {joint.name: joint.position for joint in host.joints}
     there = next(c for c in host.state_channels if c.name == positions[effect.joint])

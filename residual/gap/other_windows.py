@@ -12,10 +12,14 @@ from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.left import names_more
 from residual.gap.answer.lone import explains_the_rest, lone_stretch
 from residual.gap.confirmed import Confirmed
+from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.log import Log
 from residual.gap.longer import LESS, LONGER, longer_horizon, over, slow_error, slow_remainder
+from residual.gap.model.candidates import candidates
 from residual.gap.preparation.horizon import FEWER, WINDOWS, longest_horizon
-from residual.gap.preparation.prepare import Prepared
+from residual.gap.preparation.prepare import Prepared, prepare
+from residual.gap.search.at_sight import at_sight
+from residual.gap.search.measured_path import MeasuredPath
 from residual.trajectories import duration_text
 from sims.effects.base import Effect
 
@@ -61,27 +65,41 @@ class OtherWindows:
         return Confirmed(ready, answer, (stretch.says(left_out=True),))
 
     def shorter(self, known: Confirmed) -> Confirmed:
-        """The same, or what is found over much shorter forecasts.
+        """The same, or what is found over much shorter forecasts, where much is left.
 
-        They are tried where nothing could be named of much: motion that teeth or a stop catch now
-        and then goes another way after a while for the least difference, and hides its cause.
+        They are tried where nothing could be named: motion that teeth or a stop catch now and then
+        goes another way after a while for the least difference, and hides its cause. And where a
+        rarer effect stands out there: what moves a system far over the usual length is no small
+        change there, and lies hidden.
         """
-        answer, search = known.answer, known.answer.found.search
-        if not self._nothing_named(known) or search.simulator.has_contacts:
-            return known
+        answer, fitter = known.answer, known.answer.found.search.fitter
         horizon = PART * self.log.horizon
         step = np.median(np.concatenate([run.durations for run in self.log.recorded]))
-        if answer.left.ratio < FAR or horizon < SAMPLES * step or self.inquiry.clock.searched:
+        if not isinstance(fitter, SmoothFitter) or self.inquiry.clock.searched:
+            return known
+        if answer.left.ratio < FAR or horizon < SAMPLES * step:
+            return known
+        if not (self._nothing_named(known) or self._stands_out(known, horizon)):
             return known
         ready, found = self.over(known, horizon, "much shorter forecasts")
         if not explains_the_rest(found):
             return known
         says = (
             f"forecasts go over {duration_text(ready.fitter.seconds)}: over "
-            f"{duration_text(search.fitter.seconds)} motion hangs on where it begins, and nothing "
-            "could be named"
+            f"{duration_text(fitter.seconds)} motion hangs on where it begins, and "
+            f"{'too little' if answer.key else 'nothing'} could be named"
         )
         return dataclasses.replace(known, prepared=ready, answer=found, why=says)
+
+    def _stands_out(self, known: Confirmed, horizon: float) -> bool:
+        """Whether a rarer effect stands out over forecasts of some length, in s."""
+        search, further = known.answer.found.search, self.inquiry.offered.further
+        fitter = prepare(search.simulator, self.log.runs, horizon).fitter
+        assert isinstance(fitter, SmoothFitter)
+        offered = {candidate.label for candidate in search.candidates}
+        rest = [effect for effect in further if str(effect) not in offered]
+        path = MeasuredPath(search.simulator, fitter, search.candidates)
+        return bool(at_sight(path, candidates(search.simulator, rest, fitter.samples)))
 
     def longer(self, known: Confirmed) -> Confirmed:
         """The same, or what is found over longer forecasts, of which the records hold fewer.

@@ -25,6 +25,7 @@ from sims.effects.curves import FrictionCurve as FrictionCurve
 from sims.effects.curves import InputCurve as InputCurve
 from sims.effects.curves import StateCurve as StateCurve
 from sims.effects.curves import SymmetricInputCurve as SymmetricInputCurve
+from sims.effects.eccentric import EccentricEncoder as EccentricEncoder
 from sims.effects.exchange import Exchange as Exchange
 from sims.effects.flexible import FlexibleJoint as FlexibleJoint
 from sims.effects.flexible import FlexiblePart as FlexiblePart
@@ -36,6 +37,7 @@ from sims.effects.friction import LoadDependentFriction as LoadDependentFriction
 from sims.effects.friction import StribeckFriction as StribeckFriction
 from sims.effects.hysteresis import Hysteresis as Hysteresis
 from sims.effects.inertia import AddedInertia as AddedInertia
+from sims.effects.inertia import CrankInertia as CrankInertia
 from sims.effects.joint import AsymmetricDamping as AsymmetricDamping
 from sims.effects.joint import Cogging as Cogging
 from sims.effects.joint import ConstantLoad as ConstantLoad

@@ -146,12 +146,10 @@ def _read_after(
     simulator: HostSimulator, sensor: SensorEffect, states: Array, inputs: Array
 ) -> Array:
     """Readings a tenth of a control period after readings of ``states``, (n, n_s)."""
-    names = [c.name for c in simulator.state_channels]
-    columns = [names.index(name) for name in sensor.read_by_it(simulator)]
     true = states.copy()
-    true[:, columns] = sensor.undo(true[:, columns])
+    sensor.through(simulator, true, forward=False)
     after = shortly_after(simulator, true, inputs)
-    after[:, columns] = sensor.read(after[:, columns])
+    sensor.through(simulator, after, forward=True)
     return after
 
 

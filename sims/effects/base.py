@@ -136,6 +136,7 @@ class Effect(abc.ABC):
         looks_like: What outside the library moves a system in the same way if the effect is in all
             its inputs, in words.
         creeps: True if it is a constant that is seldom one for long, as zeros of sensors are.
+        turns: Part of a turn that data have to cover for it to be told from what does not turn.
         compound: True if its strengths are parts of one size, so that any one of them may be zero.
     """
 
@@ -150,6 +151,7 @@ class Effect(abc.ABC):
     holds_still: ClassVar[bool] = False
     drives: ClassVar[bool] = False
     creeps: ClassVar[bool] = False
+    turns: ClassVar[float] = 0.0
     compound: ClassVar[bool] = False
     looks_like: ClassVar[str] = ""
 
@@ -221,6 +223,10 @@ class Effect(abc.ABC):
         return dataclasses.replace(
             self, **{k: np.asarray(v, float) if np.ndim(v) else v for k, v in values.items()}
         )
+
+    def where_turn_is(self, turn: float) -> Self:
+        """The same where a whole turn of the position is ``turn``, if it goes by turns."""
+        return self
 
     def suited_to(self, low: float, high: float) -> Self:
         """The effect as it is looked for in readings, or commands, between two values."""

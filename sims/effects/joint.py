@@ -47,10 +47,6 @@ class JointEffect(Effect):
     def force(self, q: Value, v: Value) -> Value:
         """Force on the joint, in its unit, at position ``q`` and rate ``v``, by row."""
 
-    def where_turn_is(self, turn: float) -> Self:
-        """The same where a whole turn is ``turn`` in the unit of ``q``, if it depends on turns."""
-        return self
-
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of force, position and rate at the joint."""
         joint = place("joint", self.joint, {joint.name: joint for joint in simulator.joints})
@@ -232,6 +228,7 @@ class Unbalance(JointEffect):
     name: ClassVar[str] = "unbalance"
     sentence: ClassVar[str] = "A weight off the axis of what turns, which gravity pulls down."
     needs: ClassVar[str] = "a quarter of a turn or more"
+    turns: ClassVar[float] = 0.25
     compound: ClassVar[bool] = True
     follows_rate: ClassVar[bool] = False
 

@@ -24,6 +24,7 @@ from sims.effects.base import Effect
 from sims.effects.coupling import BY, Coupling, coupled_states
 from sims.effects.curve import Curve
 from sims.effects.curves import CURVES
+from sims.effects.eccentric import EccentricEncoder
 from sims.effects.exchange import Exchange, like_states
 from sims.effects.flexible import FlexibleJoint, FlexiblePart
 from sims.effects.friction import (
@@ -34,7 +35,7 @@ from sims.effects.friction import (
     StribeckFriction,
 )
 from sims.effects.hysteresis import Hysteresis
-from sims.effects.inertia import AddedInertia
+from sims.effects.inertia import AddedInertia, CrankInertia
 from sims.effects.joint import (
     AsymmetricDamping,
     Cogging,
@@ -166,21 +167,23 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     """What is rarer than the library, at zero strength.
 
     Friction by load of every joint that the inputs move by themselves; states that fall at another
-    pace than they rise, rub otherwise backwards, lose a constant or by a power, act on others or
-    are linked to them; inputs that act otherwise below zero or through a play, and, but for goals,
-    inputs that are followed at a limited pace.
+    pace than they rise, rub otherwise backwards, lose a constant or by a power, have an inertia by
+    their angle, act on others or are linked to them; inputs that act otherwise below zero or
+    through a play, and, but for goals, that are followed at a limited pace; encoders off their
+    axis.
     """
     found: list[Effect] = list(_geared(simulator))
     inputs = [channel.name for channel in simulator.action_channels]
     inputs += [AND.join(names) for names in like_inputs(simulator)]
-    kinds = AsymmetricResponse, AsymmetricDamping, ConstantLoss, PowerLoss
+    kinds = AsymmetricResponse, AsymmetricDamping, ConstantLoss, PowerLoss, CrankInertia
     both: list[Effect] = [kind(joint.name) for kind in kinds for joint in simulator.joints]
     both += [Coupling(BY.join(names)) for names in coupled_states(simulator)]
     links = itertools.product((CouplingSpring, CouplingDamper), linked_joints(simulator))
     both += [kind(AND.join(names)) for kind, names in links]
     slow = [name for name in inputs if name not in goals(simulator)]
     at_inputs = [kind(name) for kind in (AsymmetricActuator, Hysteresis) for name in inputs]
-    for effect in (*both, *at_inputs, *map(SlewLimit, slow)):
+    discs = [EccentricEncoder(channel.name) for channel in simulator.physical_channels]
+    for effect in (*both, *at_inputs, *map(SlewLimit, slow), *discs):
         with contextlib.suppress(ValueError):
             effect.quantities(simulator)
             found.append(effect)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from sims.effects.base import Effect, number, place
+from sims.effects.inertia import moves_others
 from sims.effects.joint import Value
 from sims.effects.pull import pulled_by_position
 
@@ -57,5 +58,4 @@ class AsymmetricResponse(Effect):
 
 def _is_a_wheel(simulator: HostSimulator, joint: Joint) -> bool:
     """Whether nothing pulls a joint by where it is, and it moves no other one."""
-    alone = simulator.coupled_inertia(joint) is None
-    return alone and not pulled_by_position(simulator, joint.name)
+    return not moves_others(simulator, joint.name) and not pulled_by_position(simulator, joint.name)

@@ -48,6 +48,18 @@ class SensorEffect(Effect):
     def undo(self, x: Value) -> Value:
         """What is true where the sensor reads ``x``: the inverse of ``read``."""
 
+    def read_from(self, simulator: HostSimulator) -> tuple[str, ...]:
+        """Those of them without which nothing of it shows."""
+        return self.read_by_it(simulator)
+
+    def through(self, simulator: HostSimulator, states: Array, forward: bool) -> None:
+        """Write what it reads into true states, (n, n_i), or backward what is true where it reads
+        them."""
+        names = [channel.name for channel in simulator.physical_channels]
+        change = self.read if forward else self.undo
+        for column in map(names.index, self.read_by_it(simulator)):
+            states[:, column] = change(states[:, column])
+
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of the channel."""
         channels = {c.name: c for c in simulator.state_channels if c.kind != "memory"}
@@ -165,9 +177,6 @@ def through_sensors(simulator: HostSimulator, states: Array, forward: bool) -> A
     if not effects:
         return states
     states = np.array(states, float)
-    names = [channel.name for channel in simulator.physical_channels]
     for effect in sorted(effects, key=lambda effect: effect.stage, reverse=not forward):
-        change = effect.read if forward else effect.undo
-        for column in map(names.index, effect.read_by_it(simulator)):
-            states[:, column] = change(states[:, column])
+        effect.through(simulator, states, forward)
     return states

@@ -24,6 +24,7 @@ from studies.gap.numbers import (
     spelt,
     times_of,
     values_of,
+    worth_telling,
 )
 from studies.gap.records import on_the_way, repeating
 from studies.gap.words import (
@@ -117,7 +118,8 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     found = [f"without it, {percent(verdict.share.value)} of the gap would be back"]
     effect = known_effects(result)[verdict.label]
     curved = isinstance(effect, Curve)
-    surer = {f: n for f, n in verdict.parameters.items() if much_surer(n) and not curved}
+    shown = worth_telling(verdict, effect)
+    surer = {f: n for f, n in shown.items() if much_surer(n) and not curved}
     if surer:
         single = len(verdict.parameters) == 1
         spans = [("" if single else f"{spelt(f)} ") + span(n) for f, n in surer.items()]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from scipy.optimize import brentq
 
 from residual.gap import GapResult
@@ -19,6 +21,8 @@ MUCH = 0.7
 FARTHEST = 1e3
 #: Upper over lower end of a share up to which it may say a unit.
 NARROW = 1.3
+#: Parts of one size that are all told.
+MANY = 2
 #: Of what a share is one more: actuators receive, and sensors read.
 SHARES = {"gain": "the command", "scale": "what is there"}
 #: The same of every number that is a share more.
@@ -31,7 +35,17 @@ def numbers_of(verdict: Verdict, effect: Effect, simulator: HostSimulator) -> li
     """Each number with its name, or where it holds if a curve is given by them."""
     if isinstance(effect, Curve):
         return _points(verdict, effect, simulator)
-    return [f"{spelt(field)} {number_text(n)}" for field, n in verdict.parameters.items()]
+    shown = worth_telling(verdict, effect)
+    texts = [f"{spelt(field)} {number_text(n)}" for field, n in shown.items()]
+    return texts if len(shown) == len(verdict.parameters) else [*texts, "the others may be zero"]
+
+
+def worth_telling(verdict: Verdict, effect: Effect) -> Mapping[str, Number]:
+    """The numbers of a verdict; of one size that has many parts, those that cannot be zero."""
+    numbers = verdict.parameters
+    if not effect.compound or len(numbers) <= MANY:
+        return numbers
+    return {f: n for f, n in numbers.items() if n.low > 0 or n.high < 0} or numbers
 
 
 def _points(verdict: Verdict, curve: Curve, simulator: HostSimulator) -> list[str]:

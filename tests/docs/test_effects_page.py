@@ -75,6 +75,7 @@ OTHERS = [
     effects.AsymmetricActuator("voltage"), effects.SlewLimit("voltage"),
     effects.Hysteresis("voltage"), effects.Coupling("pivot by elbow"),
     effects.CouplingSpring("pivot and elbow"), effects.CouplingDamper("pivot and elbow"),
+    effects.CrankInertia("pivot"), effects.EccentricEncoder("angle"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}

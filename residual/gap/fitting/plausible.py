@@ -24,7 +24,7 @@ from sims.effects.aliases import probes, shortly_after
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.parameter import ParameterChange
-from sims.effects.sensor import ScaledSensor, SensorEffect, SensorOffset
+from sims.effects.sensor import ScaledSensor, SensorOffset
 from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
@@ -211,12 +211,10 @@ def doubtful_sensor(effect: Effect, simulator: HostSimulator, samples: Samples) 
         simulator: Has the channels.
         samples: The measured table.
     """
-    if not isinstance(effect, SensorEffect):
-        return False
+    if not isinstance(effect, SensorOffset):
+        return isinstance(effect, ScaledSensor)
     names = [channel.name for channel in simulator.physical_channels]
     place = names.index(effect.channel)
-    if not isinstance(effect, SensorOffset):
-        return True
     if simulator.physical_channels[place].kind == "position":
         return False
     shown = samples.seen[:, place]

@@ -15,7 +15,7 @@ from residual.gap.model.reach import (
     full_command,
     greatest_rate,
     measured_range,
-    shows_weight,
+    turns_enough,
     within_reach,
 )
 from sims.effects.actuator import ActuatorEffect
@@ -25,7 +25,7 @@ from sims.effects.curve import Curve
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import FlexiblePart
 from sims.effects.friction import ConstantLoss
-from sims.effects.joint import AsymmetricDamping, JointEffect, Unbalance
+from sims.effects.joint import AsymmetricDamping, JointEffect
 from sims.effects.library import typical
 from sims.effects.limit import RateLimit
 from sims.effects.link import Link
@@ -160,7 +160,7 @@ def candidates(
     found = []
     for effect in effects:
         if isinstance(effect, SensorEffect):
-            if not measured.issuperset(effect.read_by_it(simulator)):
+            if not measured.issuperset(effect.read_from(simulator)):
                 continue
             effect = effect.suited_to(*measured_range(samples, columns[effect.where]))
         reach = 0.0
@@ -180,7 +180,7 @@ def candidates(
             joint = next(j for j in simulator.joints if j.name == effect.joint)
             if not _both_ways(samples, columns[joint.position], columns.get(str(joint.rate))):
                 continue
-        if isinstance(effect, Unbalance) and not shows_weight(effect, simulator, samples):
+        if not turns_enough(effect, simulator, samples):
             continue
         known = within_reach(effect, simulator, samples, seconds)
         whole = {n: q for n, q in known.items() if q.integer and q.role == "shape"}

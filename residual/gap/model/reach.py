@@ -9,7 +9,6 @@ import numpy as np
 from residual.gap.data.samples import Samples
 from sims.effects.base import Effect, Quantity
 from sims.effects.flexible import FlexiblePart
-from sims.effects.joint import Unbalance
 from sims.effects.limit import RateLimit
 from sims.effects.link import CouplingSpring
 from sims.effects.store import SecondStore
@@ -18,8 +17,6 @@ from sims.simulator import Channel
 
 #: Part of an input's bound that a log has to reach to tell of full commands.
 NEAR_FULL = 0.5
-#: Part of a turn that tells a weight off the axis from a spring.
-OF_A_TURN = 0.25
 #: A limit of a rate is looked for up to so many times the fastest motion over so many rows.
 BEYOND, SPAN = 1.2, 5
 #: Time constants of a store that are tried, as parts of the longest record.
@@ -60,13 +57,16 @@ def greatest_rate(effect: RateLimit, simulator: HostSimulator, samples: Samples)
     return fastest
 
 
-def shows_weight(effect: Unbalance, simulator: HostSimulator, samples: Samples) -> bool:
-    """Whether a joint turned so far that a weight off its axis is told from a spring."""
-    joint = next(j for j in simulator.joints if j.name == effect.joint)
+def turns_enough(effect: Effect, simulator: HostSimulator, samples: Samples) -> bool:
+    """Whether a joint turned so far that a weight off its axis is told from a spring, or an
+    encoder's error once per turn from a scale; true of what asks for no turn."""
+    if not effect.turns:
+        return True
+    joint = next((j for j in simulator.joints if j.name == effect.where), None)
     names = [channel.name for channel in simulator.physical_channels]
-    column = names.index(joint.position)
+    column = names.index(effect.where if joint is None else joint.position)
     low, high = measured_range(samples, column)
-    return high - low >= OF_A_TURN * (simulator.physical_channels[column].turn or np.inf)
+    return high - low >= effect.turns * (simulator.physical_channels[column].turn or np.inf)
 
 
 def _longest(samples: Samples) -> float:

@@ -2,48 +2,68 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Sequence
 
-from residual.gap.fitting.screening import Signatures, gains, pair_gains
-from residual.gap.fitting.smooth import SmoothFitter
+from residual.gap.fitting.screening import Signatures, gains, pair_gains, project_out
 from residual.gap.model.candidates import Candidate
-from residual.gap.search.sets import Search
+from residual.gap.search.measured_path import MeasuredPath
 
-#: Part of the cost that the library's best effect may leave without others being looked at.
+#: Part of the cost that the library's best effects may leave without others being looked at.
 LITTLE = 0.05
 #: Part of what it leaves that one of these leaves at most.
 QUARTER = 0.25
 #: Part of what one leaves that two leave at most.
 HALF = 0.5
+#: Effects of the library beside which others are looked at, one after the other.
+BESIDE = 3
 
 
-def at_sight(search: Search, further: Sequence[Candidate]) -> list[Candidate]:
+def at_sight(path: MeasuredPath, further: Sequence[Candidate]) -> list[Candidate]:
     """Those that leave a fraction of what the best of the library leaves in the linear picture,
-    alone, or two between the same joints.
+    alone, or two between the same joints; beside nothing, or beside the library's best effects.
 
     Args:
-        search: With what is on offer.
+        path: With what is on offer.
         further: What is not.
     """
-    if not (further and isinstance(search.fitter, SmoothFitter)):
+    if not further:
         return []
-    own = search.measured_path.offered
-    cost = float(own.residual @ own.residual)
-    left = cost - max((gain.value for gain in gains(own)), default=0.0)
-    if left < LITTLE * cost:
-        return []
-    others = search.measured_path.of(further)
+    own, others = path.offered, path.of(further)
+    whole = float(own.residual @ own.residual)
+    found: set[int] = set()
+    chosen: list[int] = []
+    for _ in range(BESIDE):
+        basis = own.matrix[:, chosen]
+        residual, matrix = (project_out(basis, one) for one in (own.residual, own.matrix))
+        best = gains(own, residual, matrix)[:1]
+        cost = float(residual @ residual)
+        left = cost - sum(gain.value for gain in best)
+        if left < LITTLE * whole:
+            break
+        there = dataclasses.replace(
+            others, residual=residual, matrix=project_out(basis, others.matrix)
+        )
+        found |= _standing_out(there, further, cost, QUARTER * left)
+        chosen += [column for gain in best for column in own.variants[gain.variants[0]].columns]
+    return [one for number, one in enumerate(further) if number in found]
+
+
+def _standing_out(
+    others: Signatures, further: Sequence[Candidate], cost: float, most: float
+) -> set[int]:
+    """Numbers of those that leave less than ``most`` of a cost, alone or with one of their pair."""
     alone = dict.fromkeys(range(len(further)), 0.0)
     for gain in gains(others):
         number = others.variants[gain.variants[0]].candidate
         alone[number] = max(alone[number], gain.value)
-    found = {number for number, value in alone.items() if cost - value < QUARTER * left}
+    found = {number for number, value in alone.items() if cost - value < most}
     for two in of_one_pair(further):
         both = cost - _together(others, two)
-        if both < QUARTER * left and both < HALF * (cost - max(alone[n] for n in two)):
+        if both < most and both < HALF * (cost - max(alone[n] for n in two)):
             found |= set(two)
-    return [one for number, one in enumerate(further) if number in found]
+    return found
 
 
 def of_one_pair(pool: Sequence[Candidate]) -> list[tuple[int, int]]:

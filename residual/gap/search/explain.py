@@ -147,7 +147,7 @@ def explain(
     before = earlier
     for _ in range(ROUNDS):
         search = begun(fitter, floor, before)
-        if before is None and (standing_out := at_sight(search, further)):
+        if further and before is None and (standing_out := at_sight(search.measured_path, further)):
             pool = [*pool, *standing_out]
             search = begun(fitter, floor, before)
         if not seeds:

@@ -86,10 +86,11 @@ def test_a_band_between_carts_stands_out_and_is_not_the_librarys():
         return np.array([force, -force])
 
     search, further = searched(logs(pull))
-    assert [one.label for one in at_sight(search, further)] == ["coupling_spring@x1 and x2"]
+    standing_out = at_sight(search.measured_path, further)
+    assert [one.label for one in standing_out] == ["coupling_spring@x1 and x2"]
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 def test_what_the_library_explains_has_nothing_stand_out(noise):
     search, further = searched(logs(lambda q, v: np.array([-25.0, 0.0]) * q - noise * v))
-    assert at_sight(search, further) == []
+    assert at_sight(search.measured_path, further) == []

@@ -1,0 +1,83 @@
+"""Encoders whose disc sits off its axis."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from sims.effects.base import number
+from sims.effects.joint import Value
+from sims.effects.sensor import SensorEffect
+from sims.simulator import Array
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
+
+#: Newton steps in which the angle behind a reading is found to the last digit.
+STEPS = 8
+
+
+@dataclasses.dataclass(frozen=True)
+class EccentricEncoder(SensorEffect):
+    """The sensor reads ``x + sine sin x + cosine cos x``, and the rate that is derived from it so.
+
+    A disc, or a magnet, that sits off its axis by a part ``e`` of its radius errs by ``e`` rad at
+    most, once per turn (Ellin and Dolsak, "The design and application of rotary encoders", Sensor
+    Review 28, 2008).
+    """
+
+    sine: Value = number(share=0.02, low=-0.5, high=0.5, angle=1)
+    cosine: Value = number(share=0.02, low=-0.5, high=0.5, angle=1)
+
+    name: ClassVar[str] = "eccentric_encoder"
+    sentence: ClassVar[str] = "An encoder's disc sits off its axis: the angle errs once per turn."
+    needs: ClassVar[str] = "a whole turn"
+    turns: ClassVar[float] = 1.0
+    compound: ClassVar[bool] = True
+    stage: ClassVar[int] = 0
+
+    def read(self, x: Value) -> Value:
+        """Reading of an angle in rad."""
+        return x + self.sine * np.sin(x) + self.cosine * np.cos(x)
+
+    def undo(self, x: Value) -> Value:
+        """The angle in rad behind a reading, by Newton's method."""
+        angle = x
+        for _ in range(STEPS):
+            angle = angle - (self.read(angle) - x) / self._slope(angle)
+        return angle
+
+    def _slope(self, x: Value) -> Value:
+        return 1.0 + self.sine * np.cos(x) - self.cosine * np.sin(x)
+
+    def read_by_it(self, simulator: HostSimulator) -> tuple[str, ...]:
+        """The angle and its rate."""
+        channels = simulator.physical_channels
+        return (self.channel, *(c.name for c in channels if c.rate_of == self.channel))
+
+    def read_from(self, simulator: HostSimulator) -> tuple[str, ...]:
+        """The angle."""
+        return (self.channel,)
+
+    def through(self, simulator: HostSimulator, states: Array, forward: bool) -> None:
+        """See ``SensorEffect.through``: the rate is read too fast where the angle is ahead."""
+        channels = {channel.name: i for i, channel in enumerate(simulator.physical_channels)}
+        place, *rates = (channels[name] for name in self.read_by_it(simulator))
+        radian = (simulator.physical_channels[place].turn or math.tau) / math.tau
+        angle = states[:, place] / radian
+        true = angle if forward else self.undo(angle)
+        states[:, place] = radian * (self.read(angle) if forward else true)
+        for rate in rates:
+            states[:, rate] *= self._slope(true) if forward else 1 / self._slope(true)
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """As for every sensor effect; the channel has to be an angle."""
+        found = super().measures(simulator)
+        channel = next(c for c in simulator.physical_channels if c.name == self.channel)
+        if channel.turn is None or channel.kind != "position":
+            raise ValueError(f"it needs an angle; {self.channel!r} is none")
+        return {**found, "angle": ("rad", 1.0)}
