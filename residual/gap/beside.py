@@ -84,6 +84,7 @@ class Periodic:
         frequency: In Hz.
         size, unit: Its amplitude, the median over records.
         taken: Part of the squared residual that this would take off.
+        instead: The effect, ``name@where``, in whose place it would do that; empty: beside all.
     """
 
     joint: str
@@ -91,6 +92,7 @@ class Periodic:
     size: float
     unit: str
     taken: float
+    instead: str = ""
 
 
 @dataclasses.dataclass(frozen=True)

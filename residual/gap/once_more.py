@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 from collections.abc import Callable, Sequence
 
-from residual.gap.answer.confirmed import Answer
+from residual.gap.answer.confirmed import Answer, untimely
 from residual.gap.answer.curves import worth_a_curve
 from residual.gap.answer.form import of_open_form
 from residual.gap.answer.free_parameters import better, worth_freeing
@@ -127,7 +127,9 @@ class OnceMore(OtherWindows):
         what = "curves by points in place of laws"
         found, second = self._asked_with(known, curves, what, lacking)
         if second is None:
-            untested = of_open_form(found.answer, (), self.tolerance) if curves else found.answer
+            if not curves:
+                return found
+            untested = untimely(of_open_form(found.answer, (), self.tolerance))
             return dataclasses.replace(found, answer=untested)
         if found.answer is second:
             return self.with_further(found)

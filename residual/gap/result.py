@@ -22,8 +22,8 @@ Kind = Literal[
 ]
 #: Why an effect is not certain, each in words in ``residual.gap.answer.doubts.DOUBTS``.
 Doubt = Literal[
-    "not_needed", "unsteady", "creeps", "drift", "one_way", "law", "numerics", "at_bound",
-    "clock", "within_step", "swapped", "conventions", "cut_off", "extreme", "orders", "levels",
+    "not_needed", "unsteady", "creeps", "drift", "one_way", "law", "numerics", "at_bound", "clock",
+    "within_step", "swapped", "conventions", "cut_off", "extreme", "stretched", "orders", "levels",
     "loop", "records", "set_aside", "no_help", "sensor", "no_time", "may_be_zero", "size_open",
     "share_may_be_zero", "calibration", "within", "slight", "few_blocks", "rivals", "instead",
 ]  # fmt: skip

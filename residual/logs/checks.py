@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 # Speed that no joint of an unstated unit is believed to reach, in rad/s (570 rpm), and the
 # multiple of its channel's declared scale: slow motion in deg/s is already beyond both.
-_FASTEST, _TIMES_SCALE = 60.0, 10.0
+_FASTEST, _TIMES_SCALE = 60.0, 20.0
 
 # Spans over which positions are compared, in samples: long ones beat noise, short ones turns.
 _SPANS = (1, 2, 4, 8, 16, 32)

@@ -12,7 +12,7 @@ from residual.gap.preparation.horizon import SAMPLES
 from residual.gap.result import OFF, Gap, Verdict
 from residual.trajectories import duration_text
 from sims.effects import Curve, SensorOffset
-from sims.effects.actuator import ActuatorEffect
+from sims.effects.actuator import ActuatorEffect, ActuatorLag, Delay
 from studies.gap.numbers import (
     as_commanded,
     as_in_a_unit,
@@ -51,6 +51,8 @@ from studies.gap.words import (
 NAMELESS = ("unexplained", "calibrated", "needs_data", "no_gap")
 #: Error over that by noise from which on there is a gap, however few blocks of data show it.
 PLAINLY = 10.0
+#: Residual over noise from which on points of a curve clearly miss the law between them.
+COARSE = 2.0
 
 
 def rivals(verdict: Verdict) -> tuple[str, ...]:
@@ -124,6 +126,10 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
         single = len(verdict.parameters) == 1
         spans = [("" if single else f"{spelt(f)} ") + span(n) for f, n in surer.items()]
         found.append(f"{', '.join(spans)} if all else in the simulator is exact")
+    if curved and not result.adequate and result.gap.windows_after > COARSE:
+        found.append(
+            "the law may depart from these points by more than the intervals of the points"
+        )
     told = as_in_a_unit(verdict, result.corrected), as_commanded(verdict, result)
     found += [one for one in told if one]
     for field, n in verdict.parameters.items():
@@ -164,6 +170,8 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
             found.append(f"{effect.looks_like} would look the same")
         elif verdict.label in result.nearly_late:
             found.append(f"{effect.looks_like} would look nearly the same")
+    if isinstance(effect, Delay) and not result.adequate and _beside_a_lag(effect, result):
+        found.append("together with the lag beside it, it may as well be two lags in a row")
     if isinstance(effect, SensorOffset) and _against_a_medium(effect, result):
         found.append("a current or a wind of that speed would look the same")
     for other in verdict.beside:
@@ -173,6 +181,11 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     if verdict.provisional:
         found.append(provisional(result))
     return found
+
+
+def _beside_a_lag(delay: Delay, result: GapResult) -> bool:
+    """Whether a lag of what it delays is named, too."""
+    return any(isinstance(e, ActuatorLag) and e.where == delay.where for e in result.effects)
 
 
 def _against_a_medium(effect: SensorOffset, result: GapResult) -> bool:
@@ -206,7 +219,7 @@ def _remainder_notes(verdict: Verdict, result: GapResult) -> list[str]:
         )
     if result.changing:
         found.append(on_the_way(result.changing))
-    if result.periodic:
+    if result.periodic and not result.periodic.instead:
         found.append(repeating(result.periodic))
     if verdict.follows and not result.periodic:
         found.append(f"it looks like something that follows {verdict.follows}")

@@ -10,7 +10,7 @@ from residual.gap.result import OFF, ChannelGap, Gap, Verdict
 from residual.trajectories import moment
 from studies.gap.answer import cannot_tell, rivals
 from studies.gap.beforehand import seen_first
-from studies.gap.records import beside_lead, changes_instead
+from studies.gap.records import beside_lead, changes_instead, repeats_instead
 from studies.gap.words import (
     ahead,
     by_place,
@@ -50,7 +50,7 @@ def lead(result: GapResult, tolerance: float | None = None) -> str:
         result: What was found.
         tolerance: Forecast error that does not matter.
     """
-    first = seen_first(result) or changes_instead(result)
+    first = seen_first(result) or changes_instead(result) or repeats_instead(result)
     told = _named_share(result, tolerance)
     told = f"{first}{told[:1].lower()}{told[1:]}" if first else told
     return told + beside_lead(result)

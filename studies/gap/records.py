@@ -103,12 +103,30 @@ def on_the_way(changing: Changing) -> str:
 
 def repeating(periodic: Periodic) -> str:
     """What would take most of what is left off if it acted at one frequency, a clause."""
-    size = quantity_text(periodic.size, periodic.unit)
     return (
-        f"it looks like something that repeats at {periodic.frequency:.3g} Hz and acts on "
-        f"{periodic.joint} with an amplitude of about {size}, which would take "
+        f"it looks like {_repeats(periodic)}, which would take "
         f"{percent(periodic.taken)} of the squared residual off: a vibration or a ripple that was "
         "not logged; it is not added: log it as an input, or let the simulator make it"
+    )
+
+
+def repeats_instead(result: GapResult) -> str:
+    """Before the first sentence: what repeats in place of a part that is not certain."""
+    periodic = result.periodic
+    sure = {verdict.label for verdict in result.verdicts if verdict.kind == "confirmed"}
+    if periodic is None or not periodic.instead or periodic.instead in sure:
+        return ""
+    return (
+        f"It looks like {_repeats(periodic)}, and was not logged: "
+        f"{effect_name(periodic.instead)} stands for whatever swings so. If that is not it: "
+    )
+
+
+def _repeats(periodic: Periodic) -> str:
+    size = quantity_text(periodic.size, periodic.unit)
+    return (
+        f"something that repeats at {periodic.frequency:.3g} Hz and acts on {periodic.joint} with "
+        f"an amplitude of about {size}"
     )
 
 

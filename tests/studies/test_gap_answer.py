@@ -17,7 +17,7 @@ from residual.gap.result import (
     Verdict,
 )  # fmt: skip
 from sims import Channel
-from sims.effects import ParameterChange
+from sims.effects import ActuatorLag, Delay, FrictionCurve, ParameterChange
 from studies.gap.answer import headline, notes
 from studies.gap.lead import lead
 from studies.gap.numbers import times_of
@@ -191,6 +191,27 @@ def test_late_sensors_look_like_inputs_that_are_all_late(inputs, nearly, said):
         found.corrected.action_channels = (*found.corrected.action_channels, two)
     told = [note for note in notes(DELAY, found) if "sensors that are late" in note]
     assert len(told) == bool(said) and all(said in note for note in told)
+
+
+@pytest.mark.parametrize(("left", "told"), [(3.4, True), (1.3, False)])
+def test_points_of_a_curve_miss_the_law_where_more_than_noise_is_left(left, told):
+    points = {name: Number(1.0, 0.9, 1.1, "N m") for name in ("slow", "medium", "fast")}
+    share = Span(0.9, 0.8, 1.0)
+    curve = Verdict("confirmed", "friction_curve", "pivot", points, (), "", "never parsed", share)
+    found = result(curve, effects=[FrictionCurve("pivot", 1.0, 1.0, 1.0, 9.0)])
+    gap = dataclasses.replace(found.gap, windows_after=left)
+    said = notes(curve, dataclasses.replace(found, adequate=False, gap=gap))
+    assert any("the law may depart from these points" in note for note in said) is told
+
+
+@pytest.mark.parametrize("adequate", [False, True])
+def test_a_delay_beside_a_lag_may_be_a_second_lag_where_something_is_left(adequate):
+    path = [Delay("voltage", 0.02), ActuatorLag("voltage", 0.06)]
+    found = dataclasses.replace(result(DELAY, effects=path), adequate=adequate)
+    told = any("two lags in a row" in note for note in notes(DELAY, found))
+    assert told is not adequate
+    alone = dataclasses.replace(result(DELAY, effects=path[:1]), adequate=False)
+    assert not any("two lags" in note for note in notes(DELAY, alone))
 
 
 @pytest.mark.parametrize(("share", "error", "told"), [(0.4, 0.8, True), (-0.1, 1.05, False)])

@@ -17,7 +17,7 @@ from residual.gap.confirmation.size import may_vanish
 from residual.gap.confirmation.tolerance import allow_for_parameters
 from residual.gap.fitting.contract import Left
 from residual.gap.fitting.forecasts import main_channel, noise_floor
-from residual.gap.fitting.plausible import stands_still
+from residual.gap.fitting.plausible import ratios, stands_still
 from residual.gap.search.choice import better_fit
 from residual.gap.search.comparisons import material
 from residual.gap.search.exchange import add_exchanged, add_without_each
@@ -34,6 +34,9 @@ RIVALS, FEW = 3, 3
 LIKELIER = 0.1
 #: Residual over noise from which on much is left.
 FAR = 10.0
+#: Residual over noise from which on something clearly has no name, and times a parameter may be its
+#: nominal value, either way, to be believed beside that.
+NOTABLE, SEVERAL = 3.0, 4.0
 #: Rise of the loss with inputs held the other way, as a share of it, that rules that out.
 OTHER_HOLD = 0.5
 
@@ -134,7 +137,7 @@ def confirm(
                 continue
         if not lost:
             leads = tuple(label for label in leads if label not in search.labels(key))
-            return _in_time(Answer(found, key, tuple(made), leads))
+            return with_stand_ins(_in_time(Answer(found, key, tuple(made), leads)))
         # The one that matters least goes first: what is left may have fewer rivals.
         gone = lost[-1].number
         leads = (search.candidates[gone].label, *leads)
@@ -149,19 +152,41 @@ def confirm(
 
 def _much(found: Explanation, key: Key) -> bool:
     """Whether what a set leaves is many times the noise."""
-    search = found.search
-    left = search.fitter.left
-    return not found.adequate and left(search.tried[key], found.floor).ratio >= FAR
+    return much(Answer(found, key, (), ()))
 
 
 def _in_time(answer: Answer) -> Answer:
     """An answer of which nothing is certain where much is left, and there was no time to ask what
     may stand in place of one of its effects: the others may make up for that one."""
-    late = any(claim.unasked for claim in answer.claims)
-    if not (late and _much(answer.found, answer.key)):
-        return answer
+    return untimely(answer) if any(claim.unasked for claim in answer.claims) else answer
+
+
+def untimely(answer: Answer) -> Answer:
+    """An answer for which there was no time to ask something: nothing is certain of it where much
+    is left."""
     claims = (dataclasses.replace(claim, unasked=True) for claim in answer.claims)
-    return dataclasses.replace(answer, claims=tuple(claims))
+    return dataclasses.replace(answer, claims=tuple(claims)) if much(answer) else answer
+
+
+def much(answer: Answer) -> bool:
+    """Whether what an answer leaves is many times the noise."""
+    return not answer.found.adequate and answer.left.ratio >= FAR
+
+
+def with_stand_ins(answer: Answer) -> Answer:
+    """An answer in which parameters several times their nominal values, or a fraction of them, are
+    not certain beside a remainder: so far off they may stand for a law of another form."""
+    if answer.found.adequate or answer.left.ratio < NOTABLE:
+        return answer
+    fit = answer.found.search.tried[answer.key]
+    found = ratios(fit.model.bind(fit.theta), fit.model.added(fit.theta))
+    off = {answer.key[n] for n, ratio in found.items() if not 1 / SEVERAL <= ratio <= SEVERAL}
+    return dataclasses.replace(
+        answer,
+        claims=tuple(
+            dataclasses.replace(claim, stretched=claim.number in off) for claim in answer.claims
+        ),
+    )
 
 
 def likelier(search: Search, key: Key, asked: set[Key]) -> Key:

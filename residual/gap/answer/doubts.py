@@ -26,6 +26,8 @@ DOUBTS: dict[Doubt, str] = {
     "off where it does",
     "extreme": "a parameter or an input would be more than ten times off, or act the other way, so "
     "see first whether the simulator has it right",
+    "stretched": "a parameter so many times its nominal value, or so small a part of it, may stand "
+    "for a law of another form, and something has no name",
     "orders": "torques that repeat along a turn fit whatever follows the position, where there are "
     "several or something has no name",
     "levels": "its input rests at no more levels than its laws have numbers, so that other laws "
@@ -85,6 +87,7 @@ def doubts(
         "conventions": claim.counted,
         "cut_off": claim.cut_off,
         "extreme": claim.extreme,
+        "stretched": claim.stretched,
         "orders": claim.orders,
         "levels": claim.few_levels,
         "loop": claim.in_a_loop,

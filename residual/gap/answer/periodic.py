@@ -8,6 +8,8 @@ harmonics of whatever is missing, and so does a pendulum that swings freely.
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import percentile_filter
@@ -21,6 +23,8 @@ from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model import paths
 from residual.gap.model.candidates import candidates
+from residual.gap.search.pool import Key
+from sims.effects.flexible import FlexiblePart
 from sims.effects.joint import ConstantLoad
 
 Array = NDArray[np.float64]
@@ -37,16 +41,33 @@ FRACTIONS = (1, 2, 3, 4, 5)
 
 
 def periodic(answer: Answer) -> Periodic | None:
-    """The joint and frequency of a force that would take most of what is left off, if there is one.
+    """The joint and frequency of a force that would take most of what is left off, if there is one;
+    or of what a part on a spring leaves if it is taken out.
+
+    Such a part swings from a state of its own in every window, and stands for whatever swings so.
 
     Args:
         answer: What was named.
     """
+    found = _repeating(answer, answer.key)
     search = answer.found.search
-    fitter, fit = search.fitter, search.tried[answer.key]
-    if not isinstance(fitter, SmoothFitter) or answer.left.adequate:
+    for claim in () if found else answer.claims:
+        effect = search.candidates[claim.number].effect
+        rest = tuple(number for number in answer.key if number != claim.number)
+        if isinstance(effect, FlexiblePart) and rest in search.tried:
+            found = _repeating(answer, rest)
+            found = found and dataclasses.replace(found, instead=str(effect))
+    return found
+
+
+def _repeating(answer: Answer, key: Key) -> Periodic | None:
+    """The same of what a set leaves."""
+    search = answer.found.search
+    fitter, fit = search.fitter, search.tried[key]
+    if not isinstance(fitter, SmoothFitter):
         return None
-    if answer.left.ratio < NOTABLE:
+    left = fitter.left(fit, answer.found.floor)
+    if left.adequate or left.ratio < NOTABLE:
         return None
     samples, model = fitter.samples, fit.model
     nodes = paths.measured(model, samples, fit.theta)

@@ -50,6 +50,7 @@ class Claim:
         counted: Whether the log may count otherwise than the simulator does.
         cut_off: Whether the simulator stays the same beyond a value that was recorded.
         extreme: Whether a number of its set is out of all proportion to the simulator's.
+        stretched: Whether it is a parameter several times its nominal value beside a remainder.
         orders: Whether it repeats along a turn, and is one of several that do, or beside a
             remainder: together they fit whatever follows the position.
         few_levels: Whether its input rests at as few levels as the laws of it have numbers.
@@ -90,6 +91,7 @@ class Claim:
     counted: bool = False
     cut_off: bool = False
     extreme: bool = False
+    stretched: bool = False
     orders: bool = False
     few_levels: bool = False
     in_a_loop: bool = False
@@ -130,6 +132,7 @@ class Claim:
             self.counted,
             self.cut_off,
             self.extreme,
+            self.stretched,
             self.orders,
             self.few_levels,
             self.in_a_loop,

@@ -76,6 +76,11 @@ def test_degrees_without_a_measured_rate_are_found_by_plausibility(csv):
     assert "jumps by about 360" in error(csv(angle=compass), states={"angle": "angle"})
 
 
+def test_what_turns_a_dozen_times_faster_than_usual_is_read(csv):
+    quick = {"angle": 12 * swing()["time"], "rate": np.full(200, 12.0)}
+    assert "kinematics" not in kinds(read(csv(**quick)))
+
+
 def test_stating_the_unit_settles_the_matter(csv):
     fast = {"angle": 250 * swing()["time"], "rate": np.full(200, 250.0)}
     assert "set unit: deg" in error(csv(**fast))

@@ -19,6 +19,7 @@ def test_what_cannot_be_right_without_the_others_goes_too(monkeypatch):
     monkeypatch.setattr(confirmed, "nameable", lambda search, claim, *_: claim.number != 2)
     monkeypatch.setattr(confirmed, "allow_for_parameters", lambda search, key, made, *_: made)
     monkeypatch.setattr(confirmed, "_much", lambda *_: False)
+    monkeypatch.setattr(confirmed, "with_stand_ins", lambda answer: answer)
     monkeypatch.setattr(confirmed, "other_numerics", lambda *_: [])
     monkeypatch.setattr(confirmed, "in_plain_form", lambda *_: None)
     monkeypatch.setattr(confirmed, "may_vanish", lambda *_: False)

@@ -6,6 +6,7 @@ from trolley import DT, ROWS, Trolley
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
+from sims.effects import FlexiblePart
 from studies.gap.files import gap_record
 from studies.gap.summary import summary
 
@@ -61,3 +62,15 @@ def test_friction_that_is_missing_repeats_no_more_than_its_drive(swings):
 
 def test_nothing_repeats_where_nothing_is_missing():
     assert ask(runs()).periodic is None
+
+
+def test_a_part_on_a_spring_does_not_hide_what_repeats():
+    found = find_gap(
+        Trolley(), runs(lambda time, phase: 1.5 * np.sin(2 * np.pi * 2.3 * time + phase)),
+        effects=FlexiblePart("place"), minutes=1,
+    )  # fmt: skip
+    assert not any(verdict.kind == "confirmed" for verdict in found.verdicts)
+    assert found.effects and found.periodic.instead == "flexible_part@place"
+    told = " ".join(summary(found).split())
+    assert told.startswith("It looks like something that repeats at 2.")
+    assert "flexible part at place stands for whatever swings so. If that is not it" in told
