@@ -63,4 +63,6 @@ from sims.effects.sensor import SensorEffect as SensorEffect
 from sims.effects.sensor import SensorOffset as SensorOffset
 from sims.effects.sensor import SensorScale as SensorScale
 from sims.effects.slew import SlewLimit as SlewLimit
+from sims.effects.stop import LowerStop as LowerStop
+from sims.effects.stop import UpperStop as UpperStop
 from sims.effects.store import SecondStore as SecondStore

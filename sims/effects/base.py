@@ -136,6 +136,7 @@ class Effect(abc.ABC):
         looks_like: What outside the library moves a system in the same way if the effect is in all
             its inputs, in words.
         creeps: True if it is a constant that is seldom one for long, as zeros of sensors are.
+        comes_with: Name of an effect that is usually there, too, where it is.
         turns: Part of a turn that data have to cover for it to be told from what does not turn.
         compound: True if its strengths are parts of one size, so that any one of them may be zero.
     """
@@ -151,6 +152,7 @@ class Effect(abc.ABC):
     holds_still: ClassVar[bool] = False
     drives: ClassVar[bool] = False
     creeps: ClassVar[bool] = False
+    comes_with: ClassVar[str] = ""
     turns: ClassVar[float] = 0.0
     compound: ClassVar[bool] = False
     looks_like: ClassVar[str] = ""

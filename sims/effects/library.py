@@ -55,6 +55,7 @@ from sims.effects.pull import pulled_by_position, pulled_by_turn
 from sims.effects.response import AsymmetricResponse
 from sims.effects.sensor import EncoderScale, SensorOffset, SensorScale
 from sims.effects.slew import SlewLimit
+from sims.effects.stop import LowerStop, UpperStop
 from sims.effects.store import SecondStore
 from sims.simulator import random_values
 
@@ -168,14 +169,17 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
 
     Friction by load of every joint that the inputs move by themselves; states that fall at another
     pace than they rise, rub otherwise backwards, lose a constant or by a power, have an inertia by
-    their angle, act on others or are linked to them; inputs that act otherwise below zero or
-    through a play, and, but for goals, that are followed at a limited pace; encoders off their
-    axis.
+    their angle, run into stops, act on others or are linked to them; inputs that act otherwise
+    below zero or through a play, and, but for goals, that are followed at a limited pace; encoders
+    off their axis.
     """
     found: list[Effect] = list(_geared(simulator))
     inputs = [channel.name for channel in simulator.action_channels]
     inputs += [AND.join(names) for names in like_inputs(simulator)]
-    kinds = AsymmetricResponse, AsymmetricDamping, ConstantLoss, PowerLoss, CrankInertia
+    kinds = (
+        AsymmetricResponse, AsymmetricDamping, ConstantLoss, PowerLoss, CrankInertia, UpperStop,
+        LowerStop,
+    )  # fmt: skip
     both: list[Effect] = [kind(joint.name) for kind in kinds for joint in simulator.joints]
     both += [Coupling(BY.join(names)) for names in coupled_states(simulator)]
     links = itertools.product((CouplingSpring, CouplingDamper), linked_joints(simulator))

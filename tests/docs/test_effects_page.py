@@ -76,6 +76,7 @@ OTHERS = [
     effects.Hysteresis("voltage"), effects.Coupling("pivot by elbow"),
     effects.CouplingSpring("pivot and elbow"), effects.CouplingDamper("pivot and elbow"),
     effects.CrankInertia("pivot"), effects.EccentricEncoder("angle"),
+    effects.UpperStop("pivot"), effects.LowerStop("pivot"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}

@@ -15,6 +15,7 @@ from residual.gap.model.reach import (
     full_command,
     greatest_rate,
     measured_range,
+    runs_into,
     turns_enough,
     within_reach,
 )
@@ -32,6 +33,7 @@ from sims.effects.link import Link
 from sims.effects.loss import PowerLoss
 from sims.effects.pull import ELSEWHERE
 from sims.effects.sensor import SensorEffect
+from sims.effects.stop import Stop
 from sims.effects.store import SecondStore
 from sims.host import HostSimulator
 from sims.simulator import Joint
@@ -181,6 +183,8 @@ def candidates(
             if not _both_ways(samples, columns[joint.position], columns.get(str(joint.rate))):
                 continue
         if not turns_enough(effect, simulator, samples):
+            continue
+        if isinstance(effect, Stop) and not runs_into(effect, simulator, samples):
             continue
         known = within_reach(effect, simulator, samples, seconds)
         whole = {n: q for n, q in known.items() if q.integer and q.role == "shape"}

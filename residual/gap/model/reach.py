@@ -11,12 +11,15 @@ from sims.effects.base import Effect, Quantity
 from sims.effects.flexible import FlexiblePart
 from sims.effects.limit import RateLimit
 from sims.effects.link import CouplingSpring
+from sims.effects.stop import Stop
 from sims.effects.store import SecondStore
 from sims.host import HostSimulator
 from sims.simulator import Channel
 
 #: Part of an input's bound that a log has to reach to tell of full commands.
 NEAR_FULL = 0.5
+#: Part of a way that is near its end, and times that a log comes there if it is stopped.
+NEAR_END, AGAIN = 0.05, 3
 #: A limit of a rate is looked for up to so many times the fastest motion over so many rows.
 BEYOND, SPAN = 1.2, 5
 #: Time constants of a store that are tried, as parts of the longest record.
@@ -67,6 +70,21 @@ def turns_enough(effect: Effect, simulator: HostSimulator, samples: Samples) -> 
     column = names.index(effect.where if joint is None else joint.position)
     low, high = measured_range(samples, column)
     return high - low >= effect.turns * (simulator.physical_channels[column].turn or np.inf)
+
+
+def runs_into(stop: Stop, simulator: HostSimulator, samples: Samples) -> bool:
+    """Whether a joint came near the end of the way that was measured again and again, as where it
+    is stopped; what turns on and on is there once."""
+    joint = next(j for j in simulator.joints if j.name == stop.joint)
+    names = [channel.name for channel in simulator.physical_channels]
+    place = samples.seen[:, names.index(joint.position)]
+    if not np.isfinite(place).any():
+        return False
+    low, high = float(np.nanmin(place)), float(np.nanmax(place))
+    farthest = stop.places(low, high)[0]
+    near = stop.side * (place - farthest) > -NEAR_END * (high - low)
+    comings = sum(int(np.sum(np.diff(near[a:b].astype(int)) > 0)) for a, b in samples.runs)
+    return comings >= AGAIN
 
 
 def _longest(samples: Samples) -> float:
@@ -125,6 +143,10 @@ def within_reach(
     scale, turn = channel.scale, channel.turn
     reach = max(1.0, max(abs(low), abs(high)) / scale)
     beyond = max(high - low, scale)
+    if isinstance(effect, Stop):
+        starts = effect.places(low, high)
+        at = dataclasses.replace(known["at"], low=low, high=high, starts=starts)
+        return {**known, "at": at}
     found = {}
     for field in dataclasses.fields(effect):
         quantity = known.get(field.name)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from residual.gap.fitting.screening import Signatures, gains, pair_gains, project_out
 from residual.gap.model.candidates import Candidate
 from residual.gap.search.measured_path import MeasuredPath
+from sims.effects.base import Effect
 
 #: Part of the cost that the library's best effects may leave without others being looked at.
 LITTLE = 0.05
@@ -67,11 +68,18 @@ def _standing_out(
 
 
 def of_one_pair(pool: Sequence[Candidate]) -> list[tuple[int, int]]:
-    """Numbers of two effects between the same two joints: a gyroscope couples its axes both ways,
-    a belt is a spring and a damper."""
-    pairs = [sorted(one.effect.pair) for one in pool]
+    """Numbers of two effects between the same two joints, or of two that come together: a gyroscope
+    couples its axes both ways, a belt is a spring and a damper, a way has two ends."""
+    effects = [one.effect for one in pool]
     both = itertools.combinations(range(len(pool)), 2)
-    return [(a, b) for a, b in both if pairs[a] and pairs[a] == pairs[b]]
+    return [(a, b) for a, b in both if _belong(effects[a], effects[b])]
+
+
+def _belong(one: Effect, other: Effect) -> bool:
+    if one.pair:
+        return sorted(one.pair) == sorted(other.pair)
+    together = one.name == other.comes_with or other.name == one.comes_with
+    return together and one.where == other.where
 
 
 def _together(found: Signatures, two: tuple[int, int]) -> float:
