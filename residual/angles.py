@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 #: Movement between rows in rad, by its rate, from which a wrapped angle may have gone further than
 #: half a turn, noise and acceleration included.
 FAR = 0.5 * np.pi
+#: Range in rad, noise allowed for, beyond which an angle was not cut at a turn, and between which
+#: quantiles: a few wild readings say nothing.
+ONE_TURN, MOST = 1.05 * 2 * np.pi, (0.01, 0.99)
 #: Distance in rad between an angle's movement and that by its rate, in nine rows of ten, up to
 #: which the rate belongs to it: of one in another unit it is up to pi.
 AGREES = 1.0
@@ -24,7 +27,8 @@ def unwrapped(values: Array, times: Array, rates: Array | None = None) -> Array:
 
     Between rows it is taken to go the shorter way round, or, where its rate says that it moves by
     more than a quarter of a turn, to where the mean of both rows' rates leads. A rate that does not
-    agree with the angle, as one in another unit, is left alone.
+    agree with the angle, as one in another unit, is left alone. What goes beyond one turn already
+    was not cut: it jumps where samples are missing or stand still, and stays as it is.
 
     Args:
         values: The angle, shape (n,); NaN where it was not measured.
@@ -34,6 +38,8 @@ def unwrapped(values: Array, times: Array, rates: Array | None = None) -> Array:
     found = values.copy()
     known = np.isfinite(values)
     angle, went = values[known], np.diff(values[known])
+    if known.any() and np.ptp(np.quantile(angle, MOST)) > ONE_TURN:
+        return found
     found[known] = np.unwrap(angle)
     if rates is None or not len(went):
         return found

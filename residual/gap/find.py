@@ -13,7 +13,7 @@ from residual.gap.answer.answer import summed_up, told
 from residual.gap.answer.apart import NOT_JUDGED, judged_apart
 from residual.gap.answer.changing import changing, in_place
 from residual.gap.answer.confirmed import matters
-from residual.gap.answer.encoders import by_an_encoder
+from residual.gap.answer.encoders import by_sensor_or_clock
 from residual.gap.answer.ends import with_fitted_ends
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.out_of_proportion import out_of_proportion
@@ -170,7 +170,8 @@ def find_gap(
                 replace(
                     claim,
                     swapped=claim.number in either,
-                    counted=conventions is not None or by_an_encoder(claim, log.rescaled),
+                    counted=conventions is not None
+                    or by_sensor_or_clock(claim, answer.found.search, log.rescaled),
                     cut_off=bool(log.cut_off),
                     unlike=stands_for(answer, claim, differ),
                     drifts=claim.drifts or in_place(over_time, along_records=True),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import difflib
+from collections.abc import Container, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ from sims.simulator import Channel
 
 Array = NDArray[np.float64]
 
+#: Likeness of two names from which on one may be the other, misspelt.
+NEAR = 0.8
 # Beyond it, in SI, sums of squares lose all meaning; nanoseconds since 1970 are well below.
 _LARGEST = 1e15
 
@@ -63,6 +66,9 @@ def runs_of(
     if not alone:
         _refuse_absent(table, found)
     time = time_column(table, columns.time, findings)
+    if not columns.states:
+        read = {str(column.column) for column in (*found.values(), *inputs.values(), time)}
+        _tell_misspelt(table, [c.name for c in states if c.name not in found], read, findings)
     times = _si(table, time, TIME, columns.decimal)
     seen = [
         _si(table, found[channel.name], channel, columns.decimal)
@@ -118,6 +124,22 @@ def runs_of(
                 inputs_matrix[part],
                 converted,
             )
+
+
+def _tell_misspelt(
+    table: Table, lacking: Sequence[str], read: Container[str], findings: list[Finding]
+) -> None:
+    """Tell of a column that is not read and is named nearly as a state that has none."""
+    told = {finding.where for finding in findings if finding.kind == "misspelt"}
+    unread = [str(name) for name in table.names if str(name) not in read]
+    for name in lacking:
+        near = difflib.get_close_matches(name, unread, 1, NEAR)
+        if near and name not in told:
+            says = (
+                f"has no column of its name, but there is {near[0]!r}, which is not read: if it is "
+                "that, say so under states, with --columns FILE"
+            )
+            findings.append(Finding("misspelt", name, says, {}, "warning"))
 
 
 def _refuse_absent(table: Table, states: Mapping[str, Column]) -> None:

@@ -244,10 +244,13 @@ def _what(result: GapResult) -> str:
 
 
 def _briefly(verdict: Verdict, result: GapResult) -> str:
-    """The family if the form is undecided, else the effect."""
-    if not verdict.family:
-        return effect_name(_short(verdict, result))
-    _, at, place = effect_name(_short(verdict, result)).partition(" at ")
+    """The family if the form is undecided and nothing else named is of it, else the effect."""
+    name = effect_name(_short(verdict, result))
+    named = [v for v in result.verdicts if v.kind in ("confirmed", "ambiguous")]
+    of_it = [v for v in named if (v.family, v.where) == (verdict.family, verdict.where)]
+    if not verdict.family or len(of_it) > 1:
+        return name
+    _, at, place = name.partition(" at ")
     return f"{verdict.family}{at}{place}"
 
 

@@ -56,3 +56,12 @@ def test_rows_without_an_angle_stay_so():
 @pytest.mark.parametrize("count", [0, 1])
 def test_of_fewer_than_two_rows_nothing_is_to_be_done(count):
     assert unwrapped(np.ones(count), np.ones(count), np.ones(count)).tolist() == [1.0] * count
+
+
+@given(st.floats(0.1, 3.0), st.integers(0, 99), st.integers(40, 150))
+def test_what_goes_beyond_a_turn_was_not_cut_and_keeps_its_jumps(beyond, seed, row):
+    angle, rate = turning(20.0, seed)
+    held = angle.copy()
+    held[row : row + 9] = held[row]  # a reading that stands still, and jumps on
+    held[row + 9 :] += (np.pi + beyond) * np.sign(rate[row])
+    assert np.array_equal(unwrapped(held, TIMES, rate), held)

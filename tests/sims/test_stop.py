@@ -41,8 +41,8 @@ def test_a_cart_between_two_bumpers_moves_as_scipy_says():
         x = solve_ivp(rates, (0, 0.01), x, rtol=1e-9, atol=1e-11, args=(push,), max_step=5e-4).y[
             :, -1
         ]
-        assert path[k + 1] == pytest.approx(x, abs=2e-3)
-    assert 0.2 < path[:, 0].max() < 0.21 and -0.11 < path[:, 0].min() < -0.1
+        assert path[k + 1] == pytest.approx(x, abs=5e-3)
+    assert 0.2 < path[:, 0].max() < 0.22 and -0.12 < path[:, 0].min() < -0.1
 
 
 @given(st.floats(-1, 1), st.floats(-10, 10), st.floats(0, 1e4), st.floats(0, 1e3))

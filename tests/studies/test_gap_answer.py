@@ -204,6 +204,13 @@ def test_points_of_a_curve_miss_the_law_where_more_than_noise_is_left(left, told
     assert any("the law may depart from these points" in note for note in said) is told
 
 
+def test_two_of_one_family_are_told_by_their_own_names():
+    drag = dataclasses.replace(FRICTION, kind="ambiguous", effect="quadratic_drag")
+    assert "dissipation" in lead(result(FRICTION)) and "riction" not in lead(result(FRICTION))
+    both = lead(result(FRICTION, drag))
+    assert "Coulomb friction and perhaps quadratic drag" in both and "dissipation" not in both
+
+
 @pytest.mark.parametrize("adequate", [False, True])
 def test_a_delay_beside_a_lag_may_be_a_second_lag_where_something_is_left(adequate):
     path = [Delay("voltage", 0.02), ActuatorLag("voltage", 0.06)]

@@ -56,7 +56,8 @@ def kinematics(
             says = (
                 f"changes {scale:.4f} times as much as the integral of {channel.name}: "
                 f"{channel.name} was multiplied by {scale:.4f}; if it is {channel.rate_of} that "
-                "reads wrongly, both do now"
+                "reads wrongly, both do now, and if it is the clock, whatever has a time in its "
+                "unit is off by as much"
             )
             numbers = {"scale": scale}
             findings.append(Finding("kinematics", channel.rate_of, says, numbers, "warning"))

@@ -60,7 +60,7 @@ def test_a_stop_is_looked_for_where_motion_ends_again_and_again():
         found = candidates(cart, further_in(cart), Samples.join(runs, 4))
         return {one.name for one in found if isinstance(one.effect, UpperStop | LowerStop)}
 
-    assert sought(logs(UPPER, LOWER, 2.0)) == {"upper_stop", "lower_stop"}
+    assert sought(logs(UPPER, LOWER, 4.0)) == {"upper_stop", "lower_stop"}
     times = DT * np.arange(400)
     once = np.column_stack([0.3 * times, np.full(400, np.nan)])
     assert sought([Trajectory("one way", times, once, np.zeros((399, 1)))]) == set()

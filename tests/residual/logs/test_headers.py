@@ -126,3 +126,16 @@ def test_a_comment_that_does_not_name_every_column_is_no_header(tmp_path, above)
         assert len(read(path).trajectories) == 1
     else:
         assert "holds only numbers" in error(path)
+
+
+def test_a_column_named_nearly_as_a_state_is_told_and_not_read(tmp_path):
+    columns = swing()
+    logged = {"angel" if name == "angle" else name: values for name, values in columns.items()}
+    data = read(write(tmp_path / "log.csv", logged))
+    (told,) = [finding for finding in data.findings if finding.kind == "misspelt"]
+    assert told.where == "angle" and "'angel', which is not read" in told.says
+    assert np.isnan(data.trajectories[0].states[:, 0]).all()
+    # Whoever says which column is which leaves the others out on purpose.
+    given = read(tmp_path / "log.csv", states={"rate": "rate"})
+    assert "misspelt" not in kinds(given)
+    assert "misspelt" not in kinds(read(write(tmp_path / "other.csv", columns)))
