@@ -16,10 +16,6 @@ from sims.simulator import Channel, wrap
 
 Array = NDArray[np.float64]
 
-# Speed that no joint of an unstated unit is believed to reach, in rad/s (570 rpm), and the
-# multiple of its channel's declared scale: slow motion in deg/s is already beyond both.
-_FASTEST, _TIMES_SCALE = 60.0, 20.0
-
 # Spans over which positions are compared, in samples: long ones beat noise, short ones turns.
 _SPANS = (1, 2, 4, 8, 16, 32)
 
@@ -101,6 +97,7 @@ def check_rate(position: Signal, rate: Signal, where: str) -> list[Finding]:
                     f"{position.channel.name!r} is not the integral of {rate.channel.name!r}, and "
                     "would be then)"
                 )
+        _refuse_exchanged(position, rate)
     if not math.isfinite(as_is):
         return []
     scaled = [(_scale(m, i, turning), m, i) for m, i in spans]
@@ -125,38 +122,15 @@ def check_rate(position: Signal, rate: Signal, where: str) -> list[Finding]:
     return [Finding("kinematics", where, says, {"scale": scale})]
 
 
-def check_plausible(signal: Signal, rate_scale: float | None) -> None:
-    """Look for degrees in an angle, or its rate, whose unit the config does not state.
-
-    Args:
-        signal: An angle in rad or a rate in rad/s.
-        rate_scale: Typical rate in rad/s, if the simulator declares one.
-
-    Raises:
-        ValueError: The values look like degrees.
-    """
-    unit = signal.channel.unit
-    if signal.unit or unit not in ("rad", "rad/s") or not signal.runs:
-        return
-    others, units = ("degrees", "unit: deg") if unit == "rad" else (
-        "degrees per second or revolutions per minute", "unit: deg/s or unit: rpm"
-    )  # fmt: skip
-    advice = f"looks like {others}: set {units} (or unit: {unit} if that is right)"
-    name = f"column {signal.column!r}: the channel {signal.channel.name!r}"
-    if unit == "rad" and _jumps_by_360(signal):
-        raise ValueError(f"{name} jumps by about 360, as a compass does; {advice}")
-    speeds = [
-        np.abs(values) if unit == "rad/s" else _speeds(times, values)
-        for times, values in signal.runs
-    ]
-    speed = np.concatenate(speeds)
-    speed = speed[np.isfinite(speed)]
-    limit = _TIMES_SCALE * rate_scale if rate_scale else _FASTEST
-    fast = float(np.quantile(speed, 0.95)) if speed.size else 0.0
-    if fast > limit:
-        moves = "reaches" if unit == "rad/s" else "turns by up to"
+def _refuse_exchanged(position: Signal, rate: Signal) -> None:
+    """Refuse two columns of which the second moves as the integral of the first."""
+    turned = [_changes(rate, position, span) for span in _SPANS]
+    misfits = [_misfit(*change, turning=False) for change in turned if change[0].size >= 25]
+    if min(misfits, default=math.inf) < 0.3:
         raise ValueError(
-            f"{name} {moves} {fast:.3g} rad/s, expected at most about {limit:.3g}; {advice}"
+            f"columns {position.column!r} and {rate.column!r} look exchanged: the change of "
+            f"{rate.channel.name!r} is the integral of {position.channel.name!r}; say under states "
+            "which is which, with --columns FILE"
         )
 
 
@@ -210,7 +184,8 @@ def _repairs(position: Signal, rate: Signal) -> list[Repair]:
         return not common, bool(repair[0].unit)
 
     repairs.sort(key=unlikely)
-    return [*repairs, (rate, "scale: -1", (1.0, -1.0))]
+    turned = (rate, "scale: -1", (1.0, -1.0)), (position, "scale: -1", (-1.0, 1.0))
+    return [*repairs, *turned]
 
 
 def _changes(position: Signal, rate: Signal, span: int) -> tuple[Array, Array]:
@@ -267,26 +242,3 @@ def _moving(moved: Array, integral: Array, turning: bool) -> tuple[Array, Array]
     if chosen.any():
         chosen &= (size >= np.quantile(size[chosen], 0.6)) & (size > 0)
     return moved[chosen], integral[chosen]
-
-
-def _jumps_by_360(signal: Signal) -> bool:
-    steps = np.concatenate([np.diff(values) for _, values in signal.runs])
-    steps = np.abs(steps[np.isfinite(steps)])
-    jumps = (steps > 300) & (steps < 361)
-    return int(jumps.sum()) >= 2 and float(np.quantile(steps[~jumps], 0.95)) < 100
-
-
-def _speeds(times: Array, values: Array, span: int = 3) -> Array:
-    """Mean speeds over ``span`` samples: noise counts less, and a fast swing still shows.
-
-    Time stamps that come late, and then in a bunch, make nothing fast, and neither does an angle
-    that is cut at half a turn, or at a whole one as a compass is.
-    """
-    good = np.isfinite(values)
-    times, values = times[good], values[good]
-    if values.size and np.ptp(values) < 1.01 * 2 * np.pi:
-        values = np.unwrap(values)
-    span = min(span, max(1, len(times) // 4))
-    passed = times[span:] - times[:-span]
-    passed = np.maximum(passed, np.median(passed)) if len(passed) else passed
-    return np.abs(values[span:] - values[:-span]) / passed

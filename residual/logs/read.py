@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from residual.angles import with_whole_turns
-from residual.logs.checks import Finding, Signal, check_plausible, check_rate
+from residual.logs.checks import Finding, Signal, check_rate
 from residual.logs.layout import LogFormat, check_layout, named_column
 from residual.logs.overflow import continued
+from residual.logs.plausible import check_plausible
 from residual.logs.runs import runs_of
 from residual.logs.slower import filled
 from residual.logs.sources import matching, open_log

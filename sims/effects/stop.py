@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from sims.effects.base import number
 from sims.effects.joint import JointEffect, Value
+
+if TYPE_CHECKING:
+    from sims.host import HostSimulator
 
 #: Where a stop may be, as parts of the way that was measured, from the end on that side.
 PLACES = (0.005, 0.03, 0.1)
@@ -36,6 +40,13 @@ class Stop(JointEffect):
         deep = self.side * (q - self.at)
         push = np.maximum(self.stiffness * deep + self.damping * self.side * v, 0.0)
         return -self.side * np.where(deep > 0, push, 0.0)
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """As for every joint effect; the joint needs a position."""
+        found = super().measures(simulator)
+        if "position" not in found:
+            raise ValueError(f"{self.name} needs a joint with a position; {self.joint!r} is a rate")
+        return found
 
     def places(self, low: float, high: float) -> tuple[float, ...]:
         """Where it is looked for on a way that was measured."""

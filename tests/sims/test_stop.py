@@ -61,6 +61,14 @@ class Tank(FirstOrderSystem):
         return u - x
 
 
+class Wheel(FirstOrderSystem):
+    state_channels = (Channel("speed", "rad/s", "rate"),)
+    action_channels = (Channel("torque", "N m", "input"),)
+
+    def derivative(self, x, u, p):
+        return u - x
+
+
 def test_they_are_rarer_effects_of_what_moves():
     found = set(map(str, further_in(Cart())))
     assert {"upper_stop@place", "lower_stop@place"} <= found
@@ -68,5 +76,6 @@ def test_they_are_rarer_effects_of_what_moves():
     assert {name: one.unit for name, one in known.items()} == {
         "stiffness": "N/m", "damping": "N s/m", "at": "m"
     }  # fmt: skip
-    for effect in (*library(Tank()), *further_in(Tank())):
-        assert not isinstance(effect, UpperStop | LowerStop)
+    for other in (Tank(), Wheel()):
+        for effect in (*library(other), *further_in(other)):
+            assert not isinstance(effect, UpperStop | LowerStop)

@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 
 #: Values of a position that tell nothing of a scale.
 FEW = 8
+#: Part of what a position moves by, squared, that its rate on another scale may leave: sensors of
+#: one motion leave less, whatever their noise.
+OTHER = 0.25
 #: Sampling steps by which a rate may be early or late for the way in which it was computed.
 LATE = 0.75
 
@@ -52,7 +55,8 @@ def kinematics(
         # Two rules that disagree say that the sampling is too coarse for this check.
         agree = abs(scale - other) < 0.25 * abs(scale - 1)
         clear = abs(scale - 1) > max(4 * error, 0.005)
-        if agree and clear and not (seen.by_zero(scale, error) or seen.by_noise):
+        sound = agree and clear and seen.follows(scale)
+        if sound and not (seen.by_zero(scale, error) or seen.by_noise):
             says = (
                 f"changes {scale:.4f} times as much as the integral of {channel.name}: "
                 f"{channel.name} was multiplied by {scale:.4f}; if it is {channel.rate_of} that "
@@ -144,6 +148,12 @@ class _Stretches:
         own, its = centred.scale(self.integral - self.integral.mean())
         apart = max(4 * float(np.hypot(error, its)), 0.25 * abs(scale - 1))
         return bool(np.isfinite(its) and abs(own - scale) > apart)
+
+    def follows(self, scale: float) -> bool:
+        """Whether the position does what the rate says on that scale: columns of something else
+        have a scale, too."""
+        left = self.moved - scale * self.integral
+        return bool(scale > 0 and left @ left < OTHER * (self.moved @ self.moved))
 
     def scale(self, z: Array) -> tuple[float, float]:
         """Change of the position per integral of the rate, with its standard error."""

@@ -81,6 +81,18 @@ def test_what_turns_a_dozen_times_faster_than_usual_is_read(csv):
     assert "kinematics" not in kinds(read(csv(**quick)))
 
 
+def test_exchanged_columns_are_refused_as_such(csv):
+    columns = swing()
+    message = error(csv(angle=columns["rate"], rate=columns["angle"]))
+    assert "columns 'angle' and 'rate' look exchanged" in message and "--columns" in message
+
+
+def test_a_wrong_sign_may_be_that_of_either_column(csv):
+    message = error(csv(angle=-swing()["angle"]))
+    assert "'rate' has the wrong sign: set scale: -1" in message
+    assert "or if that is right set scale: -1 for column 'angle'" in message
+
+
 def test_stating_the_unit_settles_the_matter(csv):
     fast = {"angle": 250 * swing()["time"], "rate": np.full(200, 250.0)}
     assert "set unit: deg" in error(csv(**fast))
