@@ -6,7 +6,13 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 
-from residual.gap.fitting.screening import Signatures, gains, pair_gains, project_out
+from residual.gap.fitting.screening import (
+    Signatures,
+    Variant,
+    gains,
+    pair_gains,
+    project_out,
+)
 from residual.gap.model.candidates import Candidate
 from residual.gap.search.measured_path import MeasuredPath
 from sims.effects.base import Effect
@@ -23,7 +29,9 @@ BESIDE = 3
 
 def at_sight(path: MeasuredPath, further: Sequence[Candidate]) -> list[Candidate]:
     """Those that leave a fraction of what the best of the library leaves in the linear picture,
-    alone, or two between the same joints; beside nothing, or beside the library's best effects.
+    alone, or two that belong together; beside nothing, or beside the library's best effects.
+
+    What acts in two places, or is two effects, has to leave less than two of the library do.
 
     Args:
         path: With what is on offer.
@@ -33,36 +41,51 @@ def at_sight(path: MeasuredPath, further: Sequence[Candidate]) -> list[Candidate
         return []
     own, others = path.offered, path.of(further)
     whole = float(own.residual @ own.residual)
+    chosen, left = _library(own)
     found: set[int] = set()
-    chosen: list[int] = []
-    for _ in range(BESIDE):
-        basis = own.matrix[:, chosen]
-        residual, matrix = (project_out(basis, one) for one in (own.residual, own.matrix))
-        best = gains(own, residual, matrix)[:1]
-        cost = float(residual @ residual)
-        left = cost - sum(gain.value for gain in best)
-        if left < LITTLE * whole:
+    for beside in range(BESIDE):
+        if left[beside + 1] < LITTLE * whole:
             break
+        columns = [column for variant in chosen[:beside] for column in variant.columns]
+        basis = own.matrix[:, columns]
         there = dataclasses.replace(
-            others, residual=residual, matrix=project_out(basis, others.matrix)
+            others,
+            residual=project_out(basis, own.residual),
+            matrix=project_out(basis, others.matrix),
         )
-        found |= _standing_out(there, further, cost, QUARTER * left)
-        chosen += [column for gain in best for column in own.variants[gain.variants[0]].columns]
+        most = [QUARTER * one for one in left[beside + 1 : beside + 3]]
+        found |= _standing_out(there, further, left[beside], most)
     return [one for number, one in enumerate(further) if number in found]
 
 
+def _library(own: Signatures) -> tuple[list[Variant], list[float]]:
+    """The library's best effects one after the other, and the cost that none of them leaves, the
+    first, the first two and so on."""
+    chosen: list[Variant] = []
+    left: list[float] = []
+    for _ in range(BESIDE + 2):
+        basis = own.matrix[:, [column for one in chosen for column in one.columns]]
+        residual, matrix = (project_out(basis, one) for one in (own.residual, own.matrix))
+        left.append(float(residual @ residual))
+        best = gains(own, residual, matrix)[:1]
+        chosen += [own.variants[gain.variants[0]] for gain in best]
+    return chosen, left
+
+
 def _standing_out(
-    others: Signatures, further: Sequence[Candidate], cost: float, most: float
+    others: Signatures, further: Sequence[Candidate], cost: float, most: Sequence[float]
 ) -> set[int]:
-    """Numbers of those that leave less than ``most`` of a cost, alone or with one of their pair."""
+    """Numbers of those that leave less than ``most[0]`` of a cost alone, or, in two places or with
+    one of their pair, less than ``most[1]``."""
     alone = dict.fromkeys(range(len(further)), 0.0)
     for gain in gains(others):
         number = others.variants[gain.variants[0]].candidate
         alone[number] = max(alone[number], gain.value)
-    found = {number for number, value in alone.items() if cost - value < most}
+    places = {number: 1 if one.effect.pair else 0 for number, one in enumerate(further)}
+    found = {number for number, value in alone.items() if cost - value < most[places[number]]}
     for two in of_one_pair(further):
         both = cost - _together(others, two)
-        if both < most and both < HALF * (cost - max(alone[n] for n in two)):
+        if both < most[1] and both < HALF * (cost - max(alone[n] for n in two)):
             found |= set(two)
     return found
 
