@@ -43,7 +43,7 @@ DOUBTS: dict[Doubt, str] = {
     "no_time": "there was no time to ask whether another effect, or parameters that are a few "
     "percent off, would do as well, give more --minutes",
     "may_be_zero": "its interval holds zero, or nearly",
-    "size_open": "it may be more than ten times as large as what fits best",
+    "size_open": "it may be many times as large as what fits best",
     "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
     "calibration": "parameters that are a few percent off would do nearly as well",
     "within": "its interval reaches into the few percent that are allowed to every parameter",

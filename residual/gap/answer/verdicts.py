@@ -67,7 +67,7 @@ def effect_verdict(
     effect = search.candidates[claim.number].effect
     vanishes = may_vanish(search, claim) if claim.there else may_be_none(search, claim)
     vanishes = vanishes or half_open(search, claim)
-    thin, wide = blocks < FEW and left > MUCH, size_open(search, claim)
+    thin, wide = blocks < FEW and left > MUCH, size_open(search, claim, left)
     sure = claim.sure and blocks >= TOO_FEW and not (vanishes or thin or wide)
     kind: Kind = "confirmed" if sure else "ambiguous"
     family = effect.family_in(search.simulator) if claim.form or blocks < FEW else ""

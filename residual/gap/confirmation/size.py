@@ -9,6 +9,7 @@ import numpy as np
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.resolution import below_a_step
 from residual.gap.model.candidates import Knob
+from residual.gap.result import Number
 from residual.gap.search.sets import Search
 from sims.effects.curves import StateCurve
 
@@ -18,6 +19,9 @@ NEARLY_NONE = 0.1
 AS_LARGE = 0.5
 #: Times as large as what was found that a strength may be, beyond which its size is open.
 OPEN = 10.0
+#: Residual over noise from which on much is left, and ends of an interval over one another beyond
+#: which it does not tell the size beside that.
+FAR, SPAN = 10.0, 5.0
 
 
 def may_vanish(search: Search, claim: Claim) -> bool:
@@ -58,16 +62,29 @@ def half_open(search: Search, claim: Claim) -> bool:
     )
 
 
-def size_open(search: Search, claim: Claim) -> bool:
+def size_open(search: Search, claim: Claim, left: float = 1.0) -> bool:
     """Whether every strength of an effect may be many times as large as what was found, even if all
-    else were exact: friction beside an inertia that may be anything is friction all the same."""
+    else were exact: friction beside an inertia that may be anything is friction all the same.
+
+    Where much is left, what has no name may make it larger or smaller, too: then its whole interval
+    has to tell its size.
+
+    Args:
+        search: Has the effect.
+        claim: With its numbers.
+        left: Times the noise that all chosen ones leave.
+    """
     numbers = [claim.numbers[knob.field] for knob in strengths(search, claim)]
-    told = [
-        max(end / n.value for end in n.if_exact or (n.low, n.high))
-        for n in numbers
-        if n.value and not n.at_bound
-    ]
-    return bool(told) and min(told) > OPEN
+    told = [n for n in numbers if n.value and not n.at_bound]
+    larger = [max(end / n.value for end in n.if_exact or (n.low, n.high)) for n in told]
+    spans = [_span(n) for n in told]
+    return bool(told) and (min(larger) > OPEN or (left >= FAR and min(spans) > SPAN))
+
+
+def _span(number: Number) -> float:
+    """The larger end of an interval over the smaller one."""
+    ends = sorted(abs(end) for end in (number.low, number.high))
+    return ends[1] / max(ends[0], 1e-300) if number.low * number.high > 0 else np.inf
 
 
 def with_size(search: Search, claim: Claim) -> Claim:

@@ -256,3 +256,14 @@ def test_what_may_be_ten_times_as_large_is_not_confirmed(high, kind):
     assert verdict.doubts == (("size_open",) if kind == "ambiguous" else ())
     wide = Number(0.01, 0.008, 0.5, "kg", if_exact=(0.009, high))  # beside what is not certain
     assert effect_verdict(Toy({(0,): 0.3}), claim(numbers={"change": wide}), 20).kind == kind
+
+
+@pytest.mark.parametrize(("left", "high", "kind"), [
+    (2.0, 0.09, "confirmed"), (12.0, 0.03, "confirmed"), (12.0, 0.09, "ambiguous"),
+])  # fmt: skip
+def test_beside_much_without_a_name_a_size_is_known_within_a_factor_or_not_certain(
+    left, high, kind
+):
+    size = Number(0.01, 0.008, high, "kg", if_exact=(0.009, 0.011))
+    verdict = effect_verdict(Toy({(0,): 0.3}), claim(numbers={"change": size}), 20, left=left)
+    assert verdict.kind == kind
