@@ -21,7 +21,7 @@ KEPT, AGAIN = 0.2, 1.5
 #: which none is begun.
 EACH, LEAST = 0.65, 0.02
 #: Part of the budget that is over when a later search is given up.
-ENOUGH = 0.9
+ENOUGH = 0.85
 #: Seconds in which not more than one line tells how a search goes.
 OFTEN = 2.0
 
