@@ -40,6 +40,7 @@ from studies.gap.words import (
     names_of,
     number_text,
     percent,
+    quantities_text,
     quantity_text,
     six_digits,
     titled,
@@ -134,7 +135,7 @@ def notes(verdict: Verdict, result: GapResult) -> list[str]:
     found += [one for one in told if one]
     for field, n in verdict.parameters.items():
         if n.along is not None and not result.changing:
-            begin, end = (quantity_text(value, n.unit) for value in n.along)
+            begin, end = quantities_text(n.along, n.unit)
             name = f"{spelt(field)} " if len(verdict.parameters) > 1 else ""
             found.append(
                 f"{name}no constant: about {begin} where records begin and {end} where they end"

@@ -19,6 +19,7 @@ from studies.gap.words import (
     listed,
     names_of,
     percent,
+    quantities_text,
     quantity_text,
 )
 
@@ -107,7 +108,7 @@ def _no_gap(gap: Gap) -> str:
     if known.value <= OFF * gap.noise_floor.value:
         before = quantity_text(known.value, gap.unit)
         return f"No gap above the noise: the {ahead(gap)} is {before}, noise alone makes {floor}."
-    low, value, high = (quantity_text(v, gap.unit) for v in (known.low, known.value, known.high))
+    low, value, high = quantities_text((known.low, known.value, known.high), gap.unit)
     return (
         f"No gap that these data tell from noise: the {ahead(gap)} is {value} ({low} to {high}), "
         f"noise alone makes {floor}."

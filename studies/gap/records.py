@@ -12,6 +12,7 @@ from studies.gap.words import (
     minus,
     names_of,
     percent,
+    quantities_text,
     quantity_text,
     titled,
     unit_text,
@@ -141,7 +142,7 @@ def _values(changing: Changing) -> list[str]:
     sizes = [changing.begin, changing.end, changing.nominal]
     largest = max(map(abs, sizes))
     sizes = [0.0 if abs(size) < NOTHING * largest else size for size in sizes]
-    return [minus(quantity_text(value, changing.unit)) for value in sizes]
+    return [minus(text) for text in quantities_text(sizes, changing.unit)]
 
 
 def _sizes(one: Unlike) -> str:

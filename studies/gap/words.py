@@ -36,6 +36,8 @@ RAISED = str.maketrans(
 )
 #: Units that begin with one of which a thousandth has a name.
 DIVIDED = re.compile(r"(rad|[mVKNA])(?![\w^])")
+#: Below it a number is told in thousandths of such a unit.
+THOUSANDTHS = 1e-2
 #: Names of people, in the names of effects.
 PEOPLE = ("Coulomb", "Stribeck")
 #: Pairs of words with a hyphen, in the names of effects.
@@ -185,9 +187,16 @@ def span_text(span: Span) -> str:
 
 def quantity_text(value: float, unit: str) -> str:
     """A number with its unit, in thousandths of it if it is small."""
-    if DIVIDED.match(unit) and 1e-6 <= abs(value) < 1e-2:
+    if DIVIDED.match(unit) and 1e-6 <= abs(value) < THOUSANDTHS:
         return f"{1e3 * value:.3g} m{typeset(unit)}"
     return f"{value:.3g}{unit_text(unit)}"
+
+
+def quantities_text(values: Sequence[float], unit: str) -> list[str]:
+    """Numbers that are read beside each other, all in one unit."""
+    if max(map(abs, values), default=0.0) < THOUSANDTHS:
+        return [quantity_text(value, unit) for value in values]
+    return [f"{value:.3g}{unit_text(unit)}" for value in values]
 
 
 def percent(share: float) -> str:

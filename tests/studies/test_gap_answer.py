@@ -23,6 +23,7 @@ from studies.gap.lead import lead
 from studies.gap.numbers import times_of
 from studies.gap.summary import summary
 from studies.gap.verdicts import banners
+from studies.gap.words import quantities_text
 from studies.reporting.sections import Prose
 from studies.reporting.sections import Verdict as Banner
 
@@ -202,6 +203,14 @@ def test_points_of_a_curve_miss_the_law_where_more_than_noise_is_left(left, told
     gap = dataclasses.replace(found.gap, windows_after=left)
     said = notes(curve, dataclasses.replace(found, adequate=False, gap=gap))
     assert any("the law may depart from these points" in note for note in said) is told
+
+
+@pytest.mark.parametrize(("values", "texts"), [
+    ((-0.0013, -0.014), ["-0.0013 N m", "-0.014 N m"]),
+    ((-0.0013, -0.004), ["-1.3 mN m", "-4 mN m"]), ((0.0, 0.5), ["0 N m", "0.5 N m"]),
+])  # fmt: skip
+def test_numbers_side_by_side_are_in_one_unit(values, texts):
+    assert quantities_text(values, "N m") == [text.replace(" ", " ") for text in texts]
 
 
 def test_two_of_one_family_are_told_by_their_own_names():
