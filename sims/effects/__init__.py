@@ -25,7 +25,7 @@ from sims.effects.curves import FrictionCurve as FrictionCurve
 from sims.effects.curves import InputCurve as InputCurve
 from sims.effects.curves import StateCurve as StateCurve
 from sims.effects.curves import SymmetricInputCurve as SymmetricInputCurve
-from sims.effects.eccentric import EccentricEncoder as EccentricEncoder
+from sims.effects.encoder_error import EncoderError as EncoderError
 from sims.effects.exchange import Exchange as Exchange
 from sims.effects.flexible import FlexibleJoint as FlexibleJoint
 from sims.effects.flexible import FlexiblePart as FlexiblePart

@@ -24,7 +24,7 @@ from sims.effects.base import Effect
 from sims.effects.coupling import BY, Coupling, coupled_states
 from sims.effects.curve import Curve
 from sims.effects.curves import CURVES
-from sims.effects.eccentric import EccentricEncoder
+from sims.effects.encoder_error import EncoderError
 from sims.effects.exchange import Exchange, like_states
 from sims.effects.flexible import FlexibleJoint, FlexiblePart
 from sims.effects.friction import (
@@ -186,7 +186,7 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     both += [kind(AND.join(names)) for kind, names in links]
     slow = [name for name in inputs if name not in goals(simulator)]
     at_inputs = [kind(name) for kind in (AsymmetricActuator, Hysteresis) for name in inputs]
-    discs = [EccentricEncoder(channel.name) for channel in simulator.physical_channels]
+    discs = [EncoderError(channel.name) for channel in simulator.physical_channels]
     for effect in (*both, *at_inputs, *map(SlewLimit, slow), *discs):
         with contextlib.suppress(ValueError):
             effect.quantities(simulator)

@@ -75,7 +75,7 @@ OTHERS = [
     effects.AsymmetricActuator("voltage"), effects.SlewLimit("voltage"),
     effects.Hysteresis("voltage"), effects.Coupling("pivot by elbow"),
     effects.CouplingSpring("pivot and elbow"), effects.CouplingDamper("pivot and elbow"),
-    effects.CrankInertia("pivot"), effects.EccentricEncoder("angle"),
+    effects.CrankInertia("pivot"), effects.EncoderError("angle"),
     effects.UpperStop("pivot"), effects.LowerStop("pivot"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)

@@ -73,24 +73,41 @@ def test_an_encoder_off_its_axis_errs_once_per_turn():
         return np.stack([angle + error, speed * (1 + slope)], axis=1)
 
     result = find_gap(Wheel(), logs(lambda q: INERTIA, read))
-    assert confirmed(result) == ["eccentric_encoder@angle"]
+    assert confirmed(result) == ["encoder_error@angle"]
     numbers = result.verdicts[0].parameters
-    assert numbers["sine"].value == pytest.approx(0.03 * np.cos(0.7), abs=1e-3)
-    assert numbers["cosine"].value == pytest.approx(-0.03 * np.sin(0.7), abs=1e-3)
+    assert numbers["sine_1"].value == pytest.approx(0.03 * np.cos(0.7), abs=1e-3)
+    assert numbers["cosine_1"].value == pytest.approx(-0.03 * np.sin(0.7), abs=1e-3)
 
 
 @pytest.mark.long
-def test_a_slide_on_a_short_rod_shows_over_short_forecasts_only():
+def test_a_shaft_behind_a_universal_joint_has_no_crank():
+    def read(x):
+        angle, speed = x.T
+        bend = np.cos(0.49)
+        turned = angle + np.arctan2(
+            (1 - bend) * np.sin(2 * angle), 1 + bend + (1 - bend) * np.cos(2 * angle)
+        )
+        return np.stack(
+            [turned, speed * bend / (bend**2 * np.cos(angle) ** 2 + np.sin(angle) ** 2)], axis=1
+        )
+
+    assert confirmed(find_gap(Wheel(), logs(lambda q: INERTIA, read))) == ["encoder_error@angle"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("damping", [0.02, 0.0295])
+def test_a_slide_on_a_short_rod_is_a_crank_with_three_waves(damping):
+    """Where its inertia is all that is missing, forecasts of the usual length hide it."""
     slide, radius, rod = 0.8, 0.08, 0.25
 
     def inertia(q):
         bend = rod * np.sin(q) * np.cos(q) / np.sqrt(1 - (rod * np.sin(q)) ** 2)
         return 0.0105 + slide * radius**2 * (np.sin(q) + bend) ** 2
 
-    wheel = Wheel().with_parameters(inertia=0.01, damping=0.02)
+    wheel = Wheel().with_parameters(inertia=0.01, damping=damping)
     result = find_gap(wheel, logs(inertia, lambda x: x, seconds=8.0))
-    assert confirmed(result)[:1] == ["crank_inertia@angle"]
+    assert "crank_inertia@angle" in confirmed(result)
     (crank,) = [v for v in result.verdicts if v.label == "crank_inertia@angle"]
     mean = 0.5 * slide * radius**2
-    assert crank.parameters["cosine_2"].value == pytest.approx(-mean, rel=0.02)
-    assert crank.parameters["cosine_1"].value == pytest.approx(rod * mean, rel=0.05)
+    assert crank.parameters["cosine_2"].value == pytest.approx(-mean, rel=0.05)
+    assert crank.parameters["cosine_1"].value == pytest.approx(rod * mean, rel=0.1)

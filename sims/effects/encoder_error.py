@@ -1,4 +1,4 @@
-"""Encoders whose disc sits off its axis."""
+"""Encoders whose error comes back every turn."""
 
 from __future__ import annotations
 
@@ -22,19 +22,25 @@ STEPS = 8
 
 
 @dataclasses.dataclass(frozen=True)
-class EccentricEncoder(SensorEffect):
-    """The sensor reads ``x + sine sin x + cosine cos x``, and the rate that is derived from it so.
+class EncoderError(SensorEffect):
+    """The sensor reads ``x`` and the sum of ``sine_n sin n x + cosine_n cos n x`` for n of 1 and 2,
+    and the rate that is derived from it so.
 
     A disc, or a magnet, that sits off its axis by a part ``e`` of its radius errs by ``e`` rad at
-    most, once per turn (Ellin and Dolsak, "The design and application of rotary encoders", Sensor
+    most, once per turn; one that is tilted, or no circle, and a shaft behind a universal joint, err
+    twice per turn (Ellin and Dolsak, "The design and application of rotary encoders", Sensor
     Review 28, 2008).
     """
 
-    sine: Value = number(share=0.02, low=-0.5, high=0.5, angle=1)
-    cosine: Value = number(share=0.02, low=-0.5, high=0.5, angle=1)
+    sine_1: Value = number(share=0.02, low=-0.4, high=0.4, angle=1)
+    cosine_1: Value = number(share=0.02, low=-0.4, high=0.4, angle=1)
+    sine_2: Value = number(share=0.02, low=-0.2, high=0.2, angle=1)
+    cosine_2: Value = number(share=0.02, low=-0.2, high=0.2, angle=1)
 
-    name: ClassVar[str] = "eccentric_encoder"
-    sentence: ClassVar[str] = "An encoder's disc sits off its axis: the angle errs once per turn."
+    name: ClassVar[str] = "encoder_error"
+    sentence: ClassVar[str] = (
+        "The angle that is read errs once or twice per turn: a disc off its axis, a tilted magnet."
+    )
     needs: ClassVar[str] = "a whole turn"
     turns: ClassVar[float] = 1.0
     compound: ClassVar[bool] = True
@@ -42,7 +48,8 @@ class EccentricEncoder(SensorEffect):
 
     def read(self, x: Value) -> Value:
         """Reading of an angle in rad."""
-        return x + self.sine * np.sin(x) + self.cosine * np.cos(x)
+        once = self.sine_1 * np.sin(x) + self.cosine_1 * np.cos(x)
+        return x + once + self.sine_2 * np.sin(2 * x) + self.cosine_2 * np.cos(2 * x)
 
     def undo(self, x: Value) -> Value:
         """The angle in rad behind a reading, by Newton's method."""
@@ -52,7 +59,8 @@ class EccentricEncoder(SensorEffect):
         return angle
 
     def _slope(self, x: Value) -> Value:
-        return 1.0 + self.sine * np.cos(x) - self.cosine * np.sin(x)
+        once = self.sine_1 * np.cos(x) - self.cosine_1 * np.sin(x)
+        return 1.0 + once + 2 * (self.sine_2 * np.cos(2 * x) - self.cosine_2 * np.sin(2 * x))
 
     def read_by_it(self, simulator: HostSimulator) -> tuple[str, ...]:
         """The angle and its rate."""

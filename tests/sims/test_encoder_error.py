@@ -1,4 +1,4 @@
-"""Encoders off their axis: geometry, the derivative of what they read, and its inverse."""
+"""Encoders that err per turn: geometry, the derivative of what they read, and its inverse."""
 
 import math
 
@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sims.effects import EccentricEncoder
+from sims.effects import EncoderError
 from sims.effects.library import further_in
 from sims.equations import EquationOfMotion
 from sims.simulator import Channel
 
-SIZES = st.floats(-0.3, 0.3)
+SIZES = st.floats(-0.2, 0.2)
 
 
 class Wheel(EquationOfMotion):
@@ -34,16 +34,16 @@ class InDegrees(Wheel):
     )
 
 
-@given(SIZES, SIZES, st.floats(-50, 50), st.floats(-20, 20))
-def test_what_is_true_is_found_from_what_is_read(sine, cosine, angle, speed):
-    wheel = Wheel(effects=[EccentricEncoder("angle", sine, cosine)])
+@given(st.tuples(*4 * [SIZES]), st.floats(-50, 50), st.floats(-20, 20))
+def test_what_is_true_is_found_from_what_is_read(sizes, angle, speed):
+    wheel = Wheel(effects=[EncoderError("angle", *(0.8 * size for size in sizes))])
     read = wheel.sense(np.array([[speed, angle]]))
     assert wheel.unsense(read)[0] == pytest.approx([speed, angle], rel=1e-9, abs=1e-9)
 
 
-@given(SIZES, SIZES, st.floats(-5, 5), st.floats(-20, 20))
-def test_the_rate_is_that_of_the_angle_that_is_read(sine, cosine, angle, speed):
-    wheel, short = Wheel(effects=[EccentricEncoder("angle", sine, cosine)]), 1e-6
+@given(st.tuples(*4 * [SIZES]), st.floats(-5, 5), st.floats(-20, 20))
+def test_the_rate_is_that_of_the_angle_that_is_read(sizes, angle, speed):
+    wheel, short = Wheel(effects=[EncoderError("angle", *sizes)]), 1e-6
     places = angle + speed * np.array([-short, 0.0, short])
     read = wheel.sense(np.column_stack([np.full(3, speed), places]))
     assert read[1, 0] == pytest.approx((read[2, 1] - read[0, 1]) / (2 * short), abs=1e-6)
@@ -55,20 +55,27 @@ def test_a_disc_off_its_axis_errs_by_its_share_of_the_radius():
     angles = np.linspace(0, math.tau, 50)
     middle = share * np.stack([np.cos(angles + phase), np.sin(angles + phase)])
     line = np.arctan2(-middle[1], 1 - middle[0])  # under which the middle sees the head
-    read = EccentricEncoder("angle", share * math.cos(phase), share * math.sin(phase)).read(angles)
+    read = EncoderError("angle", share * math.cos(phase), share * math.sin(phase)).read(angles)
     assert read == pytest.approx(angles - line, abs=share**2)
+
+
+def test_a_universal_joint_errs_twice_per_turn():
+    bend, angles = 0.2, np.linspace(-3, 3, 50)
+    turned = np.unwrap(np.arctan2(np.sin(angles), np.cos(bend) * np.cos(angles)))
+    read = EncoderError("angle", sine_2=math.tan(bend / 2) ** 2).read(angles)
+    assert read == pytest.approx(turned, abs=bend**4 / 16)
 
 
 def test_a_degree_is_no_radian():
     states = np.array([[3.0, 1.0], [-2.0, 7.0]])
-    effect = EccentricEncoder("angle", 0.05, -0.02)
+    effect = EncoderError("angle", 0.05, -0.02, 0.03, 0.01)
     turned = InDegrees(effects=[effect]).sense(np.degrees(states))
     assert np.radians(turned) == pytest.approx(Wheel(effects=[effect]).sense(states), rel=1e-12)
 
 
 def test_it_is_a_rarer_effect_of_angles():
-    found = [effect for effect in further_in(Wheel()) if isinstance(effect, EccentricEncoder)]
-    assert list(map(str, found)) == ["eccentric_encoder@angle"]
-    assert found[0].quantities(Wheel())["sine"].unit == "rad"
+    found = [effect for effect in further_in(Wheel()) if isinstance(effect, EncoderError)]
+    assert list(map(str, found)) == ["encoder_error@angle"]
+    assert found[0].quantities(Wheel())["sine_1"].unit == "rad"
     with pytest.raises(ValueError, match="needs an angle; 'speed' is none"):
-        Wheel(effects=[EccentricEncoder("speed", 0.1)])
+        Wheel(effects=[EncoderError("speed", 0.1)])
