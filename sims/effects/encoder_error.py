@@ -23,23 +23,25 @@ STEPS = 8
 
 @dataclasses.dataclass(frozen=True)
 class EncoderError(SensorEffect):
-    """The sensor reads ``x`` and the sum of ``sine_n sin n x + cosine_n cos n x`` for n of 1 and 2,
-    and the rate that is derived from it so.
+    """The sensor reads ``x`` and the sum of ``sine_n sin n x + cosine_n cos n x`` for n from 1 to
+    3, and the rate that is derived from it so.
 
     A disc, or a magnet, that sits off its axis by a part ``e`` of its radius errs by ``e`` rad at
     most, once per turn; one that is tilted, or no circle, and a shaft behind a universal joint, err
-    twice per turn (Ellin and Dolsak, "The design and application of rotary encoders", Sensor
-    Review 28, 2008).
+    twice per turn, a motor's Hall sensors oftener (Ellin and Dolsak, "The design and application of
+    rotary encoders", Sensor Review 28, 2008).
     """
 
     sine_1: Value = number(share=0.02, low=-0.4, high=0.4, angle=1)
     cosine_1: Value = number(share=0.02, low=-0.4, high=0.4, angle=1)
     sine_2: Value = number(share=0.02, low=-0.2, high=0.2, angle=1)
     cosine_2: Value = number(share=0.02, low=-0.2, high=0.2, angle=1)
+    sine_3: Value = number(share=0.02, low=-0.1, high=0.1, angle=1)
+    cosine_3: Value = number(share=0.02, low=-0.1, high=0.1, angle=1)
 
     name: ClassVar[str] = "encoder_error"
     sentence: ClassVar[str] = (
-        "The angle that is read errs once or twice per turn: a disc off its axis, a tilted magnet."
+        "The angle that is read errs once, twice or thrice per turn: a disc off its axis."
     )
     needs: ClassVar[str] = "a whole turn"
     turns: ClassVar[float] = 1.0
@@ -48,8 +50,7 @@ class EncoderError(SensorEffect):
 
     def read(self, x: Value) -> Value:
         """Reading of an angle in rad."""
-        once = self.sine_1 * np.sin(x) + self.cosine_1 * np.cos(x)
-        return x + once + self.sine_2 * np.sin(2 * x) + self.cosine_2 * np.cos(2 * x)
+        return x + sum(s * np.sin(n * x) + c * np.cos(n * x) for n, s, c in self._waves())
 
     def undo(self, x: Value) -> Value:
         """The angle in rad behind a reading, by Newton's method."""
@@ -59,8 +60,14 @@ class EncoderError(SensorEffect):
         return angle
 
     def _slope(self, x: Value) -> Value:
-        once = self.sine_1 * np.cos(x) - self.cosine_1 * np.sin(x)
-        return 1.0 + once + 2 * (self.sine_2 * np.cos(2 * x) - self.cosine_2 * np.sin(2 * x))
+        return 1.0 + sum(n * (s * np.cos(n * x) - c * np.sin(n * x)) for n, s, c in self._waves())
+
+    def _waves(self) -> tuple[tuple[int, Value, Value], ...]:
+        return (
+            (1, self.sine_1, self.cosine_1),
+            (2, self.sine_2, self.cosine_2),
+            (3, self.sine_3, self.cosine_3),
+        )
 
     def read_by_it(self, simulator: HostSimulator) -> tuple[str, ...]:
         """The angle and its rate."""
