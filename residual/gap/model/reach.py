@@ -68,6 +68,8 @@ def turns_enough(effect: Effect, simulator: HostSimulator, samples: Samples) -> 
     joint = next((j for j in simulator.joints if j.name == effect.where), None)
     names = [channel.name for channel in simulator.physical_channels]
     column = names.index(effect.where if joint is None else joint.position)
+    if column not in samples.measured:
+        return False
     low, high = measured_range(samples, column)
     return high - low >= effect.turns * (simulator.physical_channels[column].turn or np.inf)
 
@@ -77,9 +79,10 @@ def runs_into(stop: Stop, simulator: HostSimulator, samples: Samples) -> bool:
     is stopped; what turns on and on is there once."""
     joint = next(j for j in simulator.joints if j.name == stop.joint)
     names = [channel.name for channel in simulator.physical_channels]
-    place = samples.seen[:, names.index(joint.position)]
-    if not np.isfinite(place).any():
+    column = names.index(joint.position)
+    if column not in samples.measured:
         return False
+    place = samples.seen[:, column]
     low, high = float(np.nanmin(place)), float(np.nanmax(place))
     farthest = stop.places(low, high)[0]
     near = stop.side * (place - farthest) > -NEAR_END * (high - low)

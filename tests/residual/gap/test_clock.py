@@ -66,7 +66,7 @@ def test_a_later_search_is_given_up_in_time_and_the_first_never(now):
     tell = clock.checked(told.append)
     now.seconds = 500
     tell("the first")
-    for worth_it, last in ((False, 90), (True, 200)):
+    for worth_it, last in ((False, 85), (True, 200)):
         now.seconds = 60
         with clock.once_more(worth_it):
             now.seconds = last - 1
