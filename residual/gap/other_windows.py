@@ -79,10 +79,14 @@ class OtherWindows:
             return known
         if answer.left.ratio < FAR or horizon < SAMPLES * step:
             return known
-        if not (self._nothing_named(known) or self._stands_out(known, horizon)):
+        nothing = self._nothing_named(known)
+        sought = [] if nothing else self._standing_out(known, horizon)
+        if not (nothing or sought):
             return known
         ready, found = self.over(known, horizon, "much shorter forecasts")
         if not explains_the_rest(found):
+            return known
+        if sought and not set(sought).intersection(found.found.search.labels(found.key)):
             return known
         says = (
             f"forecasts go over {duration_text(ready.fitter.seconds)}: over "
@@ -91,15 +95,19 @@ class OtherWindows:
         )
         return dataclasses.replace(known, prepared=ready, answer=found, why=says)
 
-    def _stands_out(self, known: Confirmed, horizon: float) -> bool:
-        """Whether a rarer effect stands out over forecasts of some length, in s."""
+    def _standing_out(self, known: Confirmed, horizon: float) -> list[str]:
+        """Labels of the rarer effects that stand out over forecasts of some length, in s; none over
+        a length that a user did not ask for."""
         search, further = known.answer.found.search, self.inquiry.offered.further
+        if self.log.by_user:
+            return []
         fitter = prepare(search.simulator, self.log.runs, horizon).fitter
         assert isinstance(fitter, SmoothFitter)
         offered = {candidate.label for candidate in search.candidates}
         rest = [effect for effect in further if str(effect) not in offered]
         path = MeasuredPath(search.simulator, fitter, search.candidates)
-        return bool(at_sight(path, candidates(search.simulator, rest, fitter.samples)))
+        found = at_sight(path, candidates(search.simulator, rest, fitter.samples))
+        return [one.label for one in found]
 
     def longer(self, known: Confirmed) -> Confirmed:
         """The same, or what is found over longer forecasts, of which the records hold fewer.
