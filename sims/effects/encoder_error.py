@@ -7,11 +7,10 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
 from sims.effects.base import number
 from sims.effects.joint import Value
-from sims.effects.sensor import SensorEffect
+from sims.effects.sensor import SensorEffect, position_and_rate
+from sims.effects.waves import Waves, slope_of, sum_of
 from sims.simulator import Array
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ class EncoderError(SensorEffect):
 
     def read(self, x: Value) -> Value:
         """Reading of an angle in rad."""
-        return x + sum(s * np.sin(n * x) + c * np.cos(n * x) for n, s, c in self._waves())
+        return x + sum_of(self._waves(), x)
 
     def undo(self, x: Value) -> Value:
         """The angle in rad behind a reading, by Newton's method."""
@@ -60,9 +59,9 @@ class EncoderError(SensorEffect):
         return angle
 
     def _slope(self, x: Value) -> Value:
-        return 1.0 + sum(n * (s * np.cos(n * x) - c * np.sin(n * x)) for n, s, c in self._waves())
+        return 1.0 + slope_of(self._waves(), x)
 
-    def _waves(self) -> tuple[tuple[int, Value, Value], ...]:
+    def _waves(self) -> Waves:
         return (
             (1, self.sine_1, self.cosine_1),
             (2, self.sine_2, self.cosine_2),
@@ -71,8 +70,7 @@ class EncoderError(SensorEffect):
 
     def read_by_it(self, simulator: HostSimulator) -> tuple[str, ...]:
         """The angle and its rate."""
-        channels = simulator.physical_channels
-        return (self.channel, *(c.name for c in channels if c.rate_of == self.channel))
+        return position_and_rate(simulator, self.channel)
 
     def read_from(self, simulator: HostSimulator) -> tuple[str, ...]:
         """The angle."""

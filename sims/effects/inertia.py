@@ -13,6 +13,7 @@ import numpy as np
 from sims.effects.base import Effect, number, place
 from sims.effects.dimensions import product
 from sims.effects.joint import Value
+from sims.effects.waves import Waves, slope_of, sum_of
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
@@ -113,20 +114,13 @@ class CrankInertia(InertiaEffect):
 
     def inertia_at(self, q: Value) -> Value:
         """What is beside the mean at an angle."""
-        return sum(
-            sine * np.sin(n * self.per_radian * q) + cosine * np.cos(n * self.per_radian * q)
-            for n, sine, cosine in self._waves()
-        )
+        return sum_of(self._waves(), self.per_radian * q)
 
     def slope_at(self, q: Value) -> Value:
         """How that changes."""
-        found = sum(
-            n * (sine * np.cos(n * self.per_radian * q) - cosine * np.sin(n * self.per_radian * q))
-            for n, sine, cosine in self._waves()
-        )
-        return self.per_radian * found
+        return self.per_radian * slope_of(self._waves(), self.per_radian * q)
 
-    def _waves(self) -> tuple[tuple[int, Value, Value], ...]:
+    def _waves(self) -> Waves:
         return (
             (1, self.sine_1, self.cosine_1),
             (2, self.sine_2, self.cosine_2),

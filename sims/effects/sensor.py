@@ -161,14 +161,18 @@ class EncoderScale(ScaledSensor):
 
     def read_by_it(self, simulator: HostSimulator) -> tuple[str, ...]:
         """The position and its rate."""
-        channels = simulator.physical_channels
-        return (self.channel, *(c.name for c in channels if c.rate_of == self.channel))
+        return position_and_rate(simulator, self.channel)
 
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """As for every sensor effect; the position needs a rate."""
         if len(self.read_by_it(simulator)) == 1:
             raise ValueError(f"no channel is the rate of {self.channel!r}: use sensor_scale")
         return super().measures(simulator)
+
+
+def position_and_rate(simulator: HostSimulator, position: str) -> tuple[str, ...]:
+    """Names of a position and of the rate that is derived from it, if there is one."""
+    return (position, *(c.name for c in simulator.physical_channels if c.rate_of == position))
 
 
 def through_sensors(simulator: HostSimulator, states: Array, forward: bool) -> Array:

@@ -13,7 +13,7 @@ from residual.gap.confirmation.certainty import claims
 from residual.gap.confirmation.claim import Claim
 from residual.gap.confirmation.numerics import by_profile, other_numerics, with_enough_substeps
 from residual.gap.confirmation.rivals import in_plain_form
-from residual.gap.confirmation.size import may_vanish
+from residual.gap.confirmation.size import FAR, may_vanish
 from residual.gap.confirmation.tolerance import allow_for_parameters
 from residual.gap.fitting.contract import Left
 from residual.gap.fitting.forecasts import main_channel, noise_floor
@@ -32,8 +32,6 @@ from sims.host import HostSimulator
 RIVALS, FEW = 3, 3
 #: Part by which another set errs less that is asked in place of what is left of one.
 LIKELIER = 0.1
-#: Residual over noise from which on much is left.
-FAR = 10.0
 #: Residual over noise from which on something clearly has no name, and times a parameter may be its
 #: nominal value, either way, to be believed beside that.
 NOTABLE, SEVERAL = 3.0, 4.0

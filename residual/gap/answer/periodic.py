@@ -49,15 +49,16 @@ def periodic(answer: Answer) -> Periodic | None:
     Args:
         answer: What was named.
     """
-    found = _repeating(answer, answer.key)
+    if found := _repeating(answer, answer.key):
+        return found
     search = answer.found.search
-    for claim in () if found else answer.claims:
+    for claim in answer.claims:
         effect = search.candidates[claim.number].effect
         rest = tuple(number for number in answer.key if number != claim.number)
-        if isinstance(effect, FlexiblePart) and rest in search.tried:
-            found = _repeating(answer, rest)
-            found = found and dataclasses.replace(found, instead=str(effect))
-    return found
+        asked = isinstance(effect, FlexiblePart) and rest in search.tried
+        if asked and (found := _repeating(answer, rest)):
+            return dataclasses.replace(found, instead=str(effect))
+    return None
 
 
 def _repeating(answer: Answer, key: Key) -> Periodic | None:

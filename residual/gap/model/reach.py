@@ -83,7 +83,7 @@ def runs_into(stop: Stop, simulator: HostSimulator, samples: Samples) -> bool:
     if column not in samples.measured:
         return False
     place = samples.seen[:, column]
-    low, high = float(np.nanmin(place)), float(np.nanmax(place))
+    low, high = measured_range(samples, column)
     farthest = stop.places(low, high)[0]
     near = stop.side * (place - farthest) > -NEAR_END * (high - low)
     comings = sum(int(np.sum(np.diff(near[a:b].astype(int)) > 0)) for a, b in samples.runs)

@@ -6,16 +6,15 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 
-from residual.gap.fitting.screening import (
-    Signatures,
-    Variant,
-    gains,
-    pair_gains,
-    project_out,
-)
+import numpy as np
+from numpy.typing import NDArray
+
+from residual.gap.fitting.screening import Signatures, gains, pair_gains, project_out
 from residual.gap.model.candidates import Candidate
 from residual.gap.search.measured_path import MeasuredPath
 from sims.effects.base import Effect
+
+Array = NDArray[np.float64]
 
 #: Part of the cost that the library's best effects may leave without others being looked at.
 LITTLE = 0.05
@@ -41,35 +40,32 @@ def at_sight(path: MeasuredPath, further: Sequence[Candidate]) -> list[Candidate
         return []
     own, others = path.offered, path.of(further)
     whole = float(own.residual @ own.residual)
-    chosen, left = _library(own)
+    after = _library(own)
+    left = [float(residual @ residual) for _, residual in after]
     found: set[int] = set()
     for beside in range(BESIDE):
         if left[beside + 1] < LITTLE * whole:
             break
-        columns = [column for variant in chosen[:beside] for column in variant.columns]
-        basis = own.matrix[:, columns]
-        there = dataclasses.replace(
-            others,
-            residual=project_out(basis, own.residual),
-            matrix=project_out(basis, others.matrix),
-        )
+        basis, residual = after[beside]
+        matrix = project_out(basis, others.matrix)
+        there = dataclasses.replace(others, residual=residual, matrix=matrix)
         most = [QUARTER * one for one in left[beside + 1 : beside + 3]]
         found |= _standing_out(there, further, left[beside], most)
     return [one for number, one in enumerate(further) if number in found]
 
 
-def _library(own: Signatures) -> tuple[list[Variant], list[float]]:
-    """The library's best effects one after the other, and the cost that none of them leaves, the
-    first, the first two and so on."""
-    chosen: list[Variant] = []
-    left: list[float] = []
+def _library(own: Signatures) -> list[tuple[Array, Array]]:
+    """Columns of none of the library's effects, of the best, of the best two and so on, one after
+    the other, and what they leave, (rows,)."""
+    columns: list[int] = []
+    found = []
     for _ in range(BESIDE + 2):
-        basis = own.matrix[:, [column for one in chosen for column in one.columns]]
+        basis = own.matrix[:, columns]
         residual, matrix = (project_out(basis, one) for one in (own.residual, own.matrix))
-        left.append(float(residual @ residual))
-        best = gains(own, residual, matrix)[:1]
-        chosen += [own.variants[gain.variants[0]] for gain in best]
-    return chosen, left
+        found.append((basis, residual))
+        for gain in gains(own, residual, matrix)[:1]:
+            columns += own.variants[gain.variants[0]].columns
+    return found
 
 
 def _standing_out(
