@@ -78,7 +78,8 @@ def _spreads(fit: Fit, blocks: Blocks) -> tuple[Array, Array, Array]:
     One is Gauss-Newton's with start states projected out, times the residual variance; the other
     is of the numbers that data without one of the blocks would give, which allows for errors that
     go together within a block, zero of too few. What is known of a number beforehand counts as an
-    observation, and is known as well however large the residuals are.
+    observation, and is known as well however large the residuals are. A fit that ran away tells
+    nothing.
 
     Sources: MacKinnon, Nielsen and Webb, "Fast and reliable jackknife and bootstrap methods for
     cluster-robust inference", J. Applied Econometrics 38 (2023); for the number of blocks Carter,
@@ -87,6 +88,11 @@ def _spreads(fit: Fit, blocks: Blocks) -> tuple[Array, Array, Array]:
     """
     told = fit.told
     rows, residual = told.by_knob, told.residual
+    with np.errstate(over="ignore"):
+        squares, moved = float((residual**2).sum()), float((rows**2).sum())
+    if not np.isfinite(squares + moved):
+        unknown = np.full(rows.shape[-1], np.inf)
+        return unknown, unknown, unknown
     scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
     unit = rows / scale
     # Of a number that moves nothing, no more is known than what is known for certain.
@@ -99,7 +105,7 @@ def _spreads(fit: Fit, blocks: Blocks) -> tuple[Array, Array, Array]:
         inverse = np.linalg.pinv(matrix + variance * prior, rcond=1e-12)
         # A number that is known beforehand takes less of the data than a whole one.
         taken = float(np.clip(1 - variance * np.diag(inverse) * known**-2, 0.0, 1.0).sum())
-        variance = max(1.0, float((residual**2).sum()) / max(freedom - taken, 1))
+        variance = max(1.0, squares / max(freedom - taken, 1))
     plain = variance * np.maximum(np.diag(inverse), 0.0)  # of a matrix that is all but singular
     count = len(blocks)
     if count <= taken + 1:

@@ -60,6 +60,14 @@ def test_what_is_known_beforehand_is_known_however_large_residuals_are():
     assert deviations(fit, Ten())[0] < 2 * np.hypot(own, known)
 
 
+@pytest.mark.parametrize(("slopes", "left"), [(1.0, 1e200), (1e200, 1.0), (np.inf, 1.0)])
+def test_of_a_fit_that_ran_away_no_number_is_known(slopes, left):
+    knobs = [SimpleNamespace(known=np.inf)]
+    rows = np.full((30, 20, 1), slopes)
+    fit = found(knobs, np.ones(1), rows, np.full((30, 20), left))
+    assert deviations(fit, Ten()) == np.inf
+
+
 def slopes_by_block(rng, amplitudes, together, numbers=1):
     """A fit of numbers that are zero by blocks of three windows, of unequal amplitude, each with
     errors that go together, as of a law that is not quite right."""
