@@ -8,7 +8,8 @@ from residual.gap.result import Doubt
 DOUBTS: dict[Doubt, str] = {
     "not_needed": "without it forecasts are not worse in enough blocks of data to be sure",
     "unsteady": "its size differs between parts of the data",
-    "creeps": "it is no constant: its size changes along the records, or from one to another",
+    "creeps": "it is no constant: its size changes along the records, with how far the motion "
+    "goes, or from one record to another",
     "drift": "a push, or a parameter, that changes steadily along the records, as of a room that "
     "warms, would do as well",
     "one_way": "motion goes one way only, so that a part of it may be a constant load",

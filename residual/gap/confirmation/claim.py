@@ -32,7 +32,8 @@ class Claim:
         needed: Whether forecasts are clearly worse without it; where chance decides, also whether
             its share is above zero in its interval.
         steady: Whether its strength is about the same in every fold.
-        creeps: Whether it is a constant that changes along the records, or from one to another.
+        creeps: Whether it is a constant that changes along the records, with how far the system
+            moves, or from one record to another.
         drifts: Whether a push that grows steadily along the records would do its work as well.
         one_way: Whether motion goes one way only, so that part of it may be a load.
         other_law: Whether it, or one beside it, explains more if it changes with the motion.

@@ -1,7 +1,8 @@
 """Whether a constant stays the same over the log: zeros of sensors creep, and loads come and go.
 
 Folds interpolate, so that a number which creeps is about the same in each of them. Here every
-number may differ between records, and change along them.
+number may differ between records, change along them, and with how far the system moves: a damper
+that is harder one way pushes in the mean, and at rest not at all.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ APART = 3.0
 
 
 def creeps(search: Search, key: Key, number: int) -> bool:
-    """Whether a constant push is clearly another one in one of the records, or changes on the way.
+    """Whether a constant push is clearly another one in one of the records, or changes on the way,
+    or with how far the system moves.
 
     Args:
         search: With the fitted set.
@@ -111,12 +113,26 @@ def along_windows(search: Search) -> Array:
     return along_records(search)[search.fitter.blocks.windows.index[:, 0]]
 
 
+def by_motion(search: Search) -> Array:
+    """The rank of every window by how far what was measured moves in it, from -1/2 to 1/2, (W,)."""
+    samples, windows = search.fitter.samples, search.fitter.blocks.windows
+    seen = samples.seen[:, samples.measured]
+    inside = windows.inside[..., None] & np.isfinite(seen[windows.index])
+    there = np.where(inside, seen[windows.index], 0.0)
+    count = np.maximum(inside.sum(axis=1), 1)
+    around = np.where(inside, there - (there.sum(axis=1) / count)[:, None], 0.0)
+    variances = (around**2).sum(axis=1) / count
+    moved = (variances / np.maximum(variances.mean(axis=0), 1e-300)).sum(axis=1)
+    return np.argsort(np.argsort(moved)) / max(len(moved) - 1, 1) - 0.5
+
+
 def _courses(search: Search) -> Iterator[Array]:
-    """How a number may go over the windows, each (W,): along every record from -1/2 to 1/2, and
-    otherwise in one of the records."""
+    """How a number may go over the windows, each (W,): along every record from -1/2 to 1/2, from
+    where least moves to where most does, and otherwise in one of the records."""
     blocks = search.fitter.blocks
     windows = blocks.windows
     yield along_windows(search)
+    yield by_motion(search)
     records = np.unique(windows.run)
     for run in records if len(records) > 1 else ():
         own = windows.run == run

@@ -10,7 +10,7 @@ from oven import Oven, steps
 from residual.gap import find_gap
 from residual.gap.confirmation.constancy import far_apart
 from residual.trajectories import Trajectory
-from sims.equations import FirstOrderSystem
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.simulator import Channel, Parameter
 from studies.gap.answer import notes
 
@@ -38,6 +38,44 @@ def test_a_push_is_certain_only_while_it_is_a_constant(zeros, creeps):
     assert named.effect in ("constant_load", "sensor_offset")
     assert ("creeps" in named.doubts) == creeps
     assert (named.kind == "confirmed") == (not creeps)
+
+
+class Body(EquationOfMotion):
+    """A body on a spring and a damper, by the force on it."""
+
+    dt = 0.02
+    state_channels = (
+        Channel("x", "m", "position", scale=0.1),
+        Channel("v", "m/s", "rate", scale=0.5, rate_of="x"),
+    )
+    action_channels = (Channel("push", "N", "input", scale=10.0),)
+
+    def acceleration(self, q, v, u, force, p):
+        return u - 100.0 * q - 4.0 * v + force
+
+
+def damped(seed, harder, load, n=500):
+    """Pushes that become weaker and stronger; the damper is harder upwards, by Euler in 1 ms."""
+    rng = np.random.default_rng(seed)
+    sizes = np.resize([12.0, 3.0, 0.5, 8.0], n // 25)
+    pushes = np.repeat(sizes * rng.uniform(-1, 1, n // 25), 25)
+    x, v, seen = 0.0, 0.0, []
+    for push in pushes:
+        seen.append((x, v))
+        for _ in range(20):
+            damper = 4.0 * v * (1 + harder * np.sign(v))
+            v += 0.001 * (push + load - 100.0 * x - damper)
+            x += 0.001 * v
+    states = np.array(seen) + [2e-4, 1e-3] * rng.standard_normal((len(seen), 2))
+    return Trajectory(f"record {seed}", 0.02 * np.arange(len(seen)), states, pushes[:-1, None])
+
+
+@pytest.mark.parametrize(("harder", "load"), [(0.5, 0.0), (0.0, 0.5)])
+def test_what_pushes_only_while_it_moves_is_no_constant_push(harder, load):
+    runs = [damped(seed, harder, load) for seed in (0, 1)]
+    (named,) = [v for v in find_gap(Body(), runs, effects=OFFERED[:2]).verdicts if v.label]
+    assert ("creeps" in named.doubts) == bool(harder)
+    assert (named.kind == "confirmed") == bool(load)
 
 
 class Wheel(FirstOrderSystem):
