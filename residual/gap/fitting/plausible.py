@@ -249,6 +249,13 @@ def _pulling(fit: Fit, samples: Samples) -> int:
     return int((negative.mean(axis=(0, 1)) > SELDOM).sum())
 
 
+def unlikely(fit: Fit, samples: Samples) -> int:
+    """Pairs of a fitted set that undo each other, and sensors that are wrong as they seldom are."""
+    own = fit.model.added(fit.theta)
+    sensors = sum(doubtful_sensor(effect, fit.model.simulator, samples) for effect in own)
+    return undone(fit) + sensors
+
+
 def undone(fit: Fit) -> int:
     """Pairs of a fitted set that undo all but a quarter of each other: a zero that is far off and
     the load that holds it there bend a motion a bit, and so does much less of something else."""

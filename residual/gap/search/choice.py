@@ -193,10 +193,10 @@ def _fits_alike(search: Search, key: Key, best: Key) -> bool:
 
 
 def _does_as_well(search: Search, key: Key, best: Key) -> bool:
-    """Whether a set is as good as the best within chance, or surprises less and is next to it; of
-    what undoes itself an imperfect simulator may make use, so that next to it is farther."""
+    """Whether a set is as good as the best within chance, or surprises less and is next to it; next
+    to what is unlikely, of which an imperfect simulator may make use, is farther."""
     error, least = search.error(key), search.error(best)
-    if search.undone(key) < search.undone(best) and error <= NEAR * least:
+    if search.unlikely(key) < search.unlikely(best) and error <= NEAR * least:
         return search.surprises(key) < search.surprises(best)
     if search.surprises(key) < search.surprises(best) and error <= (1 + ALIKE) * least:
         return True

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.fitting.contract import UNCONVERGED, Fit, Fitter
-from residual.gap.fitting.plausible import absurd, nearly, surprises, told_by_data, undone
+from residual.gap.fitting.plausible import absurd, nearly, surprises, told_by_data, unlikely
 from residual.gap.fitting.screening import Signatures, signatures, trials
 from residual.gap.fitting.validation import Validated, validate
 from residual.gap.model.candidates import Candidate
@@ -127,9 +127,10 @@ class Search(Pool):
         """Effects of a set that are larger than usual, end at a bound, or are unlikely so."""
         return surprises(self.tried[key], self.fitter.samples) + (key in self.extreme)
 
-    def undone(self, key: Key) -> int:
-        """Pairs of a set that undo nearly all of each other."""
-        return undone(self.tried[key])
+    def unlikely(self, key: Key) -> int:
+        """Pairs of a set that undo nearly all of each other, and sensors that are wrong as they
+        seldom are: an imperfect simulator may make use of them."""
+        return unlikely(self.tried[key], self.fitter.samples)
 
     def usable(self) -> list[Key]:
         """Sets that converged and may be right."""

@@ -105,9 +105,9 @@ class Toy:
         )
 
     def surprises(self, key):
-        return len(self.surprising & set(key)) + self.undone(key)
+        return len(self.surprising & set(key)) + self.unlikely(key)
 
-    def undone(self, key):
+    def unlikely(self, key):
         return int(key in self.undoing)
 
     def labels(self, key):

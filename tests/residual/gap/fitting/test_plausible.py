@@ -8,7 +8,14 @@ from oven import Oven, steps
 
 from residual.gap.data.samples import Samples
 from residual.gap.fitting import plausible
-from residual.gap.fitting.plausible import absurd, doubtful_sensor, nearly, surprises, undone
+from residual.gap.fitting.plausible import (
+    absurd,
+    doubtful_sensor,
+    nearly,
+    surprises,
+    undone,
+    unlikely,
+)
 from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
 from residual.trajectories import Trajectory
@@ -126,7 +133,7 @@ def test_what_ends_at_a_bound_surprises():
 
 
 @pytest.mark.parametrize(
-    ("effect", "size", "low", "unlikely"),
+    ("effect", "size", "low", "surprising"),
     [
         (ActuatorBias("duty"), -0.3, 0.0, 1),
         (ActuatorBias("duty"), -0.3, -1.0, 0),  # may be negative
@@ -135,7 +142,7 @@ def test_what_ends_at_a_bound_surprises():
         (Delay("duty"), 3.0, 0.0, 0),
     ],
 )
-def test_a_heater_that_would_cool_surprises(effect, size, low, unlikely):
+def test_a_heater_that_would_cool_surprises(effect, size, low, surprising):
     """Where all commands are well above zero a bias is a dead zone; below, only one is possible."""
 
     class Bounded(Oven):
@@ -145,7 +152,7 @@ def test_a_heater_that_would_cool_surprises(effect, size, low, unlikely):
     (candidate,) = candidates(Bounded(), [effect], samples)
     model, theta = Model(Bounded(), [candidate]), np.array([size])
     fit = SimpleNamespace(model=model, theta=theta, by_knob=np.ones((1, 5, 1)), weights=np.ones(1))
-    assert surprises(fit, samples) == unlikely
+    assert surprises(fit, samples) == surprising
 
 
 @pytest.mark.parametrize(("sizes", "pairs"), [
@@ -178,3 +185,11 @@ def test_what_undoes_nearly_all_of_another_is_counted(sizes, pairs):
 def test_a_sensor_is_seldom_wrong_in_its_scale_or_by_a_fifth_of_what_it_shows(effect, far):
     samples = built(ActuatorGain("voltage"), gain=0.0)[2]
     assert doubtful_sensor(effect, PendulumEquation(), samples) is far
+    owner, simulator = np.zeros(1, int), PendulumEquation()
+    model = SimpleNamespace(
+        simulator=simulator, owner=owner, chosen=[None], added=lambda _: (effect,)
+    )
+    fit = SimpleNamespace(
+        model=model, theta=np.ones(1), by_knob=np.ones((1, 5, 1)), weights=np.ones(1)
+    )
+    assert unlikely(fit, samples) == far
