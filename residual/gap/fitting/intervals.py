@@ -89,8 +89,8 @@ def _spreads(fit: Fit, blocks: Blocks) -> tuple[Array, Array, Array]:
     told = fit.told
     rows, residual = told.by_knob, told.residual
     with np.errstate(over="ignore"):
-        squares, moved = float((residual**2).sum()), float((rows**2).sum())
-    if not np.isfinite(squares + moved):
+        squares, slopes = float((residual**2).sum()), float((rows**2).sum())
+    if not np.isfinite(squares + slopes):
         unknown = np.full(rows.shape[-1], np.inf)
         return unknown, unknown, unknown
     scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
