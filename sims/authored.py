@@ -107,9 +107,12 @@ def push_of_inputs(acceleration: Acceleration) -> DriveForce:
         if len(q) == 1:
             return inputs / moved[0]
         matrix = np.stack(moved).transpose(2, 1, 0)
-        matrix[np.linalg.det(matrix) == 0] = np.nan  # what has left all bounds
-        found = np.asarray(np.linalg.solve(matrix, inputs.T[:, :, None]), float)
-        return found[:, :, 0].T
+        try:
+            found = np.linalg.solve(matrix, inputs.T[:, :, None])
+        except np.linalg.LinAlgError:  # what has left all bounds
+            matrix[np.linalg.det(matrix) == 0] = np.nan
+            found = np.linalg.solve(matrix, inputs.T[:, :, None])
+        return np.asarray(found, float)[:, :, 0].T
 
     return push
 

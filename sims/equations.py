@@ -15,7 +15,7 @@ from sims.declared import refuse_declarations, refuse_period
 from sims.effects.base import Effect
 from sims.effects.pull import ELSEWHERE
 from sims.host import HostSimulator
-from sims.hosted import kept_motion, motion_of
+from sims.hosted import kept_motion, kept_scale, motion_of
 from sims.motion import Motion, substep_ends
 from sims.rows import State
 from sims.simulator import Array, Joint, Parameter
@@ -153,10 +153,14 @@ class EquationOfMotion(_Equations):
         if joint.scale is not None:
             return joint.scale
         j = self.joints.index(joint)
-        speed = self.state_channels[self._rates[j]].scale
-        moved = self._mobility(j, np.zeros((1, len(self.joints))))[0, j]
-        with np.errstate(all="ignore"):
-            return float(abs(speed / (10 * self.dt * moved)))
+
+        def after_ten_periods() -> float:
+            speed = self.state_channels[self._rates[j]].scale
+            moved = self._mobility(j, np.zeros((1, len(self.joints))))[0, j]
+            with np.errstate(all="ignore"):
+                return float(abs(speed / (10 * self.dt * moved)))
+
+        return kept_scale(self, joint.name, after_ten_periods)
 
     def moved_by(self, joint: Joint) -> Array:
         """See ``HostSimulator.moved_by``; at rest, at some places."""

@@ -50,6 +50,25 @@ def kept_motion(host: HostSimulator, make: Callable[[], Motion]) -> Motion:
     return motion
 
 
+def kept_scale(host: HostSimulator, joint: str, make: Callable[[], float]) -> float:
+    """The typical force on a joint: what it was last, if the system is the same but for effects.
+
+    Args:
+        host: The system.
+        joint: Which.
+        make: Works it out anew.
+    """
+    rest = {**vars(host), "effects": None, "state_channels": None}
+    own = (type(host), *host.physical_channels, *rest, *rest.values())
+    known: tuple[object, ...] = getattr(_last, "scales_of", ())
+    if len(known) != len(own) or not all(map(operator.is_, known, own)):
+        _last.scales_of, _last.scales = own, {}
+    scales: dict[str, float] = _last.scales
+    if joint not in scales:
+        scales[joint] = make()
+    return scales[joint]
+
+
 def motion_of(
     host: HostSimulator,
     names: Sequence[str],

@@ -209,6 +209,13 @@ def test_force_scale_is_what_sets_up_a_typical_rate_in_ten_periods():
     assert cart == Joint("x", "x", "speed", "N")
     # Upright at rest, a force on the cart moves it as if the bob hung on a massless hinge.
     assert simulator.force_scale(cart) == pytest.approx(1.0 / 0.2 * CART)
+    # It follows what the system is, not what was asked last.
+    heavier, faster = simulator.with_parameters(cart=2 * CART), CartPole(dt=simulator.dt / 2)
+    assert heavier.force_scale(cart) == pytest.approx(2.0 / 0.2 * CART)
+    assert faster.force_scale(cart) == pytest.approx(2.0 / 0.2 * CART)
+    assert simulator.with_scales({"speed": 3.0}).force_scale(cart) == pytest.approx(15.0 * CART)
+    rubbed = simulator.with_effects([CoulombFriction("x", 1.0)])
+    assert rubbed.force_scale(cart) == pytest.approx(1.0 / 0.2 * CART)
 
 
 def test_the_two_pendulums_agree():

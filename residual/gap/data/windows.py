@@ -1,4 +1,4 @@
-"""Windows of consecutive samples: cut by local instability, and carried linearly along."""
+"""Windows of consecutive samples, cut by local instability."""
 
 from __future__ import annotations
 
@@ -138,39 +138,3 @@ def cut(
 def _grown(product: Array, growth: float) -> bool:
     """Whether errors grow by more than a factor; what overflows before readings come has."""
     return not np.isfinite(product).all() or bool(np.linalg.norm(product, 2) > growth)
-
-
-def carry(
-    windows: Windows, jacobians: Array, start: Array, injected: Array, begun: Array | None = None
-) -> Array:
-    """Linear response of the states inside every window.
-
-    ``G[k + 1] = A[k] G[k] + injected[k]``, with ``G[0]`` = ``start`` for the first columns.
-
-    Args:
-        windows: W windows of up to L samples.
-        jacobians: A, shape (n, n_s, n_s), one for every row of the table.
-        start: Columns that start as perturbations of the first state, shape (n_s, f).
-        injected: Columns that act at every step: (n, n_s, q) for every row of the table, or
-            (W, L, n_s, q) for every place in a window.
-        begun: What the injected columns have done before the first state, (W, n_s, q).
-
-    Returns:
-        shape (W, L, n_s, f + q).
-    """
-    count, length = windows.index.shape
-    width, f = start.shape
-    q = injected.shape[-1]
-    response = np.zeros((count, length, width, f + q))
-    response[:, 0, :, :f] = start
-    if begun is not None:
-        response[:, 0, :, f:] = begun
-    local = injected if injected.ndim == 4 else injected[windows.index]
-    steps = jacobians[windows.index]
-    # A trial that runs away stays finite and loses.
-    with np.errstate(over="ignore", invalid="ignore"):
-        for k in range(length - 1):
-            response[:, k + 1] = steps[:, k] @ response[:, k]
-            response[:, k + 1, :, f:] += local[:, k]
-    np.nan_to_num(response, copy=False, nan=0.0)
-    return np.clip(response, -1e12, 1e12, out=response)

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from residual.gap.data.carrying import carry
 from residual.gap.data.samples import Samples
-from residual.gap.data.windows import Windows, carry
+from residual.gap.data.windows import Windows
 from residual.gap.fitting.linearised import ShootingFit
 from residual.gap.fitting.noise import Floor, driven_states, push
 from residual.gap.fitting.screening import flatten, project_out

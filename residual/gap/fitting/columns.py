@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from residual.gap.data.windows import carry
+from residual.gap.data.carrying import carry
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.linearised import ShootingFit
 from residual.gap.model.candidates import Candidate
@@ -36,35 +36,42 @@ def columns(
     model, samples, windows = fit.model, fitter.samples, fitter.blocks.windows
     inner: ShootingFit = fit.inner
     n, width = inner.nodes.shape
-    moved: list[Array] = []
-    shown: list[Array] = []
-    for candidate in candidates:
+    values = [np.vstack([trial.values for trial in one.trials]) for one in candidates]
+    acts = np.zeros((n, width, sum(map(len, values))))
+    # What is seen of sensors by themselves, with the place of its columns.
+    seen: list[tuple[slice, Array]] = []
+    begin = 0
+    for candidate, given in zip(candidates, values, strict=True):
         joint = Model(model.simulator, (*model.chosen, candidate))
-        values = np.vstack([trial.values for trial in candidate.trials])
-        theta = np.hstack([np.repeat(fit.theta[None], len(values), axis=0), values])
-        states = np.broadcast_to(inner.nodes, (len(values), n, width))
+        own = slice(begin, begin + len(given))
+        begin = own.stop
+        theta = np.hstack([np.repeat(fit.theta[None], len(given), axis=0), given])
+        states = np.broadcast_to(inner.nodes, (len(given), n, width))
         if joint.width > width:
             nodes = inner.nodes[:, : joint.physical]
             play = [joint.widen(samples, nodes, t, without=True) for t in theta]
             states = np.concatenate([states, np.stack(play)[:, :, width:]], axis=2)
-        still = np.zeros((n, width, len(values)))
         if candidate.effect.enters == "sensor":
-            moved.append(still)
-            seen = joint.sense(states, theta) - inner.slope.shown
-            shown.append(seen.transpose(1, 2, 0))
+            shown = joint.sense(states, theta) - inner.slope.shown
+            seen.append((own, shown.transpose(1, 2, 0)))
         else:
             after = joint.advance(samples, states, theta)[..., :width] - inner.slope.after
-            moved.append(after.transpose(1, 2, 0))
-            shown.append(still)
-    start, acts = np.zeros((width, 0)), np.concatenate(moved, axis=2)
-    seen = np.concatenate(shown, axis=2)
-    if share is not None and share.ndim == 2:
-        acts, seen = (some[..., :1] * share.T[:, None, :] for some in (acts, seen))
-    elif share is not None:
-        acts = acts * share[:, None, None]
-    response = carry(windows, inner.slope.by_state, start, acts)
+            acts[..., own] = after.transpose(1, 2, 0)
+    if share is not None:
+        acts, seen = _shared(acts, share), [(own, _shared(shown, share)) for own, shown in seen]
+        if share.ndim == 2:
+            seen = [(slice(None), shown) for _, shown in seen[:1]]
+    response = carry(windows, inner.slope.by_state, np.zeros((width, 0)), acts)
     found = observe(samples, windows, inner.slope, response, fitter.sigma)
-    measured = samples.measured
-    direct = seen[:, measured][windows.index] / fitter.sigma[:, None]
-    found = found + direct * fitter.valid[..., None]
+    for own, shown in seen:
+        direct = shown[:, samples.measured][windows.index] / fitter.sigma[:, None]
+        found[..., own] += direct * fitter.valid[..., None]
     return found.reshape(len(windows), -1, found.shape[-1])
+
+
+def _shared(columns: Array, share: Array) -> Array:
+    """Columns (n, n_s, c) that act by a share from each row, (n,); or the first of them by several,
+    (k, n), one after the other."""
+    if share.ndim == 2:
+        return columns[..., :1] * share.T[:, None, :]
+    return columns * share[:, None, None]

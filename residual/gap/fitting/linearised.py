@@ -10,8 +10,9 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.data.carrying import carry
 from residual.gap.data.samples import Samples
-from residual.gap.data.windows import Windows, carry
+from residual.gap.data.windows import Windows
 from residual.gap.model.model import Model
 from residual.gap.model.slopes import Slope, by_unknowns, defects, misfit, observe, slopes
 

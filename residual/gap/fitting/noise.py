@@ -7,8 +7,9 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.data.carrying import carry
 from residual.gap.data.samples import Samples
-from residual.gap.data.windows import Windows, carry, fixed
+from residual.gap.data.windows import Windows, fixed
 from residual.gap.model.model import Model
 from residual.gap.model.slopes import Slope, defects, misfit, observe, slopes
 from sims.host import HostSimulator

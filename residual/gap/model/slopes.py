@@ -11,6 +11,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.data.carrying import weighted
 from residual.gap.data.samples import Samples
 from residual.gap.data.windows import Windows
 from residual.gap.model.model import Model
@@ -122,7 +123,7 @@ def observe(
     measured = samples.measured
     valid = np.isfinite(samples.seen[:, measured])[windows.index] & windows.inside[..., None]
     gain = slope.shown_by_state[:, measured][windows.index] / sigma
-    return response[:, :, measured] * (gain * valid)[..., None]
+    return weighted(response, measured, gain * valid)
 
 
 def misfit(samples: Samples, windows: Windows, slope: Slope, sigma: Array) -> Array:

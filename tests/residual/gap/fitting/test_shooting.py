@@ -5,7 +5,8 @@ import functools
 import numpy as np
 import pytest
 
-from residual.gap.data.windows import carry, cut, fixed
+from residual.gap.data.carrying import carry
+from residual.gap.data.windows import cut, fixed
 from residual.gap.fitting.shooting import fit
 from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
