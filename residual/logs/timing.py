@@ -145,7 +145,7 @@ def _ordered(run: Run, minimum: int, findings: list[Finding]) -> Run:
     if repeats:
         row = int(ordered.rows[~fresh][0])
         says = f"{repeats} samples repeat the time before them (first in row {row}); dropped."
-        findings.append(Finding("repeated", run.name, says, {"samples": repeats}))
+        findings.append(Finding("repeated", run.name, says, {"samples": repeats}, "warning"))
         ordered = ordered.take(fresh)
     if len(ordered) < minimum:
         raise LogError(
@@ -168,7 +168,8 @@ def _once(run: Run, findings: list[Finding]) -> Run:
         return run
     first = int(run.rows[again][0])
     says = f"{again.sum()} samples are copies of the one before (first in row {first}); dropped."
-    findings.append(Finding("repeated", run.name, says, {"samples": int(again.sum())}))
+    numbers = {"samples": int(again.sum())}
+    findings.append(Finding("repeated", run.name, says, numbers, "warning"))
     return run.take(~again)
 
 

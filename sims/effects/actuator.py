@@ -129,6 +129,7 @@ class QuadraticActuator(StaticActuatorEffect):
         "A part of the output grows with the square of the command, as thrust or heat does."
     )
     needs: ClassVar[str] = "small, middling and large inputs"
+    whole: ClassVar[tuple[str, ...]] = ("square",)
     stage: ClassVar[int] = 2
 
     @property

@@ -137,6 +137,7 @@ class Effect(abc.ABC):
             its inputs, in words.
         creeps: True if it is a constant that is seldom one for long, as zeros of sensors are.
         comes_with: Name of an effect that is usually there, too, where it is.
+        whole: Names of numbers at whose upper bound it is a law of its own, and whole.
         turns: Part of a turn that data have to cover for it to be told from what does not turn.
         compound: True if its strengths are parts of one size, so that any one of them may be zero.
     """
@@ -153,6 +154,7 @@ class Effect(abc.ABC):
     drives: ClassVar[bool] = False
     creeps: ClassVar[bool] = False
     comes_with: ClassVar[str] = ""
+    whole: ClassVar[tuple[str, ...]] = ()
     turns: ClassVar[float] = 0.0
     compound: ClassVar[bool] = False
     looks_like: ClassVar[str] = ""

@@ -18,7 +18,7 @@ from residual.gap.confirmation.numerics import STEADY, in_the_limit, survives
 from residual.gap.confirmation.one_way import may_hold_a_load
 from residual.gap.confirmation.resolution import untimed
 from residual.gap.confirmation.rivals import error_ratio, near, where_it_matters
-from residual.gap.fitting.intervals import bounded, deviations, ended, scatter
+from residual.gap.fitting.intervals import bounded, cut_off, deviations, scatter
 from residual.gap.fitting.plausible import doubtful_sensor
 from residual.gap.search.comparisons import AT_ONE, no_match
 from residual.gap.search.parted import parted
@@ -91,7 +91,7 @@ def claims(
                     survives(fit.theta[j], half[j], [n[j] for n in limits], least)
                     for j in strengths
                 ),
-                any(ended(fit, j) for j in (strengths if compound else own)),
+                any(cut_off(fit, j) for j in (strengths if compound else own)),
                 taken,
                 brief=untimed(search, number, fit.theta[own]),
                 sensor=not adequate and not twins and of_doubtful_sensor(search, key, place),

@@ -101,5 +101,8 @@ def filled(simulator: HostSimulator, run: Trajectory) -> Array | None:
             continue
         if channel.rate_of not in names:
             return None
-        states[:, column] = np.gradient(states[:, names.index(channel.rate_of)], run.times)
+        position = states[:, names.index(channel.rate_of)]
+        known = position[np.isfinite(position)]
+        # Of a constant nothing is left, not even rounding.
+        states[:, column] = np.gradient(position - known[:1].sum(), run.times)
     return states

@@ -36,6 +36,15 @@ def ended(fit: Fit, j: int) -> bool:
     return at_bound(fit, j) or not fit.by_knob[..., j].any()
 
 
+def cut_off(fit: Fit, j: int) -> bool:
+    """Whether a number ended where the data would have it go on: not at a bound at which its effect
+    is a law of its own, as thrust by the square of a command alone is."""
+    effect = fit.model.chosen[int(fit.model.owner[j])].effect
+    knob = fit.model.knobs[j]
+    whole = knob.field in effect.whole and float(fit.theta[j]) > 0.5 * (knob.low + knob.high)
+    return ended(fit, j) and not whole
+
+
 def bounded(fit: Fit, j: int, half: float, numerics: Sequence[Array]) -> Number:
     """A number with its interval, widened to what half the step makes of it."""
     knob, value = fit.model.knobs[j], float(fit.theta[j])

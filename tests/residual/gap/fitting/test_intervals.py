@@ -8,7 +8,7 @@ import pytest
 
 from residual.gap.confirmation.certainty import SCATTERED
 from residual.gap.fitting.contract import Fit
-from residual.gap.fitting.intervals import bounded, deviations, ended, scatter
+from residual.gap.fitting.intervals import bounded, cut_off, deviations, ended, scatter
 
 
 def fitted(value, slopes):
@@ -19,6 +19,17 @@ def fitted(value, slopes):
         theta=np.array([value]),
         by_knob=np.full((3, 5, 1), slopes),
     )
+
+
+@pytest.mark.parametrize(("value", "whole", "there"), [
+    (10.0, (), True), (10.0, ("square",), False), (-10.0, ("square",), True), (2.0, (), False),
+])  # fmt: skip
+def test_a_bound_at_which_a_law_is_whole_cuts_nothing_off(value, whole, there):
+    fit = fitted(value, 0.3)
+    fit.model.knobs[0].field = "square"
+    fit.model.owner = np.zeros(1, int)
+    fit.model.chosen = [SimpleNamespace(effect=SimpleNamespace(whole=whole))]
+    assert cut_off(fit, 0) is there
 
 
 def found(knobs, theta, rows, left):
