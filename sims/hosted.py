@@ -12,9 +12,11 @@ from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
+from sims.altered import carrying, in_flows
 from sims.effects.coupling import Coupling
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import flexible_parts
+from sims.effects.flow import AmbientFlow
 from sims.effects.friction import DryFriction
 from sims.effects.inertia import InertiaEffect
 from sims.effects.joint import JointEffect
@@ -24,7 +26,7 @@ from sims.effects.parameter_curve import ParameterCurve
 from sims.effects.response import AsymmetricResponse
 from sims.effects.store import stores
 from sims.host import HostSimulator
-from sims.motion import Acceleration, DriveForce, Flow, Motion, carrying
+from sims.motion import Acceleration, DriveForce, Flow, Motion
 from sims.simulator import Array
 from sims.values import Values
 
@@ -99,25 +101,28 @@ def motion_of(
         for i, e in enumerate(there)
         if isinstance(e, InertiaEffect)
     }
-    speeds = {joint.name: joint.rate is not None for joint in host.joints}
+    rated = {joint.name: joint.rate is not None for joint in host.joints}
     inertia = {
         f"{name} {field}": getattr(e, field)
         for name, (_, e) in added.items()
         for field in e.numbers()
     }
+    mediums = {f"{e} {i}": e for i, e in enumerate(there) if isinstance(e, AmbientFlow)}
+    speeds = {name: e.speed for name, e in mediums.items()}
+    along = {name: names.index(e.joint) for name, e in mediums.items()}
     inputs = {channel.name: (2, k) for k, channel in enumerate(host.action_channels)}
     curves = [e for e in there if isinstance(e, ParameterCurve)]
     follow = _Following(host, curves, {**places, **inputs})
     return Motion(
-        carrying(follow.in_place(acceleration), added),
+        carrying(in_flows(follow.in_place(acceleration), along), added),
         follow.in_place(drive_force),
-        Values(**host.parameter_values(), **inertia, **follow.numbers()),
+        Values(**host.parameter_values(), **inertia, **speeds, **follow.numbers()),
         smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
         dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
         plays=tuple((names.index(e.joint), e) for e in host.plays()),
         capped=tuple((names.index(e.joint), e) for e in there if isinstance(e, RateLimit)),
         returns=tuple(
-            (names.index(e.joint), e, speeds[e.joint])
+            (names.index(e.joint), e, rated[e.joint])
             for e in there
             if isinstance(e, AsymmetricResponse)
         ),

@@ -6,19 +6,16 @@ Joints first and rows last, (n_joints, n), as in ``sims.rows``.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
 from sims.effects.backlash import Backlash
-from sims.effects.base import Effect
 from sims.effects.coupling import Coupling
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import FlexiblePart
 from sims.effects.friction import CoulombFriction, DryFriction
-from sims.effects.inertia import InertiaEffect
 from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
 from sims.effects.link import Link
@@ -206,47 +203,6 @@ class Motion:
         for j, effect in self.dry:
             size[j] += effect.under(push[j]).limit(np.abs(v[j]))
         return size
-
-
-def carrying(
-    acceleration: Acceleration, inertias: Mapping[str, tuple[int, InertiaEffect]]
-) -> Acceleration:
-    """The accelerations with inertia that moves with one joint alone.
-
-    Args:
-        acceleration: Without it.
-        inertias: Numbers of joints and what each takes along, by the beginning of the names of the
-            parameters that hold its numbers.
-    """
-    if not inertias:
-        return acceleration
-
-    def slowed(q: Array, v: Array, u: Array, force: Array, p: SimpleNamespace) -> Array:
-        own = [(j, e.with_values(**numbers_in(p, name, e))) for name, (j, e) in inertias.items()]
-        force = force.copy()
-        for j, effect in own:
-            force[j] -= 0.5 * effect.slope_at(q[j]) * v[j] ** 2
-        found = acceleration(q, v, u, force, p)
-        moved = []  # by a unit force on each of the joints
-        for j, _ in own:
-            more = force.copy()
-            more[j] += 1.0
-            moved.append(acceleration(q, v, u, more, p) - found)
-        # One inertia after the other, by the formula of Sherman and Morrison.
-        for i, (j, effect) in enumerate(own):
-            inertia = effect.inertia_at(q[j])
-            share = inertia / (1 + inertia * moved[i][j])
-            for other in range(i + 1, len(moved)):
-                moved[other] = moved[other] - moved[i] * (share * moved[other][j])
-            found = found - moved[i] * (share * found[j])
-        return found
-
-    return slowed
-
-
-def numbers_in(p: SimpleNamespace, name: str, effect: Effect) -> dict[str, Any]:
-    """Numbers of an effect that are kept among the parameters, by the beginning of their names."""
-    return {field: getattr(p, f"{name} {field}") for field in effect.numbers()}
 
 
 def advance_smoothly(motion: Motion, state: State, u: Array, h: Array) -> State:

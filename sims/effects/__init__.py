@@ -29,6 +29,7 @@ from sims.effects.encoder_error import EncoderError as EncoderError
 from sims.effects.exchange import Exchange as Exchange
 from sims.effects.flexible import FlexibleJoint as FlexibleJoint
 from sims.effects.flexible import FlexiblePart as FlexiblePart
+from sims.effects.flow import AmbientFlow as AmbientFlow
 from sims.effects.friction import ConstantLoss as ConstantLoss
 from sims.effects.friction import CoulombFriction as CoulombFriction
 from sims.effects.friction import DirectionalFriction as DirectionalFriction

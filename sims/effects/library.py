@@ -27,6 +27,7 @@ from sims.effects.curves import CURVES
 from sims.effects.encoder_error import EncoderError
 from sims.effects.exchange import Exchange, like_states
 from sims.effects.flexible import FlexibleJoint, FlexiblePart
+from sims.effects.flow import AmbientFlow
 from sims.effects.friction import (
     ConstantLoss,
     CoulombFriction,
@@ -169,11 +170,12 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
 
     Friction by load of every joint that the inputs move by themselves; states that fall at another
     pace than they rise, rub otherwise backwards, lose a constant or by a power, have an inertia by
-    their angle, run into stops, act on others or are linked to them; inputs that act otherwise
+    their angle, run into stops, act on others or are linked to them; what moves in a medium that
+    does, too; inputs that act otherwise
     below zero or through a play, and, but for goals, that are followed at a limited pace; encoders
     off their axis.
     """
-    found: list[Effect] = list(_geared(simulator))
+    found: list[Effect] = [*_geared(simulator), *_in_mediums(simulator)]
     inputs = [channel.name for channel in simulator.action_channels]
     inputs += [AND.join(names) for names in like_inputs(simulator)]
     kinds = (
@@ -195,21 +197,39 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
 
 
 def _geared(simulator: HostSimulator) -> list[LoadDependentFriction]:
-    plain, rng, found = simulator.with_effects(()), np.random.default_rng(0), []
-    known = plain.has_drive_force or all(channel.pushes for channel in plain.action_channels)
-    if not plain.action_channels:
-        return []
-    states = plain.smooth_states(PLACES, rng)
-    inputs = np.stack([random_values(c, PLACES, rng) for c in plain.action_channels], axis=1)
+    known = simulator.has_drive_force or all(c.pushes for c in simulator.action_channels)
+    found = []
     # Of a motor's speed all is known that it makes, of other joints what is said to push them.
     for joint in (one for one in simulator.joints if known or one.first_order):
         gear = LoadDependentFriction(joint.name)
         with contextlib.suppress(ValueError):
-            there = plain.with_effects([typical(gear, simulator)])
-            after = there.step(states, inputs)
-            if not np.allclose(after, plain.step(states, inputs), rtol=1e-9):
+            if simulator.action_channels and _does_something(simulator, gear):
                 found.append(gear)
     return found
+
+
+def _in_mediums(simulator: HostSimulator) -> list[AmbientFlow]:
+    """A medium that moves along each joint that slides, where its rate does something."""
+    turn = {channel.name: channel.turn for channel in simulator.physical_channels}
+    found = []
+    for joint in simulator.joints:
+        flow = AmbientFlow(joint.name)
+        with contextlib.suppress(ValueError):
+            flow.quantities(simulator)
+            if turn[joint.position] is None and _does_something(simulator, flow):
+                found.append(flow)
+    return found
+
+
+def _does_something(simulator: HostSimulator, effect: Effect) -> bool:
+    """Whether an effect changes a control period from some states, beside none of the others."""
+    plain, rng = simulator.with_effects(()), np.random.default_rng(0)
+    states = plain.smooth_states(PLACES, rng)
+    inputs = np.zeros((PLACES, len(plain.action_channels)))
+    for column, channel in enumerate(plain.action_channels):
+        inputs[:, column] = random_values(channel, PLACES, rng)
+    there = plain.with_effects([typical(effect, simulator)])
+    return not np.allclose(there.step(states, inputs), plain.step(states, inputs), rtol=1e-9)
 
 
 def like_inputs(simulator: HostSimulator) -> list[tuple[str, ...]]:

@@ -76,7 +76,7 @@ OTHERS = [
     effects.Hysteresis("voltage"), effects.Coupling("pivot by elbow"),
     effects.CouplingSpring("pivot and elbow"), effects.CouplingDamper("pivot and elbow"),
     effects.CrankInertia("pivot"), effects.EncoderError("angle"),
-    effects.UpperStop("pivot"), effects.LowerStop("pivot"),
+    effects.UpperStop("pivot"), effects.LowerStop("pivot"), effects.AmbientFlow("pivot"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}

@@ -1,0 +1,72 @@
+"""What an author wrote, altered: inertia that a joint takes along, a medium that moves.
+
+Joints first and rows last. Numbers of what alters it are kept among the parameters, which are cut
+to rows as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
+
+from sims.effects.base import Effect
+from sims.effects.inertia import InertiaEffect
+from sims.motion import Acceleration
+from sims.simulator import Array
+
+
+def carrying(
+    acceleration: Acceleration, inertias: Mapping[str, tuple[int, InertiaEffect]]
+) -> Acceleration:
+    """The accelerations with inertia that moves with one joint alone.
+
+    Args:
+        acceleration: Without it.
+        inertias: Numbers of joints and what each takes along, by the beginning of the names of the
+            parameters that hold its numbers.
+    """
+    if not inertias:
+        return acceleration
+
+    def slowed(q: Array, v: Array, u: Array, force: Array, p: SimpleNamespace) -> Array:
+        own = [(j, e.with_values(**numbers_in(p, name, e))) for name, (j, e) in inertias.items()]
+        force = force.copy()
+        for j, effect in own:
+            force[j] -= 0.5 * effect.slope_at(q[j]) * v[j] ** 2
+        found = acceleration(q, v, u, force, p)
+        moved = []  # by a unit force on each of the joints
+        for j, _ in own:
+            more = force.copy()
+            more[j] += 1.0
+            moved.append(acceleration(q, v, u, more, p) - found)
+        # One inertia after the other, by the formula of Sherman and Morrison.
+        for i, (j, effect) in enumerate(own):
+            inertia = effect.inertia_at(q[j])
+            share = inertia / (1 + inertia * moved[i][j])
+            for other in range(i + 1, len(moved)):
+                moved[other] = moved[other] - moved[i] * (share * moved[other][j])
+            found = found - moved[i] * (share * found[j])
+        return found
+
+    return slowed
+
+
+def in_flows(acceleration: Acceleration, flows: Mapping[str, int]) -> Acceleration:
+    """The accelerations where a medium moves along some joints: numbers of these, by the names of
+    the parameters that hold its speeds."""
+    if not flows:
+        return acceleration
+
+    def through(q: Array, v: Array, u: Array, force: Array, p: SimpleNamespace) -> Array:
+        v = v.copy()
+        for name, j in flows.items():
+            v[j] -= getattr(p, name)
+        return acceleration(q, v, u, force, p)
+
+    return through
+
+
+def numbers_in(p: SimpleNamespace, name: str, effect: Effect) -> dict[str, Any]:
+    """Numbers of an effect that are kept among the parameters, by the beginning of their names."""
+    return {field: getattr(p, f"{name} {field}") for field in effect.numbers()}

@@ -1,0 +1,60 @@
+"""A boat in a current that nobody told the simulator of."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from residual.gap import find_gap
+from residual.trajectories import Trajectory
+from sims.equations import EquationOfMotion
+from sims.simulator import Channel, Parameter
+
+
+class Boat(EquationOfMotion):
+    """Its way over ground by satellite, and its thrust."""
+
+    dt = 0.2
+    state_channels = (
+        Channel("x", "m", "position", invariant=True),
+        Channel("u", "m/s", "rate", rate_of="x", scale=1.0),
+    )
+    action_channels = (Channel("thrust", "N", "input", scale=60.0, low=-120.0, high=120.0),)
+
+    def __init__(self):
+        self.parameters = {
+            "mass": Parameter(60.0, "kg", "mass, water that moves along included", low=1.0),
+            "linear": Parameter(22.0, "N s/m", "drag", low=0.0, family="dissipation"),
+            "square": Parameter(25.0, "N s^2/m^2", "drag", low=0.0, family="dissipation"),
+        }
+        super().__init__()
+
+    def acceleration(self, q, v, u, force, p):
+        speed = v[:, 0]
+        drag = p.linear * speed + p.square * speed * np.abs(speed)
+        return ((u[:, 0] - drag + force[:, 0]) / p.mass)[:, None]
+
+
+def measured(seed, current, n=600):
+    """Thrusts for 10 s each, parameters 1 % off, rounded readings."""
+    rng = np.random.default_rng(seed)
+    thrusts = np.repeat(rng.uniform(-60, 110, n // 50), 50)
+    x, seen = np.zeros(2), []
+    for thrust in thrusts:
+        seen.append(x)
+
+        def rates(_, y, thrust=thrust):
+            w = y[1] - current
+            return [y[1], (thrust - 22.2 * w - 24.8 * w * abs(w)) / 60.6]
+
+        x = solve_ivp(rates, (0, 0.2), x, rtol=1e-8, atol=1e-10).y[:, -1]
+    states = np.round(np.array(seen) + [0.02, 0.01] * rng.standard_normal((n, 2)), 2)
+    return Trajectory(f"run {seed}", 0.2 * np.arange(n), states, thrusts[:-1, None])
+
+
+@pytest.mark.long
+def test_a_current_is_named_in_place_of_the_loads_and_dampers_that_it_looks_like():
+    found = find_gap(Boat(), [measured(seed, 0.35) for seed in range(3)])
+    sure = [v for v in found.verdicts if v.kind == "confirmed"]
+    assert [v.label for v in sure] == ["ambient_flow@x"]
+    (speed,) = sure[0].parameters.values()
+    assert speed.low < 0.35 < speed.high and speed.high - speed.low < 0.05
