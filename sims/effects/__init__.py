@@ -51,6 +51,7 @@ from sims.effects.joint import ViscousFriction as ViscousFriction
 from sims.effects.library import library as library
 from sims.effects.library import typical as typical
 from sims.effects.limit import RateLimit as RateLimit
+from sims.effects.link import AsymmetricCouplingDamping as AsymmetricCouplingDamping
 from sims.effects.link import CouplingDamper as CouplingDamper
 from sims.effects.link import CouplingSpring as CouplingSpring
 from sims.effects.link import Link as Link

@@ -49,7 +49,12 @@ from sims.effects.joint import (
     ViscousFriction,
 )
 from sims.effects.limit import RateLimit, follows_command, goals
-from sims.effects.link import CouplingDamper, CouplingSpring, linked_joints
+from sims.effects.link import (
+    AsymmetricCouplingDamping,
+    CouplingDamper,
+    CouplingSpring,
+    linked_joints,
+)
 from sims.effects.loss import PowerLoss, ProportionalLoss
 from sims.effects.parameter import ParameterChange
 from sims.effects.pull import pulled_by_position, pulled_by_turn
@@ -184,7 +189,8 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     )  # fmt: skip
     both: list[Effect] = [kind(joint.name) for kind in kinds for joint in simulator.joints]
     both += [Coupling(BY.join(names)) for names in coupled_states(simulator)]
-    links = itertools.product((CouplingSpring, CouplingDamper), linked_joints(simulator))
+    joined = CouplingSpring, CouplingDamper, AsymmetricCouplingDamping
+    links = itertools.product(joined, linked_joints(simulator))
     both += [kind(AND.join(names)) for kind, names in links]
     slow = [name for name in inputs if name not in goals(simulator)]
     at_inputs = [kind(name) for kind in (AsymmetricActuator, Hysteresis) for name in inputs]

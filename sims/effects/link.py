@@ -9,6 +9,8 @@ import itertools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
+
 from sims.effects.actuator import AND
 from sims.effects.base import Both, Effect, number, place
 from sims.effects.joint import RESTS, Value
@@ -96,6 +98,37 @@ class CouplingDamper(Link):
     def pull(self, away: Value, parting: Value) -> Value:
         """Force that keeps the two from parting."""
         return -self.coefficient * parting
+
+
+@dataclasses.dataclass(frozen=True)
+class AsymmetricCouplingDamping(Link):
+    """A damper between two joints that is harder one way, and as much softer the other:
+    ``-forward |v1 - ratio v2|``, beside what the simulator has.
+
+    The shock absorber of a car is several times as hard in rebound as in compression, and pulls the
+    body down in the mean while the wheel runs over a rough road ("jacking down"; Dixon, "The Shock
+    Absorber Handbook", 2007). Hosted by written-out equations.
+    """
+
+    forward: Value = number(force=1, rate=-1)
+
+    name: ClassVar[str] = "asymmetric_coupling_damping"
+    sentence: ClassVar[str] = (
+        "A damper between two joints that is harder one way: the shock absorber of a car."
+    )
+    needs: ClassVar[str] = "times at which the two move against each other, slowly and fast"
+    family: ClassVar[str] = "dissipation"
+    by_position: ClassVar[bool] = False
+
+    def pull(self, away: Value, parting: Value) -> Value:
+        """Force beside that of a damper which is as hard either way."""
+        return -self.forward * np.abs(parting)
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """As for every link; the system has to be written out."""
+        if not simulator.written_out:
+            raise ValueError(f"{self.name} needs a system that is written out as equations")
+        return super().measures(simulator)
 
 
 def linked_joints(simulator: HostSimulator) -> list[tuple[str, str]]:

@@ -45,7 +45,9 @@ PAIRS = ("load-dependent",)
 #: Times its value that an end of an interval may be, beyond which it is none.
 OPEN = 1e6
 #: Effects that act between two places.
-BETWEEN = ("exchange", "coupling_spring", "coupling_damper")
+BETWEEN = (
+    "exchange", "coupling_spring", "coupling_damper", "asymmetric_coupling_damping",
+)  # fmt: skip
 
 
 def effect_name(label: str) -> str:
