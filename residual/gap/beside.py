@@ -32,16 +32,18 @@ class Conventions:
             better: a sign, a zero, a unit or a clock; of ``"row"`` the inputs, of ``"size"``
             what is left out.
         times: How much smaller the error is then, or how many times its scale a channel is.
-        reason: ``"forecasts"`` are far better so, or with the ``"zero"`` of an angle elsewhere; an
-            input would be turned round by what was found (``"sign"``); a channel is far beyond the
-            ``"scale"`` that it declares; what is found with every input a ``"row"`` earlier
-            forecasts better, or what is ``"found"`` with the change; or a channel may hold the
-            ``"size"`` of a speed alone.
+        reason: ``"forecasts"`` are far better so, or with the ``"zero"`` of an angle elsewhere, or
+            with samples at the ``"pace"`` of the control period; an input would be turned round by
+            what was found (``"sign"``); a channel is far beyond the ``"scale"`` that it declares;
+            what is found with every input a ``"row"`` earlier forecasts better, or what is
+            ``"found"`` with the change; or a channel may hold the ``"size"`` of a speed alone.
     """
 
     changes: tuple[str, ...]
     times: float
-    reason: Literal["forecasts", "zero", "sign", "scale", "row", "found", "size"] = "forecasts"
+    reason: Literal["forecasts", "zero", "pace", "sign", "scale", "row", "found", "size"] = (
+        "forecasts"
+    )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -21,6 +21,7 @@ def _conventions(result: GapResult) -> str:
     why = {
         "forecasts": errs,
         "zero": errs,
+        "pace": f"{errs}, as where times were made up from a period that was not kept",
         "sign": f"what fits acts the other way, as with {changes}",
         "scale": f"a channel is {other.times:.0f} times the scale that it declares, as without "
         f"{changes}",

@@ -31,6 +31,8 @@ SLIPS, SLIPPED = (10.0, 60.0, 100.0, 1000.0), 0.15
 #: Units of time, one in the other, and control periods in a sample from which on one is far; the
 #: largest command likewise, over a share of it.
 TIMES, FAR = (60.0, 1000.0, 3600.0), 8.0
+#: Ratio of a sample to the control period from which on it may be meant to be that.
+PACE = 1.05
 #: Ratios of a gear that inputs may lack, and part of their declared sizes that all are below
 #: then.
 RATIOS, SMALL = np.geomspace(5.0, 320.0, 13), 0.1
@@ -68,23 +70,24 @@ def conventions(
 def _of_the_clock(
     simulator: HostSimulator, samples: Samples, joints: Sequence[Sequence[int]]
 ) -> list[Convention]:
-    """A sample in every control period, where one comes ten, 60, 100 or 1000 times as often or as
-    seldom; or another unit of time, where samples are far from the control period as they are said
-    to come and near it in that unit.
+    """A sample in every control period, where one comes at another pace; or another unit of time,
+    where samples are far from the control period as they are said to come and near it in that unit.
 
-    Times that count rows may be their numbers, whatever the control period. A measured rate counts
-    as it is, or it was put on the scale of a position whose clock was wrong.
+    Times may count rows, or be made up from a period that was meant and not kept, whatever the
+    control period. A measured rate counts as it is, or it was put on the scale of a position whose
+    clock was wrong.
     """
     rare = samples.recorded_step / simulator.dt
-    slips = [n for n in SLIPS for ratio in (rare, 1 / rare) if abs(ratio / n - 1) < SLIPPED]
-    if samples.recorded_step == 1.0 and rare != 1.0:
-        slips.append(rare)
-    also = f" (`period: {simulator.dt:g}` of a log without times)" if slips else ""
+    slips = any(abs(ratio / n - 1) < SLIPPED for n in SLIPS for ratio in (rare, 1 / rare))
+    near = not slips and 1 / FAR < rare < FAR and bool(abs(np.log(rare)) > np.log(PACE))
+    by_rows = slips or near or (samples.recorded_step == 1.0 and rare != 1.0)
+    also = f" (`period: {simulator.dt:g}` of a log without times)" if by_rows else ""
     found = []
-    for clock in [1 / rare] if slips else _units_of_time(rare):
+    for clock in [1 / rare] if by_rows else _units_of_time(rare):
         says = f"`scale: {clock:.6g}` for the time{also}"
         plain, pace = (
-            dataclasses.replace(as_said(simulator), says=says, clock=clock) for _ in range(2)
+            dataclasses.replace(as_said(simulator), says=says, clock=clock, meant=near)
+            for _ in range(2)
         )
         for joint in joints:
             pace.states[0, joint[1:]] = 1 / clock

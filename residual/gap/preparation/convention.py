@@ -26,6 +26,7 @@ class Convention:
         inputs_from: The same of every input, (n_a,).
         turned: Whether nothing but the zero of an angle is another one, and perhaps its direction.
         clock: Times as long as said that every step lasts.
+        meant: Whether that is the control period, from which samples are not far as they are said.
         relative: States to which a multiple of another is added: the places of both, and how often.
     """
 
@@ -36,6 +37,7 @@ class Convention:
     inputs_from: Places
     turned: bool = False
     clock: float = 1.0
+    meant: bool = False
     relative: tuple[tuple[int, int, float], ...] = ()
 
     def states_of(self, seen: Array) -> Array:

@@ -33,6 +33,7 @@ from residual.gap.preparation.other_units import misread
 from residual.gap.preparation.way import errors_of, mean_error
 from residual.logs.units import other_units
 from sims.effects.base import Effect
+from sims.effects.parameter import ParameterChange
 from sims.effects.sensor import SensorOffset
 from sims.host import HostSimulator
 from sims.simulator import UNDECLARED
@@ -108,7 +109,8 @@ def otherwise(
     further = None if _smaller_angle(simulator, fitter.samples, best) else beyond(best)
     if further is not None and BETTER * least > mean_error(simulator, fitter, further):
         return None
-    reason: Literal["zero", "forecasts"] = "zero" if best.turned else "forecasts"
+    reason: Literal["zero", "pace", "forecasts"] = "pace" if best.meant else "forecasts"
+    reason = "zero" if best.turned else reason
     return Conventions(_as_good(errors, least), own / least, reason)
 
 
@@ -177,7 +179,8 @@ def still_open(
 
     What stands upright in a loop runs away in every forecast that misses something, and would err
     less if it hung. What is explained down to the noise without a sensor's zero does not, unless
-    another zero alone does nearly as much: effects are found that make up for it.
+    another zero alone does nearly as much: effects are found that make up for it. And a single
+    parameter that is off is likelier than times that were made up; several are not.
 
     Args:
         conventions: With which the nominal simulator forecasts better.
@@ -186,6 +189,8 @@ def still_open(
         found: Its effects.
         times: That they make forecasts better.
     """
+    if conventions.reason == "pace":
+        return sum(isinstance(effect, ParameterChange) or effect.drives for effect in found) > 1
     zero = conventions.reason == "zero"
     turns = {channel.name: channel.turn for channel in simulator.physical_channels}
     zeros = [

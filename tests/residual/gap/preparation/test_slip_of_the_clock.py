@@ -1,4 +1,4 @@
-"""Logs whose times are ten or sixty times too long, or too short."""
+"""Logs whose times are ten or sixty times too long, or too short, or made up."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import pytest
 from plate import Plate
 
 from residual.gap import find_gap
-from residual.gap.preparation.conventions import otherwise
+from residual.gap.preparation.conventions import otherwise, still_open
 from residual.gap.preparation.prepare import prepare
 from residual.trajectories import Trajectory
-from sims.effects import ConstantLoad, ParameterChange
+from sims.effects import ActuatorGain, ConstantLoad, ParameterChange
 
 #: What a plate may lack that is none of its clock.
 LARGE = [
@@ -44,6 +44,17 @@ def test_a_slip_of_the_clock_is_told(slip):
     assert says == f"`scale: {1 / slip:.6g}` for the time (`period: 1` of a log without times)"
 
 
+@pytest.mark.parametrize("pace", [2.5, 0.4])
+def test_times_that_were_made_up_are_told_unless_one_parameter_explains_as_much(pace):
+    run = heated()
+    found = asked(dataclasses.replace(run, times=pace * run.times))
+    assert found is not None and found.reason == "pace"
+    assert found.changes[0].startswith(f"`scale: {1 / pace:.6g}` for the time")
+    off = ParameterChange("time_constant", 30.0)
+    assert not still_open(found, Plate(), True, [off, ConstantLoad("warmth", 0.1)], 20.0)
+    assert still_open(found, Plate(), True, [off, ActuatorGain("power", 0.3)], 20.0)
+
+
 def test_numbers_of_rows_in_place_of_times_are_told():
     run = heated(dt=0.2)
     found = asked(dataclasses.replace(run, times=np.arange(len(run.times), dtype=float)), dt=0.2)
@@ -59,7 +70,7 @@ def test_a_sample_a_second_of_a_faster_simulator_is_none():
 def test_rare_and_frequent_samples_are_none(effects):
     run = heated(effects)
     assert asked(run) is None
-    for dt in (0.1, 10.0):
+    for dt in (0.1, 0.7, 1.25, 10.0):
         assert asked(run, dt) is None, dt
 
 
