@@ -1,6 +1,8 @@
 """What changes at one row does along the rest of its window, in the linear picture.
 
-Compiled (docs/benchmarks.md has the times beside NumPy's products of stacks of small matrices).
+Compiled: of 100 windows of 17 samples of 6 states as fast as NumPy's products of stacks of matrices
+for 7 columns (0.34 ms), and 8 times as fast for 90 (1.4 and 11.6 ms; tests/benchmarks/
+test_carrying_time.py).
 """
 
 from __future__ import annotations
