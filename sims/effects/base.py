@@ -136,6 +136,7 @@ class Effect(abc.ABC):
         looks_like: What outside the library moves a system in the same way if the effect is in all
             its inputs, in words.
         creeps: True if it is a constant that is seldom one for long, as zeros of sensors are.
+        pushes: True if to most logs it is a constant push.
         comes_with: Name of an effect that is usually there, too, where it is.
         whole: Names of numbers at whose upper bound it is a law of its own, and whole.
         turns: Part of a turn that data have to cover for it to be told from what does not turn.
@@ -153,6 +154,7 @@ class Effect(abc.ABC):
     holds_still: ClassVar[bool] = False
     drives: ClassVar[bool] = False
     creeps: ClassVar[bool] = False
+    pushes: ClassVar[bool] = False
     comes_with: ClassVar[str] = ""
     whole: ClassVar[tuple[str, ...]] = ()
     turns: ClassVar[float] = 0.0

@@ -34,6 +34,7 @@ class AmbientFlow(Effect):
     )
     enters: ClassVar = "joint"
     needs: ClassVar[str] = "motion at several speeds, either way"
+    pushes: ClassVar[bool] = True
 
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of the rate."""

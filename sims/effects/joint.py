@@ -100,6 +100,7 @@ class AsymmetricDamping(JointEffect):
 
     name: ClassVar[str] = "asymmetric_damping"
     sentence: ClassVar[str] = "Damping that is harder one way than the other: a shock absorber."
+    pushes: ClassVar[bool] = True
     needs: ClassVar[str] = "motion at several speeds in both directions"
     family: ClassVar[str] = "dissipation"
 

@@ -117,6 +117,7 @@ class AsymmetricCouplingDamping(Link):
         "A damper between two joints that is harder one way: the shock absorber of a car."
     )
     needs: ClassVar[str] = "times at which the two move against each other, slowly and fast"
+    pushes: ClassVar[bool] = True
     family: ClassVar[str] = "dissipation"
     by_position: ClassVar[bool] = False
 

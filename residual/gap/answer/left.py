@@ -73,17 +73,26 @@ def worth_asking_for(answer: Answer, further: Sequence[Effect]) -> list[Effect]:
 
 
 def _fits_in_place(one: Candidate, fitter: SmoothFitter, fit: Fit) -> bool:
-    """Whether an effect fits about as well in place of what is of its family, and at its place."""
-    kind = one.effect.family, one.effect.where
+    """Whether an effect fits about as well in place of what is of its family, and at its place, or
+    of a constant push that it is in the mean."""
     chosen = fit.model.chosen
-    alike = [i for i, c in enumerate(chosen) if (c.effect.family, c.effect.where) == kind]
-    if not (alike and one.effect.family):
-        return False
-    kept = [candidate for i, candidate in enumerate(chosen) if i not in alike]
-    own = fit.theta[~np.isin(fit.model.owner, alike)]
-    model = Model(fit.model.simulator, [*kept, one])
-    starts = (np.append(own, trial.values[0]) for trial in one.trials)
-    return any(fitter.fit(model, start, fit).merit < NEARLY * fit.merit for start in starts)
+    for gone in _in_whose_place(one.effect, [candidate.effect for candidate in chosen]):
+        kept = [candidate for i, candidate in enumerate(chosen) if i not in gone]
+        own = fit.theta[~np.isin(fit.model.owner, gone)]
+        model = Model(fit.model.simulator, [*kept, one])
+        starts = (np.append(own, trial.values[0]) for trial in one.trials)
+        if any(fitter.fit(model, start, fit).merit < NEARLY * fit.merit for start in starts):
+            return True
+    return False
+
+
+def _in_whose_place(further: Effect, chosen: Sequence[Effect]) -> list[list[int]]:
+    """Members, by place, that a further effect may stand for: all of its family where it acts; or
+    each of the constant pushes, if it pushes in the mean."""
+    kind = further.family, further.where
+    alike = [i for i, one in enumerate(chosen) if kind == (one.family, one.where)]
+    pushes = [[i] for i, one in enumerate(chosen) if further.pushes and one.creeps]
+    return [alike, *pushes] if alike and further.family else pushes
 
 
 def half_beyond_noise(answer: Answer, loss: float) -> float:
