@@ -52,7 +52,7 @@ def test_a_motor_that_is_twenty_times_faster_than_its_data_sheet_is_named(wander
     found = find_gap(Motor(), [stepped(0.005, wander)], effects=OFFERED)
     first = found.verdicts[0]
     assert (first.kind, first.effect) == ("ambiguous", "time_constant")
-    assert first.doubts == ("extreme",)
+    assert "extreme" in first.doubts
     assert first.parameters["change"].low < -0.095 < first.parameters["change"].high
 
 
