@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from sims.effects.base import Effect
+from sims.effects.flow import AmbientFlow
 from sims.effects.inertia import InertiaEffect
 from sims.motion import Acceleration
 from sims.simulator import Array
@@ -52,16 +53,17 @@ def carrying(
     return slowed
 
 
-def in_flows(acceleration: Acceleration, flows: Mapping[str, int]) -> Acceleration:
-    """The accelerations where a medium moves along some joints: numbers of these, by the names of
-    the parameters that hold its speeds."""
+def in_flows(
+    acceleration: Acceleration, flows: Mapping[str, tuple[int, AmbientFlow]]
+) -> Acceleration:
+    """The accelerations where a medium moves along some joints; arguments as of ``carrying``."""
     if not flows:
         return acceleration
 
     def through(q: Array, v: Array, u: Array, force: Array, p: SimpleNamespace) -> Array:
         v = v.copy()
-        for name, j in flows.items():
-            v[j] -= getattr(p, name)
+        for name, (j, flow) in flows.items():
+            v[j] -= numbers_in(p, name, flow)["speed"]
         return acceleration(q, v, u, force, p)
 
     return through

@@ -45,8 +45,7 @@ def kept_motion(host: HostSimulator, make: Callable[[], Motion]) -> Motion:
         make: Makes the motion anew.
     """
     own = (host, host.effects, host.joints, *host.parameters, *host.parameters.values())
-    known: tuple[object, ...] = getattr(_last, "of", ())
-    if len(known) != len(own) or not all(map(operator.is_, known, own)):
+    if not _same(getattr(_last, "of", ()), own):
         _last.of, _last.motion = own, make()
     motion: Motion = _last.motion
     return motion
@@ -62,13 +61,17 @@ def kept_scale(host: HostSimulator, joint: str, make: Callable[[], float]) -> fl
     """
     rest = {**vars(host), "effects": None, "state_channels": None}
     own = (type(host), *host.physical_channels, *rest, *rest.values())
-    known: tuple[object, ...] = getattr(_last, "scales_of", ())
-    if len(known) != len(own) or not all(map(operator.is_, known, own)):
+    if not _same(getattr(_last, "scales_of", ()), own):
         _last.scales_of, _last.scales = own, {}
     scales: dict[str, float] = _last.scales
     if joint not in scales:
         scales[joint] = make()
     return scales[joint]
+
+
+def _same(known: tuple[object, ...], own: tuple[object, ...]) -> bool:
+    """Whether a thing is made of the very objects that it was made of."""
+    return len(known) == len(own) and all(map(operator.is_, known, own))
 
 
 def motion_of(
@@ -101,28 +104,30 @@ def motion_of(
         for i, e in enumerate(there)
         if isinstance(e, InertiaEffect)
     }
-    rated = {joint.name: joint.rate is not None for joint in host.joints}
-    inertia = {
+    mediums = {
+        f"{e} {i}": (names.index(e.joint), e)
+        for i, e in enumerate(there)
+        if isinstance(e, AmbientFlow)
+    }
+    altering = {
         f"{name} {field}": getattr(e, field)
-        for name, (_, e) in added.items()
+        for name, (_, e) in {**added, **mediums}.items()
         for field in e.numbers()
     }
-    mediums = {f"{e} {i}": e for i, e in enumerate(there) if isinstance(e, AmbientFlow)}
-    speeds = {name: e.speed for name, e in mediums.items()}
-    along = {name: names.index(e.joint) for name, e in mediums.items()}
+    speeds = {joint.name: joint.rate is not None for joint in host.joints}
     inputs = {channel.name: (2, k) for k, channel in enumerate(host.action_channels)}
     curves = [e for e in there if isinstance(e, ParameterCurve)]
     follow = _Following(host, curves, {**places, **inputs})
     return Motion(
-        carrying(in_flows(follow.in_place(acceleration), along), added),
+        carrying(in_flows(follow.in_place(acceleration), mediums), added),
         follow.in_place(drive_force),
-        Values(**host.parameter_values(), **inertia, **speeds, **follow.numbers()),
+        Values(**host.parameter_values(), **altering, **follow.numbers()),
         smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
         dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),
         plays=tuple((names.index(e.joint), e) for e in host.plays()),
         capped=tuple((names.index(e.joint), e) for e in there if isinstance(e, RateLimit)),
         returns=tuple(
-            (names.index(e.joint), e, rated[e.joint])
+            (names.index(e.joint), e, speeds[e.joint])
             for e in there
             if isinstance(e, AsymmetricResponse)
         ),

@@ -221,7 +221,6 @@ def _in_mediums(simulator: HostSimulator) -> list[AmbientFlow]:
     for joint in simulator.joints:
         flow = AmbientFlow(joint.name)
         with contextlib.suppress(ValueError):
-            flow.quantities(simulator)
             if turn[joint.position] is None and _does_something(simulator, flow):
                 found.append(flow)
     return found
@@ -230,11 +229,11 @@ def _in_mediums(simulator: HostSimulator) -> list[AmbientFlow]:
 def _does_something(simulator: HostSimulator, effect: Effect) -> bool:
     """Whether an effect changes a control period from some states, beside none of the others."""
     plain, rng = simulator.with_effects(()), np.random.default_rng(0)
+    there = plain.with_effects([typical(effect, simulator)])
     states = plain.smooth_states(PLACES, rng)
     inputs = np.zeros((PLACES, len(plain.action_channels)))
     for column, channel in enumerate(plain.action_channels):
         inputs[:, column] = random_values(channel, PLACES, rng)
-    there = plain.with_effects([typical(effect, simulator)])
     return not np.allclose(there.step(states, inputs), plain.step(states, inputs), rtol=1e-9)
 
 

@@ -98,11 +98,11 @@ def _spreads(fit: Fit, blocks: Blocks) -> tuple[Array, Array, Array]:
     told = fit.told
     rows, residual = told.by_knob, told.residual
     with np.errstate(over="ignore"):
-        squares, slopes = float((residual**2).sum()), float((rows**2).sum())
-    if not np.isfinite(squares + slopes):
+        squares, slopes = float((residual**2).sum()), (rows**2).sum(axis=(0, 1))
+    if not np.isfinite([squares, *slopes]).all():
         unknown = np.full(rows.shape[-1], np.inf)
         return unknown, unknown, unknown
-    scale = np.sqrt(np.maximum((rows**2).sum(axis=(0, 1)), 1e-300))
+    scale = np.sqrt(np.maximum(slopes, 1e-300))
     unit = rows / scale
     # Of a number that moves nothing, no more is known than what is known for certain.
     known = np.maximum(np.array([knob.known for knob in fit.model.knobs]) * scale, 1e-6)

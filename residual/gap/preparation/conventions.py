@@ -109,8 +109,9 @@ def otherwise(
     further = None if _smaller_angle(simulator, fitter.samples, best) else beyond(best)
     if further is not None and BETTER * least > mean_error(simulator, fitter, further):
         return None
-    reason: Literal["zero", "pace", "forecasts"] = "pace" if best.meant else "forecasts"
-    reason = "zero" if best.turned else reason
+    reason: Literal["zero", "pace", "forecasts"] = (
+        "zero" if best.turned else "pace" if best.meant else "forecasts"
+    )
     return Conventions(_as_good(errors, least), own / least, reason)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from held import path
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
@@ -38,17 +38,19 @@ def measured(seed, current, n=600):
     """Thrusts for 10 s each, parameters 1 % off, rounded readings."""
     rng = np.random.default_rng(seed)
     thrusts = np.repeat(rng.uniform(-60, 110, n // 50), 50)
-    x, seen = np.zeros(2), []
-    for thrust in thrusts:
-        seen.append(x)
 
-        def rates(_, y, thrust=thrust):
-            w = y[1] - current
-            return [y[1], (thrust - 22.2 * w - 24.8 * w * abs(w)) / 60.6]
+    def rates(_, y, thrust):
+        w = y[1] - current
+        return [y[1], (thrust - 22.2 * w - 24.8 * w * abs(w)) / 60.6]
 
-        x = solve_ivp(rates, (0, 0.2), x, rtol=1e-8, atol=1e-10).y[:, -1]
-    states = np.round(np.array(seen) + [0.02, 0.01] * rng.standard_normal((n, 2)), 2)
-    return Trajectory(f"run {seed}", 0.2 * np.arange(n), states, thrusts[:-1, None])
+    return read(f"run {seed}", path(rates, [0.0, 0.0], thrusts, 0.2), thrusts, 0.02, 0.2, rng)
+
+
+def read(name, states, inputs, noise, dt, rng):
+    """Rounded readings of a position and its rate."""
+    seen = states[:-1, :2] + [noise, 0.01] * rng.standard_normal((len(inputs), 2))
+    times = dt * np.arange(len(inputs))
+    return Trajectory(name, times, np.round(seen, 2), inputs[:-1, None])
 
 
 @pytest.mark.long
@@ -88,18 +90,14 @@ def flown(seed, n=500):
     """In a wind of 2.2 m/s, the pitch 0.16 s late."""
     rng = np.random.default_rng(seed)
     pitches = np.repeat(rng.uniform(-0.3, 0.3, n // 25), 25)
-    x, seen = np.zeros(3), []
-    for pitch in pitches:
-        seen.append(x[:2])
 
-        def rates(_, y, pitch=pitch):
-            w = y[1] - 2.2
-            drag = 0.224 * w + 0.0493 * w * abs(w)
-            return [y[1], 9.81 * np.tan(y[2]) - drag / 1.32, (pitch - y[2]) / 0.16]
+    def rates(_, y, pitch):
+        w = y[1] - 2.2
+        drag = 0.224 * w + 0.0493 * w * abs(w)
+        return [y[1], 9.81 * np.tan(y[2]) - drag / 1.32, (pitch - y[2]) / 0.16]
 
-        x = solve_ivp(rates, (0, 0.04), x, rtol=1e-8, atol=1e-10).y[:, -1]
-    states = np.round(np.array(seen) + [0.01, 0.01] * rng.standard_normal((n, 2)), 2)
-    return Trajectory(f"flight {seed}", 0.04 * np.arange(n), states, pitches[:-1, None])
+    flight = path(rates, np.zeros(3), pitches, 0.04)
+    return read(f"flight {seed}", flight, pitches, 0.01, 0.04, rng)
 
 
 @pytest.mark.long

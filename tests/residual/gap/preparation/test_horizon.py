@@ -246,5 +246,6 @@ def test_of_a_slow_motion_that_is_unstable_without_what_is_missing_rows_are_clos
     assert np.median([len(forecast.times) for forecast in found.rollouts]) > 9
     first = found.verdicts[0]
     # Its torque follows from what was measured alone, so that it is not certain.
-    assert first.effect == "viscous_friction" and "loop" in first.doubts
+    assert (first.kind, first.effect) == ("ambiguous", "viscous_friction")
+    assert first.doubts == ("unsteady", "loop")
     assert first.parameters["coefficient"].low < friction < first.parameters["coefficient"].high
