@@ -25,7 +25,8 @@ Doubt = Literal[
     "not_needed", "unsteady", "creeps", "drift", "one_way", "law", "numerics", "at_bound", "clock",
     "within_step", "swapped", "conventions", "cut_off", "extreme", "stretched", "orders", "levels",
     "loop", "records", "set_aside", "no_help", "sensor", "no_time", "may_be_zero", "size_open",
-    "share_may_be_zero", "calibration", "within", "slight", "few_blocks", "rivals", "instead",
+    "share_may_be_zero", "calibration", "within", "slight", "company", "few_blocks", "rivals",
+    "instead",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.
 WORSE = 1.05
@@ -37,9 +38,8 @@ OFF = 1.5
 class Number:
     """A fitted number with its 95 % interval and unit; at a bound it has none that means much.
 
-    ``if_exact`` is the interval if everything else in the simulator were exactly right; None if
-    the simulator was taken for exact anyway. ``along`` is what it is at the beginning of the
-    records and at their end if it clearly changes on the way.
+    ``if_exact`` is the interval if all else in the simulator were exactly right; None if it was
+    taken for that. ``along`` is what it is as the records begin and end if it clearly changes.
     """
 
     value: float

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from residual.gap.answer.calibrated import calibrated_verdict, moved
+from residual.gap.answer.company import in_company
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.evidence import evidence
 from residual.gap.answer.table import gap, rollouts
@@ -20,6 +21,7 @@ from residual.gap.answer.verdicts import (
 from residual.gap.beside import Blind
 from residual.gap.confirmation.aliases import hidden
 from residual.gap.confirmation.certainty import TOO_FEW, share
+from residual.gap.confirmation.claim import Claim
 from residual.gap.fitting.forecasts import fitted_floor
 from residual.gap.result import Gap, GapResult, Verdict
 from residual.gap.search.comparisons import helps, material
@@ -109,12 +111,18 @@ def verdicts(
     search = answer.found.search
     labels = [search.candidates[claim.number].label for claim in answer.claims]
     blocks = len(search.fitter.blocks)
-    made: list[Verdict] = []
     left = answer.left
     times = 1.0 if left.adequate else left.ratio
-    for claim, label in zip(answer.claims, labels, strict=True):
-        exact = dependent(label, labels, sets)
-        made.append(effect_verdict(search, claim, blocks, *exact, times))
+
+    def of_effects(claims: Sequence[Claim]) -> list[Verdict]:
+        return [
+            effect_verdict(search, claim, blocks, *dependent(label, labels, sets), times)
+            for claim, label in zip(claims, labels, strict=True)
+        ]
+
+    made = of_effects(answer.claims)
+    if not left.adequate:
+        made = of_effects(in_company(search, answer.key, answer.claims, made))
     made.sort(key=lambda verdict: verdict.kind != "confirmed")
     if shifted := moved(search, answer.key):
         made.append(calibrated_verdict(search, shifted))

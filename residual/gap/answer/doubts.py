@@ -46,6 +46,7 @@ DOUBTS: dict[Doubt, str] = {
     "may_be_zero": "its interval holds zero, or nearly",
     "size_open": "it may be many times as large as what fits best",
     "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
+    "company": "it only helps beside another effect that may not be there",
     "calibration": "parameters that are a few percent off would do nearly as well",
     "within": "its interval reaches into the few percent that are allowed to every parameter",
     "slight": "without it errors are less than twice as large, and what has no name may favour "
@@ -98,6 +99,7 @@ def doubts(
         "may_be_zero": vanishes,
         "size_open": wide,
         "share_may_be_zero": not claim.gains,
+        "company": claim.in_company,
         "few_blocks": thin,
         "rivals": bool(claim.rivals or claim.alike),
         "instead": bool(claim.instead),

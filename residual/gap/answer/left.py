@@ -15,7 +15,9 @@ from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.model.model import Model
 from residual.gap.search.at_sight import of_one_pair
+from residual.gap.search.explain import FOOTNOTE
 from residual.gap.search.pool import Key
+from residual.gap.search.pushes import constant, of_one_kind
 from sims.effects.base import Effect
 from sims.effects.flexible import FlexiblePart
 
@@ -24,13 +26,16 @@ from sims.effects.flexible import FlexiblePart
 QUARTER, OF_MORE = 0.25, 0.5
 #: Part of what is left beyond noise that its cause may leave in the linear picture.
 HALF = 0.5
-#: Loss over that of one of its family, up to which an effect fits about as well.
+#: Loss over that of one of its family, up to which an effect fits about as well; squared forecast
+#: error over that of more effects, up to which what fits down to the noise forecasts so.
 NEARLY = 1.25
 #: Effects fewer with which an answer that forecasts as well is the simpler one, whatever numbers
 #: these have.
 FEWER = 2
 #: Residual over noise from which on laws may only imitate the true one.
 NOTABLE = 1.5
+#: Effects from which on they are several.
+SEVERAL = 3
 #: Part of the gap without a name that is much, however little it is beside noise.
 MUCH = 0.3
 
@@ -67,6 +72,9 @@ def worth_asking_for(answer: Answer, further: Sequence[Effect]) -> list[Effect]:
     worth = {n for n in range(len(pool)) if takes_most(n)}
     for two in of_one_pair(pool):
         worth |= set(two) if takes_most(*two) else set()
+    for alike in of_one_kind(pool):
+        if _fit_in_place_of_pushes([pool[n] for n in alike], fitter, fit):
+            worth |= set(alike)
     return [
         one.effect for n, one in enumerate(pool) if n in worth or _fits_in_place(one, fitter, fit)
     ]
@@ -84,6 +92,18 @@ def _fits_in_place(one: Candidate, fitter: SmoothFitter, fit: Fit) -> bool:
         if any(fitter.fit(model, start, fit).merit < NEARLY * fit.merit for start in starts):
             return True
     return False
+
+
+def _fit_in_place_of_pushes(several: Sequence[Candidate], fitter: SmoothFitter, fit: Fit) -> bool:
+    """Whether some effects together fit about as well in place of several constant pushes."""
+    chosen, gone = fit.model.chosen, constant(fit.model.chosen)
+    if len(gone) < 2:
+        return False
+    kept = [i for i in range(len(chosen)) if i not in gone]
+    model = Model(fit.model.simulator, [*(chosen[i] for i in kept), *several])
+    own = fit.theta[np.isin(fit.model.owner, kept)]
+    start = np.concatenate([own, *(one.trials[0].values[0] for one in several)])
+    return fitter.fit(model, start, fit).merit < NEARLY * fit.merit
 
 
 def _in_whose_place(further: Effect, chosen: Sequence[Effect]) -> list[list[int]]:
@@ -109,9 +129,11 @@ def half_beyond_noise(answer: Answer, loss: float) -> float:
 
 
 def much_is_left(answer: Answer) -> bool:
-    """Whether what was named leaves clearly more than noise."""
+    """Whether what was named leaves clearly more than noise; more than noise where it is several
+    effects, which together come near to any law."""
     left = answer.left
-    return not left.adequate and left.ratio > NOTABLE
+    least = FOOTNOTE if len(answer.key) >= SEVERAL else NOTABLE
+    return not left.adequate and left.ratio > least
 
 
 def beside_noise(answer: Answer, key: Key) -> tuple[float, float]:
@@ -125,7 +147,8 @@ def beside_noise(answer: Answer, key: Key) -> tuple[float, float]:
 
 def takes_what_is_left(second: Answer, first: Answer, more: Sequence[Effect]) -> bool:
     """Whether further effects were named and take most of what the library left beside noise, half
-    of it where they stand for more than they are, or stand for three and forecast no worse.
+    of it where they stand for more than they are, or stand for three and forecast no worse, or
+    about as well where they leave no more than noise.
 
     Args:
         second: What was found with them on offer, too; ``first``: without.
@@ -137,7 +160,7 @@ def takes_what_is_left(second: Answer, first: Answer, more: Sequence[Effect]) ->
     left, least = beside_noise(first, first.key)
     now = search.currency.error(again.validated[second.key].squares) ** 2
     fewer = len(first.key) - len(second.key)
-    if fewer >= FEWER and now <= left:
+    if fewer >= FEWER and now <= (NEARLY if second.left.adequate else 1.0) * left:
         return True
     most = OF_MORE if fewer > 0 else QUARTER
     return now - least < most * (left - least) and better(second, first)

@@ -7,6 +7,7 @@ import numpy as np
 from residual.gap.fitting.screening import gains
 from residual.gap.search.choice import choose
 from residual.gap.search.pool import Key
+from residual.gap.search.pushes import add_in_place_of_pushes
 from residual.gap.search.sets import Proposals, Search
 
 #: Error with an effect that was lacking over that without, from which on none of them helps.
@@ -16,11 +17,17 @@ SEEDS, HOPEFUL = 12, 3.0
 
 
 def near_best(search: Search) -> list[Key]:
-    """The sets worth trying again: what is chosen, those that forecast best, and that fit best."""
+    """The sets worth trying again: what is chosen, those that forecast best, and that fit best, of
+    all and of every number of effects.
+
+    The right one may forecast badly: what stands on the verge of breaking loose does so by chance.
+    """
     best = sorted(search.usable(), key=search.error)[:SEEDS]
     good = [key for key in best if search.error(key) <= HOPEFUL * search.error(best[0])]
-    fit = sorted(search.usable(), key=lambda key: search.tried[key].merit)[: search.effort.beam]
-    return list(dict.fromkeys([choose(search).key, *good, *fit]))
+    fit = sorted(search.usable(), key=lambda key: search.tried[key].merit)
+    of_size = {len(key): key for key in reversed(fit)}
+    few = sorted(of_size.values(), key=len)
+    return list(dict.fromkeys([choose(search).key, *good, *fit[: search.effort.beam], *few]))
 
 
 def carried(earlier: Search, search: Search) -> Proposals:
@@ -65,6 +72,7 @@ def add_what_it_lacked(earlier: Search, search: Search) -> None:
             if number in fresh and (key or not search.late):
                 more, theta = search.merged(key, [(number, gain.values[0])])
                 search.add({more: theta})
+        add_in_place_of_pushes(search, key, sorted(fresh))
 
 
 def is_in_vain(earlier: Search, search: Search) -> bool:

@@ -1,4 +1,4 @@
-"""A boat in a current that nobody told the simulator of."""
+"""A boat in a current, and drones in a wind, that nobody told the simulator of."""
 
 import numpy as np
 import pytest
@@ -47,10 +47,13 @@ def measured(seed, current, n=600):
 
 
 def read(name, states, inputs, noise, dt, rng):
-    """Rounded readings of a position and its rate."""
-    seen = states[:-1, :2] + [noise, 0.01] * rng.standard_normal((len(inputs), 2))
+    """Rounded readings of positions, each followed by its rate."""
+    inputs = np.array(inputs).reshape(len(states) - 1, -1)
+    width = 2 * inputs.shape[1]
+    spread = np.tile([noise, 0.01], width // 2)
+    seen = states[:-1, :width] + spread * rng.standard_normal((len(inputs), width))
     times = dt * np.arange(len(inputs))
-    return Trajectory(name, times, np.round(seen, 2), inputs[:-1, None])
+    return Trajectory(name, times, np.round(seen, 2), inputs[:-1])
 
 
 @pytest.mark.long
@@ -108,3 +111,55 @@ def test_a_wind_is_named_in_place_of_the_bias_that_it_looks_like():
     assert not {"actuator_bias@pitch", "constant_load@x"} & set(sure)
     (speed,) = sure["ambient_flow@x"].parameters.values()
     assert speed.low < 2.2 < speed.high and speed.high - speed.low < 0.4
+
+
+class OverGround(EquationOfMotion):
+    """A drone along x and y, whose drag both speeds make."""
+
+    dt = 0.05
+    state_channels = (
+        Channel("x", "m", "position", invariant=True),
+        Channel("vx", "m/s", "rate", rate_of="x", scale=4.0),
+        Channel("y", "m", "position", invariant=True),
+        Channel("vy", "m/s", "rate", rate_of="y", scale=4.0),
+    )
+    action_channels = (
+        Channel("pitch", "rad", "input", scale=0.3, low=-0.6, high=0.6),
+        Channel("roll", "rad", "input", scale=0.3, low=-0.6, high=0.6),
+    )
+
+    def __init__(self):
+        self.parameters = {
+            "mass": Parameter(1.3, "kg", "mass", low=0.1),
+            "body": Parameter(0.09, "N s^2/m^2", "drag", low=0.0, family="dissipation"),
+        }
+        super().__init__()
+
+    def acceleration(self, q, v, u, force, p):
+        drag = p.body * np.hypot(v[:, 0], v[:, 1])[:, None] * v
+        return 9.81 * np.tan(u) + (force - drag) / p.mass
+
+
+def over_ground(seed, wind, n=500):
+    """Pitch and roll for 1.25 s each, parameters 1 % off."""
+    rng = np.random.default_rng(seed)
+    tilts = [tuple(two) for two in rng.uniform(-0.3, 0.3, (n // 25, 2)) for _ in range(25)]
+
+    def rates(_, y, tilt):
+        w = y[1::2] - wind
+        ax, ay = 9.81 * np.tan(tilt) - 0.0909 * np.hypot(*w) * w / 1.29
+        return [y[1], ax, y[3], ay]
+
+    return read(f"flight {seed}", path(rates, np.zeros(4), tilts, 0.05), tilts, 0.01, 0.05, rng)
+
+
+@pytest.mark.long
+def test_one_wind_along_two_axes_is_named_in_place_of_two_pushes():
+    """Drag couples them: with the wind along one axis alone the other's drag stays wrong."""
+    wind = np.array([3.0, -1.5])
+    found = find_gap(OverGround(), [over_ground(seed, wind) for seed in range(3)])
+    sure = {v.label: v for v in found.verdicts if v.kind == "confirmed"}
+    assert set(sure) == {"ambient_flow@x", "ambient_flow@y"}
+    for axis, true in zip("xy", wind, strict=True):
+        (speed,) = sure[f"ambient_flow@{axis}"].parameters.values()
+        assert speed.low < true < speed.high and speed.high - speed.low < 0.4
