@@ -45,6 +45,13 @@ class Noise:
     step: float = 0.0
 
 
+#: Fields of the truth that are relative changes, and those that cannot be negative.
+RELATIVE = ("mass", "inertia", "length", "actuator_gain", "sensor_scale")
+NOT_NEGATIVE = (
+    "viscous_friction", "coulomb_friction", "stribeck_friction", "stribeck_speed",
+    "quadratic_drag", "dead_zone", "saturation", "delay", "actuator_lag", "backlash", "resonance",
+)  # fmt: skip
+
 NOISES: Mapping[str, Noise] = {
     "A": Noise(angle=0.01, rate=0.2),
     "B": Noise(angle=0.0, rate=None, step=0.002),
@@ -88,6 +95,14 @@ class Truth:
     sensor_scale: float = 0.0
     resonance: float = 0.0
     wind: float = 0.0
+
+    def __post_init__(self) -> None:
+        least = {name: -1.0 for name in RELATIVE} | {name: 0.0 for name in NOT_NEGATIVE}
+        for name, low in least.items():
+            value = getattr(self, name)
+            if not (value > low or value == low == 0):
+                expected = "0 or more" if low == 0 else f"more than {low:g}"
+                raise ValueError(f"truth.{name} is {value:g}, expected {expected}")
 
     def torque(self, angle: Array, rate: Array) -> Array:
         """Joint torque of the hidden effects in N m, all but gravity and motor."""

@@ -58,3 +58,18 @@ def test_a_policy_of_another_algorithm_walks_too(tmp_path, capsys):
         assert said.count("\n") == 1 and "sac.safetensors" in said and says in said
     make_log.main([*named, "--learner_options", json.dumps(options)])
     assert list((tmp_path / "walks").glob("walk-*.csv"))
+
+
+@pytest.mark.parametrize(
+    ("option", "says"),
+    [
+        ("delay=-0.1", "truth.delay is -0.1, expected 0 or more"),
+        ("mass=-1", "truth.mass is -1, expected more than -1"),
+    ],
+)
+def test_what_no_pendulum_can_have_is_refused(tmp_path, capsys, option, says):
+    with pytest.raises(SystemExit, match="2"):
+        make_log.main(["--output", str(tmp_path / "logs"), f"--truth.{option}"])
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and says in said
+    assert not (tmp_path / "logs").exists()

@@ -69,7 +69,8 @@ def scatter(fit: Fit, blocks: Blocks) -> Array:
     if not len(fit.theta):
         return np.zeros(0)
     plain, jackknife, _ = _spreads(fit, blocks)
-    return jackknife / np.maximum(plain, 1e-300)
+    with np.errstate(over="ignore"):  # what the data hardly tell of scatters without end
+        return np.asarray(jackknife / np.maximum(plain, 1e-300))
 
 
 def _by_slopes(fit: Fit, blocks: Blocks) -> Array:
