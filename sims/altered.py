@@ -1,4 +1,5 @@
-"""What an author wrote, altered: inertia that a joint takes along, a medium that moves.
+"""What an author wrote, altered: inertia that a joint takes along, a medium that moves, a drive
+that makes no more than so much.
 
 Joints first and rows last. Numbers of what alters it are kept among the parameters, which are cut
 to rows as they are.
@@ -10,10 +11,13 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
 from sims.effects.base import Effect
+from sims.effects.drive_limit import DriveLimit
 from sims.effects.flow import AmbientFlow
 from sims.effects.inertia import InertiaEffect
-from sims.motion import Acceleration
+from sims.motion import Acceleration, DriveForce
 from sims.simulator import Array
 
 
@@ -67,6 +71,30 @@ def in_flows(
         return acceleration(q, v, u, force, p)
 
     return through
+
+
+def held_back(
+    acceleration: Acceleration, drive: DriveForce, limits: Mapping[str, tuple[int, DriveLimit]]
+) -> tuple[Acceleration, DriveForce]:
+    """The accelerations, and the force of the drives, where some are limited; arguments as of
+    ``carrying``, and of ``sims.motion.Motion``."""
+    if not limits:
+        return acceleration, drive
+
+    def lacking(push: Array, p: SimpleNamespace) -> Array:
+        found = np.zeros_like(push)
+        for name, (j, limit) in limits.items():
+            found[j] = limit.with_values(**numbers_in(p, name, limit)).lacking(push[j])
+        return found
+
+    def slower(q: Array, v: Array, u: Array, force: Array, p: SimpleNamespace) -> Array:
+        return acceleration(q, v, u, force + lacking(drive(q, v, u, p), p), p)
+
+    def weaker(q: Array, v: Array, u: Array, p: SimpleNamespace) -> Array:
+        push = drive(q, v, u, p)
+        return push + lacking(push, p)
+
+    return slower, weaker
 
 
 def numbers_in(p: SimpleNamespace, name: str, effect: Effect) -> dict[str, Any]:

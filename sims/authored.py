@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -117,7 +117,7 @@ def push_of_inputs(acceleration: Acceleration) -> DriveForce:
     return push
 
 
-def beyond_rest(rates: Acceleration, pushes: bool) -> DriveForce:
+def beyond_rest(rates: Acceleration, pushes: bool, brakes: Collection[str] = ()) -> DriveForce:
     """What drives a first-order system, (q, v, u, p) -> (states, n): the change that its inputs
     make, or, where these do not push by themselves, all change beyond that at rest without input,
     since what a voltage makes of a speed falls as that rises (back EMF).
@@ -125,10 +125,17 @@ def beyond_rest(rates: Acceleration, pushes: bool) -> DriveForce:
     Args:
         rates: What the author wrote, joints first and rows last.
         pushes: Whether inputs push by themselves.
+        brakes: Parameters of what brakes the system, which is no part of its drive.
     """
 
     def drive(q: Array, v: Array, u: Array, p: SimpleNamespace) -> Array:
         none = np.zeros_like(v)
-        return rates(q, v, u, none, p) - rates(q, v if pushes else none, 0.0 * u, none, p)
+        loose = Values(**{**vars(p), **dict.fromkeys(brakes, 0.0)})
+        with np.errstate(all="ignore"):
+            found = rates(q, v, u, none, loose)
+            found -= rates(q, v if pushes else none, 0.0 * u, none, loose)
+        if brakes and not np.isfinite(found).all():  # what is divided by one of them
+            return beyond_rest(rates, pushes)(q, v, u, p)
+        return found
 
     return drive

@@ -279,6 +279,7 @@ class FirstOrderSystem(_Equations):
     def _motion(self) -> Motion:
         names = [channel.name for channel in self.physical_channels]
         pushes = all(channel.pushes for channel in self.action_channels)
+        brakes = [name for name, p in self.parameters.items() if p.family == "dissipation"]
 
         def rates(q: Array, v: Array, u: Array, f: Array, p: SimpleNamespace) -> Array:
             own = v[: len(names)]
@@ -292,7 +293,7 @@ class FirstOrderSystem(_Equations):
                 own = v[: len(names)]
                 found = by_joint(self.drive_force(own.T, u.T, p), own.shape, "drive_force", "x")
                 return np.concatenate([found, np.zeros_like(v[len(names) :])])
-            return beyond_rest(rates, pushes)(q, v, u, p)
+            return beyond_rest(rates, pushes, brakes)(q, v, u, p)
 
         places = {name: (1, i) for i, name in enumerate(names)}
         return motion_of(self, names, places, rates, drive)

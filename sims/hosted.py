@@ -12,8 +12,9 @@ from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
-from sims.altered import carrying, in_flows
+from sims.altered import carrying, held_back, in_flows
 from sims.effects.coupling import Coupling
+from sims.effects.drive_limit import DriveLimit
 from sims.effects.exchange import Exchange
 from sims.effects.flexible import flexible_parts
 from sims.effects.flow import AmbientFlow
@@ -109,18 +110,25 @@ def motion_of(
         for i, e in enumerate(there)
         if isinstance(e, AmbientFlow)
     }
+    limits = {
+        f"{e} {i}": (names.index(e.joint), e)
+        for i, e in enumerate(there)
+        if isinstance(e, DriveLimit)
+    }
     altering = {
         f"{name} {field}": getattr(e, field)
-        for name, (_, e) in {**added, **mediums}.items()
+        for name, (_, e) in {**added, **mediums, **limits}.items()
         for field in e.numbers()
     }
     speeds = {joint.name: joint.rate is not None for joint in host.joints}
     inputs = {channel.name: (2, k) for k, channel in enumerate(host.action_channels)}
     curves = [e for e in there if isinstance(e, ParameterCurve)]
     follow = _Following(host, curves, {**places, **inputs})
+    written = follow.in_place(acceleration), follow.in_place(drive_force)
+    acceleration, drive_force = held_back(*written, limits)
     return Motion(
-        carrying(in_flows(follow.in_place(acceleration), mediums), added),
-        follow.in_place(drive_force),
+        carrying(in_flows(acceleration, mediums), added),
+        drive_force,
         Values(**host.parameter_values(), **altering, **follow.numbers()),
         smooth=tuple((j, e) for j, e in forces if not isinstance(e, DryFriction)),
         dry=tuple((j, e) for j, e in forces if isinstance(e, DryFriction)),

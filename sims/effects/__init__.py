@@ -25,6 +25,7 @@ from sims.effects.curves import FrictionCurve as FrictionCurve
 from sims.effects.curves import InputCurve as InputCurve
 from sims.effects.curves import StateCurve as StateCurve
 from sims.effects.curves import SymmetricInputCurve as SymmetricInputCurve
+from sims.effects.drive_limit import DriveLimit as DriveLimit
 from sims.effects.encoder_error import EncoderError as EncoderError
 from sims.effects.exchange import Exchange as Exchange
 from sims.effects.flexible import FlexibleJoint as FlexibleJoint

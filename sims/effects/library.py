@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +25,7 @@ from sims.effects.base import Effect
 from sims.effects.coupling import BY, Coupling, coupled_states
 from sims.effects.curve import Curve
 from sims.effects.curves import CURVES
+from sims.effects.drive_limit import DriveLimit
 from sims.effects.encoder_error import EncoderError
 from sims.effects.exchange import Exchange, like_states
 from sims.effects.flexible import FlexibleJoint, FlexiblePart
@@ -173,12 +175,11 @@ def parts_in(simulator: HostSimulator) -> tuple[FlexiblePart, ...]:
 def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     """What is rarer than the library, at zero strength.
 
-    Friction by load of every joint that the inputs move by themselves; states that fall at another
-    pace than they rise, rub otherwise backwards, lose a constant or by a power, have an inertia by
-    their angle, run into stops, act on others or are linked to them; what moves in a medium that
-    does, too; inputs that act otherwise
-    below zero or through a play, and, but for goals, that are followed at a limited pace; encoders
-    off their axis.
+    Friction by load and a limited drive of every joint that the inputs move by themselves; states
+    that fall at another pace than they rise, rub otherwise backwards, lose a constant or by a
+    power, have an inertia by their angle, run into stops, act on others or are linked to them;
+    what moves in a medium that does, too; inputs that act otherwise below zero or through a play,
+    and, but for goals, that are followed at a limited pace; encoders off their axis.
     """
     found: list[Effect] = [*_geared(simulator), *_in_mediums(simulator)]
     inputs = [channel.name for channel in simulator.action_channels]
@@ -202,27 +203,33 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     return tuple(found)
 
 
-def _geared(simulator: HostSimulator) -> list[LoadDependentFriction]:
-    known = simulator.has_drive_force or all(c.pushes for c in simulator.action_channels)
-    found = []
+def _geared(simulator: HostSimulator) -> list[Effect]:
+    """Friction by load, and limits of the drive, of what the inputs move by themselves."""
+    if not simulator.action_channels:
+        return []
+    known = simulator.has_drive_force
+    pushed = known or all(channel.pushes for channel in simulator.action_channels)
     # Of a motor's speed all is known that it makes, of other joints what is said to push them.
-    for joint in (one for one in simulator.joints if known or one.first_order):
-        gear = LoadDependentFriction(joint.name)
-        with contextlib.suppress(ValueError):
-            if simulator.action_channels and _does_something(simulator, gear):
-                found.append(gear)
-    return found
+    gears = [LoadDependentFriction(j.name) for j in simulator.joints if pushed or j.first_order]
+    moved = [joint for joint in simulator.joints if joint.rate is not None]
+    limits = [DriveLimit(joint.name) for joint in moved if known or joint.first_order]
+    return _acting(simulator, [*gears, *limits])
 
 
-def _in_mediums(simulator: HostSimulator) -> list[AmbientFlow]:
+def _in_mediums(simulator: HostSimulator) -> list[Effect]:
     """A medium that moves along each joint that slides, where its rate does something."""
     turn = {channel.name: channel.turn for channel in simulator.physical_channels}
+    sliding = [joint.name for joint in simulator.joints if turn[joint.position] is None]
+    return _acting(simulator, map(AmbientFlow, sliding))
+
+
+def _acting(simulator: HostSimulator, effects: Iterable[Effect]) -> list[Effect]:
+    """The effects that a simulator can host, and that do something there."""
     found = []
-    for joint in simulator.joints:
-        flow = AmbientFlow(joint.name)
+    for effect in effects:
         with contextlib.suppress(ValueError):
-            if turn[joint.position] is None and _does_something(simulator, flow):
-                found.append(flow)
+            if _does_something(simulator, effect):
+                found.append(effect)
     return found
 
 

@@ -77,6 +77,7 @@ OTHERS = [
     effects.CouplingSpring("pivot and elbow"), effects.CouplingDamper("pivot and elbow"),
     effects.CrankInertia("pivot"), effects.EncoderError("angle"),
     effects.UpperStop("pivot"), effects.LowerStop("pivot"), effects.AmbientFlow("pivot"),
+    effects.DriveLimit("pivot"),
     effects.AsymmetricCouplingDamping("pivot and elbow"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
