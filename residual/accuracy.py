@@ -82,6 +82,11 @@ def accuracy_along(
     Returns:
         The errors.
     """
+    if not isinstance(corrected, CorrectedSimulator):
+        raise ValueError(
+            f"accuracy is of a CorrectedSimulator(simulator, difference model), got "
+            f"{type(corrected).__name__}"
+        )
     names = [channel.name for channel in corrected.state_channels]
     before, held, after = (
         np.concatenate(parts)

@@ -156,6 +156,10 @@ class Trajectory:
     def __post_init__(self) -> None:
         samples = len(self.times)
         for name, one in (("states", self.states), ("actions", self.actions)):
+            if np.asarray(one).dtype.kind not in "fiub":
+                raise ValueError(
+                    f"{self.name}: {name} are {np.asarray(one).dtype.name}, expected numbers"
+                )
             if np.ndim(one) != 2:
                 raise ValueError(
                     f"{self.name}: {name} has shape {np.shape(one)}, expected two dimensions: a "
@@ -221,10 +225,9 @@ def trajectories_of(given: Any) -> list[Trajectory]:
     """Runs as a list, from one of them, several, or what ``residual.logs.read_logs`` returned.
 
     Raises:
-        ValueError: It is something else.
+        ValueError: It is something else, or the times of a run do not rise.
     """
-    if isinstance(given, Trajectory):
-        return [given]
+    given = [given] if isinstance(given, Trajectory) else given
     given = getattr(given, "trajectories", given)
     listed = isinstance(given, Iterable) and not isinstance(given, str)
     runs = list(given) if listed else [given]
@@ -234,5 +237,12 @@ def trajectories_of(given: Any) -> list[Trajectory]:
             raise ValueError(
                 f"expected measured runs (Trajectory), got {kind}: read logs with "
                 "read_logs(paths, simulator.state_channels, simulator.action_channels)"
+            )
+        if not (run.durations > 0).all():
+            row = int(np.argmin(run.durations > 0)) + 1
+            before, after = run.times[row - 1 : row + 1]
+            raise ValueError(
+                f"{run.name}: times go from {before:g} to {after:g} s at row {row}, expected each "
+                "to be later than the one before; sort the rows, or make a run of each part"
             )
     return runs

@@ -22,7 +22,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
+from jsonargparse.typing import ClosedUnitInterval, PositiveFloat, PositiveInt
 
 from residual.gap import GapResult, find_gap
 from residual.gap.clock import usual_minutes
@@ -71,7 +71,7 @@ class GapStudy:
     tolerance: PositiveFloat | None = None
     hold: str | dict[str, str] = "auto"
     horizon: PositiveFloat | None = None
-    parameter_tolerance: NonNegativeFloat = 0.03
+    parameter_tolerance: ClosedUnitInterval = 0.03
     minutes: PositiveFloat | None = None
 
 

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-from jsonargparse.typing import PositiveInt
+from jsonargparse.typing import NonNegativeInt, PositiveInt
 
 from policy.learner import OURS, Algorithm
 from residual.logs.writing import write_log
@@ -48,7 +48,7 @@ def build_parser() -> Parser:
         "--learner", default=OURS, help="Leo: the algorithm that learnt it, as leo_gap's --learner."
     )
     parser.add_argument("--learner_options", type=dict[str, Any], default={}, help="As leo_gap's.")
-    parser.add_argument("--seed", type=int, default=0, help="Of motion and noise.")
+    parser.add_argument("--seed", type=NonNegativeInt, default=0, help="Of motion and noise.")
     parser.add_function_arguments(write_logs, skip={"folder", "seed"})
     parser.add_function_arguments(write_walks, "walk", skip={"folder", "policy", "learner", "seed"})
     return parser

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -111,7 +111,7 @@ def find_gap(
     """
     simulator = hosting(simulator)
     declared = {channel.name: channel.scale for channel in simulator.physical_channels}
-    _refuse_settings(horizon, parameter_tolerance, minutes)
+    _refuse_settings(horizon, parameter_tolerance, minutes, n_jobs)
     runs, set_aside = trajectories_of(trajectories), trajectories_of(held_out)
     clock = Clock()
     tell = progress or (lambda _: None)
@@ -213,7 +213,7 @@ def hosting(simulator: Simulator) -> HostSimulator:
     return simulator
 
 
-def _refuse_settings(horizon: Any, parameter_tolerance: Any, minutes: Any) -> None:
+def _refuse_settings(horizon: Any, parameter_tolerance: Any, minutes: Any, n_jobs: Any) -> None:
     """Refuse numbers that are none, or mean nothing.
 
     Raises:
@@ -228,6 +228,8 @@ def _refuse_settings(horizon: Any, parameter_tolerance: Any, minutes: Any) -> No
         least = 0.0 if name == "parameter_tolerance" else np.nextafter(0.0, 1.0)
         if not number or not least <= float(value) <= most:
             raise ValueError(f"{name} is {value!r}, expected {what}")
+    if isinstance(n_jobs, bool) or not isinstance(n_jobs, Integral) or n_jobs < 1:
+        raise ValueError(f"n_jobs is {n_jobs!r}, expected a number of processes, 1 or more")
 
 
 def _searched(fitter: Fitter) -> list[str]:

@@ -89,6 +89,19 @@ def check_layout(columns: LogFormat, states: Sequence[Channel], actions: Sequenc
     Raises:
         LogError: A channel is unknown, or a setting is not usable.
     """
+    if not isinstance(columns, LogFormat):
+        raise LogError(
+            f"columns is {columns!r}, expected a LogFormat, as LogFormat(states={{...}}); a file "
+            "with one is for --columns of the command"
+        )
+    for kind, channels, own in (("state", states, False), ("action", actions, True)):
+        strange = [channel.name for channel in channels if (channel.kind == "input") != own]
+        if strange:
+            what = "is no input" if own else "is an input"
+            raise LogError(
+                f"{kind} channels: {strange[0]!r} {what}; expected the simulator's state_channels, "
+                "then its action_channels"
+            )
     for kind, given, channels in (
         ("state", columns.states, states),
         ("action", columns.actions, actions),

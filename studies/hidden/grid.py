@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
-from jsonargparse.typing import PositiveInt
+from jsonargparse.typing import NonNegativeInt, PositiveInt
 
 from studies.hidden.data import Excitation
 from studies.hidden.dirty.measure import Layout
@@ -104,7 +104,7 @@ class HiddenStudy:
         default_factory=lambda: list(METHODS)  # type: ignore[arg-type]
     )
     steps: PositiveInt = 250
-    seed: int = 0
+    seed: NonNegativeInt = 0
 
 
 def trials_of(study: HiddenStudy) -> list[dict[str, Any]]:

@@ -8,12 +8,20 @@ import typing
 from collections.abc import Mapping
 from typing import Any
 
-from jsonargparse.typing import NonNegativeFloat, PositiveFloat, PositiveInt
+from jsonargparse.typing import (
+    ClosedUnitInterval,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+)
 
 #: What numbers of these types are, in words.
 NUMBERS: dict[Any, str] = {
     PositiveFloat: "a number above 0",
     NonNegativeFloat: "a number, 0 or more",
+    ClosedUnitInterval: "a share from 0 to 1, as 0.03 for 3 %",
+    NonNegativeInt: "a whole number, 0 or more",
     PositiveInt: "a whole number, 1 or more",
 }
 UNIONS = (typing.Union, types.UnionType)

@@ -170,3 +170,8 @@ class TestAccuracy:
     def test_horizons_beyond_the_rollouts_are_left_out(self, corrected):
         states, actions = uniform_rollouts(Pendulum.true(), np.random.default_rng(5), 3, steps=6)
         assert list(accuracy_along(corrected, states, actions).multi_step) == ["0.25 s"]
+
+
+def test_accuracy_is_of_a_corrected_simulator():
+    with pytest.raises(ValueError, match=r"CorrectedSimulator\(simulator, .*, got Pendulum"):
+        accuracy_along(Pendulum(), np.zeros((1, 9, 2)), np.zeros((1, 8, 1)))

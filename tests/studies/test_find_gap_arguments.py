@@ -72,6 +72,7 @@ def test_a_log_in_degrees_is_refused(logs, tmp_path, capsys):
         (["--simulator", EQUATION, "--held-out", "absent.csv"], "absent.csv"),
         (["--simulator", EQUATION, "--seed", "1"], "seed"),
         (["--simulator", EQUATION, "--tolerance", "-1"], "tolerance"),
+        (["--simulator", EQUATION, "--parameter_tolerance", "3"], "a share from 0 to 1"),
         (["--simulator", EQUATION, "--columns.tme", "t"], "tme"),
         (["--simulator", EQUATION, "--columns", "absent.yaml"], "absent.yaml"),
         (["--simulator", EQUATION, "--output", __file__], "expected a folder"),

@@ -1,5 +1,7 @@
 """What find_gap and read_logs take for measured runs, and how they refuse the rest."""
 
+import dataclasses
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -44,6 +46,15 @@ def test_columns_that_are_not_the_channels_are_refused(states, actions, says):
         find_gap(PendulumEquation(), run)
 
 
+def test_times_that_fall_and_states_that_are_no_numbers_are_refused():
+    run = noisy()
+    backwards = dataclasses.replace(run, times=run.times[::-1])
+    with pytest.raises(ValueError, match=r"times go from 19.95 to 19.9 s at row 1.*sort the rows"):
+        find_gap(PendulumEquation(), backwards)
+    with pytest.raises(ValueError, match=r"run: states are str\d+, expected numbers"):
+        dataclasses.replace(run, states=run.states.astype(str))
+
+
 def test_a_run_of_one_dimension_is_refused_with_the_fix():
     with pytest.raises(ValueError, match=r"shape \(5,\), expected two.*values\[:, None\]"):
         Trajectory("drop", np.arange(5.0), np.zeros(5), np.zeros((4, 0)))
@@ -82,7 +93,8 @@ def test_runs_in_place_of_a_simulator_are_told():
     ("settings", "says"),
     [({"horizon": "2"}, "horizon is '2', expected seconds above 0"),
      ({"minutes": 0}, "minutes is 0, expected minutes above 0"),
-     ({"parameter_tolerance": 3}, "parameter_tolerance is 3, expected a share up to 1")],
+     ({"parameter_tolerance": 3}, "parameter_tolerance is 3, expected a share up to 1"),
+     ({"n_jobs": 0}, "n_jobs is 0, expected a number of processes, 1 or more")],
 )  # fmt: skip
 def test_settings_that_are_no_numbers_or_beyond_their_range_are_refused(settings, says):
     with pytest.raises(ValueError, match=says):

@@ -26,6 +26,13 @@ def test_no_file_and_no_table(tmp_path):
         assert "cannot be read as" in error(tmp_path / name)
 
 
+def test_what_is_no_layout_and_channels_that_were_exchanged():
+    with pytest.raises(LogError, match=r"columns is 'c.yaml', expected a LogFormat"):
+        read_logs("log.csv", STATES, ACTIONS, "c.yaml")
+    with pytest.raises(LogError, match=r"state channels: '\w+' is an input; expected the sim"):
+        read_logs("log.csv", ACTIONS, STATES)
+
+
 def test_header_missing_or_alone(csv):
     message = error(csv(lambda lines: ["", *lines[1:]]))
     assert "row 2: holds only numbers" in message and "set header: false" in message
