@@ -47,7 +47,12 @@ def even_clock(times: Array) -> tuple[Array, float]:
 
 
 def _rounding(times: Array) -> float:
-    """The largest power of ten of which all times are multiples, at least a microsecond, or 0."""
+    """The largest power of ten of which all times are multiples, at least a microsecond, or 0; of
+    times that repeat, the least step between others if all are multiples of that."""
+    steps = np.diff(times)
+    least = float(steps.min(initial=np.inf, where=steps > 0))
+    if steps.min() == 0 and np.abs(steps / least - np.round(steps / least)).max() < 1e-3:
+        return least
     for decimals in range(DECIMALS + 1):
         scaled = times * 10.0**decimals
         if np.abs(scaled - np.round(scaled)).max() < 1e-3:

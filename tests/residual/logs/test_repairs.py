@@ -54,6 +54,18 @@ def test_a_clock_rounded_in_print_is_evened(tmp_path, rate, decimals):
     assert np.array_equal(run.states[:, 0], np.unwrap(true["angle"]))
 
 
+@pytest.mark.parametrize(("rate", "step"), [(50, 0.04), (4, 1.0), (30, 0.25)])
+def test_several_rows_of_one_time_stamp_are_spread_over_it(tmp_path, rate, step):
+    true = swing(dt=1 / rate)
+    stamped = true | {"time": step * np.floor(true["time"] / step + 1e-9)}
+    data = read(write(tmp_path / "log.csv", stamped))
+    (run,) = data.trajectories
+    assert "rounded_clock" in kinds(data) and "repeated" not in kinds(data)
+    assert len(run.times) == len(true["time"])
+    assert np.abs(np.diff(run.times) * rate - 1).max() < 0.03
+    assert np.abs(run.times - stamped["time"]).max() <= step
+
+
 @pytest.mark.parametrize("every", [1, 7])
 def test_rows_that_are_written_twice_are_no_rounded_clock(tmp_path, every):
     once = swing()
