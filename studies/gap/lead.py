@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Mapping
 
 from residual.gap import GapResult
 from residual.gap.fitting.forecasts import own_channels
@@ -124,13 +124,14 @@ def own_errors(result: GapResult, apart: Gap | None = None) -> dict[str, Channel
 
 
 def _by_channel(result: GapResult) -> str:
-    """The share of every channel's own gap, where they differ: the share is a mean over them."""
-    errors = own_errors(result)
-    shares = {
-        name: 1 - (error.after.value / error.before.value) ** 2
-        for name, error in errors.items()
-        if error.before.value > OFF * error.noise_floor.value
-    }
+    """The share of every channel's own gap, where they differ: the share is a mean over them.
+
+    Measured rates are told, too, where a position's share is not that mean.
+    """
+    own, every = own_errors(result), result.gap.by_channel
+    shares, mean = _shares(own, OFF), result.gap.share.value
+    if len(every) > len(own) and any(abs(share - mean) > UNLIKE for share in shares.values()):
+        shares = _shares(every)
     if len(shares) < 2 or max(shares.values()) - min(shares.values()) < UNLIKE:
         return ""
     told = [f"{name} {percent(share)}" for name, share in shares.items()]
@@ -139,6 +140,15 @@ def _by_channel(result: GapResult) -> str:
         told = [f"{name} {percent(shares[name])}" for name in ends]
         return f" (between {' and '.join(told)})"
     return f" ({', '.join(told)})"
+
+
+def _shares(errors: Mapping[str, ChannelGap], least: float = 0.0) -> dict[str, float]:
+    """What is gone of the squared error of channels that err at least so many times as by noise."""
+    return {
+        name: 1 - (error.after.value / error.before.value) ** 2
+        for name, error in errors.items()
+        if error.before.value > least * error.noise_floor.value
+    }
 
 
 def _but_off_apart(result: GapResult) -> str:

@@ -44,6 +44,10 @@ PEOPLE = ("Coulomb", "Stribeck")
 PAIRS = ("load-dependent",)
 #: Times its value that an end of an interval may be, beyond which it is none.
 OPEN = 1e6
+#: Part of half an interval that its near side is, below which the far end has digits of its own.
+LOPSIDED = 0.01
+#: Letters of a parameter's name up to which it reads as none.
+SHORT = 2
 #: Effects that act between two places.
 BETWEEN = (
     "exchange", "coupling_spring", "coupling_damper", "asymmetric_coupling_damping",
@@ -55,6 +59,8 @@ def effect_name(label: str) -> str:
     if " with " in label:
         return " with ".join(map(effect_name, label.split(" with ")))
     name, _, where = label.partition("@")
+    if not where and len(name) <= SHORT:
+        return f"parameter {name}"
     if name == ParameterCurve.name:
         parameter, _, channel = where.partition(" over ")
         return f"{parameter.replace('_', ' ')} that changes with {channel}"
@@ -175,8 +181,13 @@ def number_text(number: Number, sign: bool = False) -> str:
     # Of a lopsided interval the near side says how well the value is known.
     half = 0.5 * (number.high - number.low)
     near = min(number.high - number.value, number.value - number.low)
-    half = max(near, 0.05 * half) if 0 < near < 0.3 * half else half
-    value, low, high = (rounded(x, half) for x in (number.value, number.low, number.high))
+    known = near if 0 < near < LOPSIDED * half else half
+    if 0 < near < 0.3 * half:
+        known = max(near, 0.05 * known)
+    value, low, high = (
+        rounded(x, max(known, 0.05 * abs(x)) if abs(x - number.value) > half else known)
+        for x in (number.value, number.low, number.high)
+    )
     return minus(f"{plus}{value}{unit} ({low} to {high})")
 
 

@@ -195,7 +195,7 @@ SYSTEM = ("--system", "studies.systems.pendulum.SYSTEM")
         ("learn", (*SYSTEM, "--corrected", "none.yaml"), "--corrected none.yaml: there is no"),
         ("learn", (*SYSTEM, "--estimator", "residual.No"), "--estimator: there is no class res"),
         ("learn", (*SYSTEM, "--estimator", "sklearn.cluster.KMeans"), "is no regressor (clus"),
-        ("find_gap", (*SIMULATOR, "--parameter_tolerance", "-1"), "expected a number, 0"),
+        ("find_gap", (*SIMULATOR, "--parameter_tolerance", "-1"), "expected a share from 0 to 1"),
         ("learn", ("--system", "sims.simulator.wrap"), "cannot be called without argu"),
         ("learn", (*SYSTEM, "--backend", "dask"), "--backend dask runs the trials of a grid"),
         ("learn", (*SYSTEM, "--ddpg.hiden", "9"), "--ddpg.hiden 9; did you mean --ddpg.hidden?"),

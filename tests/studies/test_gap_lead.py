@@ -165,6 +165,22 @@ def test_the_first_sentence_tells_channels_apart_where_they_differ(errors, told)
     assert lead(boats(*errors)) == f"46 % of the gap is mass{told} {OTHER}"
 
 
+def test_the_first_sentence_tells_a_rate_that_a_position_s_share_does_not():
+    """A rate that reads wrongly keeps its error, whatever explains the angle."""
+    swinging = SimpleNamespace(
+        physical_channels=[
+            Channel("a", "rad", "position"), Channel("b", "rad/s", "rate", rate_of="a"),
+        ],
+        joints=(), parameters={},
+    )  # fmt: skip
+    for errors, told in (
+        ([(1.0, 0.1), (0.14, 0.14)], " (a 99 %, b 0 %)."),
+        ([(1.0, 0.7), (1.0, 0.7)], "."),
+    ):
+        found = dataclasses.replace(boats(*errors), corrected=swinging)
+        assert lead(found) == f"46 % of the gap is mass{told} {OTHER}"
+
+
 @pytest.mark.parametrize(
     ("errors", "says"),
     [

@@ -35,6 +35,8 @@ def test_an_interval_is_written_with_its_unit():
     # Of a lopsided interval the near side tells how well the value is known.
     assert number_text(Number(-0.3, -32.7, 1.3, "%")) == "−0.3 % (−32.7 to 1.3)"
     assert number_text(Number(-0.34, -0.84, -0.001, "1")) == "−0.34 (−0.84 to 0.00)"
+    assert number_text(Number(5.6e-5, 0.0, 22.36, "s")) == "0.000056 s (0 to 22.4)"
+    assert number_text(Number(2.0, -300.0, 2.02, "V")) == "2.000 V (−300 to 2.020)"
     assert number_text(Number(0.35, 0.0, 6.8e142, "N m")) == "0.35 N m (nothing tells how large)"
     assert number_text(Number(2.0, 1.9, 2.1, "kg"), sign=True) == "+2.00 kg (1.90 to 2.10)"
 

@@ -35,6 +35,7 @@ from residual.gap.data.nominal import nominal
 from residual.gap.data.onset import begun_late
 from residual.gap.data.repeats import without_repeats
 from residual.gap.data.resets import cut_at_resets
+from residual.gap.data.same_columns import same_columns
 from residual.gap.data.sizes import other_zero, sizes
 from residual.gap.data.sweeps import sweeps
 from residual.gap.data.turns import wrapped, wrapped_inputs
@@ -122,8 +123,9 @@ def findings(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
         return [refusal("empty", "", "there are no trajectories: give at least one measured run")]
     found = _refusals(simulator, trajectories)
     if not found:
-        checks = (sampling, bounds, bound, speeds, sizes, other_zero, wrapped, wrapped_inputs,
-                  still, faults, clipped, rounded, sums, sweeps, nominal, unanswered)  # fmt: skip
+        checks = (same_columns, sampling, bounds, bound, speeds, sizes, other_zero, wrapped,
+                  wrapped_inputs, still, faults, clipped, rounded, sums, sweeps, nominal,
+                  unanswered)  # fmt: skip
         found = [one for check in checks for one in check(simulator, trajectories)]
     ranks = {"refuse": 0, "warning": 1, "note": 2}
     return sorted(found, key=lambda one: ranks[one.severity])

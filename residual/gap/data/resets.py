@@ -136,12 +136,13 @@ def leapt(
     usual, sudden = (
         float(np.nanquantile(np.abs(np.concatenate(parts)), USUAL)) for parts in (ways, beyond)
     )
-    least = max(
-        FAST * usual if rates is None else 0.0, SUDDEN * sudden,
-        FAR * min(float(np.ptp(known)), most), ROUGH * grain(values),
-    )  # fmt: skip
-    for own, leap, mask in zip(values, beyond, found, strict=True):
-        for row in np.flatnonzero(np.abs(leap) > least).tolist():
+    moved = max(FAST * usual if rates is None else 0.0, SUDDEN * sudden)
+    least = max(FAR * min(float(np.ptp(known)), most), ROUGH * grain(values))
+    period = float(np.median(np.concatenate(steps)))
+    for own, leap, step, mask in zip(values, beyond, steps, found, strict=True):
+        # Over a hole it moves farther.
+        own_least = np.maximum(moved * np.maximum(step / period, 1.0), least)
+        for row in np.flatnonzero(np.abs(leap) > own_least).tolist():
             mask[row] = not (_comes_back(leap, row) or _held(own, row))
     return found
 

@@ -1,4 +1,4 @@
-"""Records that share samples with others are no second measurement."""
+"""Records and columns that are copies of others are no second measurement."""
 
 import dataclasses
 
@@ -7,6 +7,7 @@ import pytest
 
 from residual.gap import find_gap
 from residual.gap.data.copies import shared
+from residual.gap.data.same_columns import same_columns
 from residual.trajectories import Trajectory
 from sims.pendulum_equation import PendulumEquation
 from studies.hidden.data import Truth, make_logs
@@ -32,3 +33,13 @@ def test_measured_again_under_the_same_commands_is_a_test():
     short = [logs[0].piece(0, 25)]
     assert shared(short, short[:0]) == []
     assert shared([dataclasses.replace(short[0], name="again")], short)
+
+
+def test_two_states_that_were_read_from_one_column_are_refused():
+    (run,) = make_logs(Truth(), 4, "strong", "A", 1)
+    both = dataclasses.replace(run, states=run.states[:, [0, 0]])
+    with pytest.raises(ValueError, match=r"rate: reads the same as 'angle' in all 251 rows"):
+        find_gap(PendulumEquation(), both)
+    resting = dataclasses.replace(run, states=np.zeros_like(run.states))
+    assert not same_columns(PendulumEquation(), [run, resting])
+    assert not same_columns(PendulumEquation(), [resting])

@@ -53,6 +53,10 @@ def test_what_comes_back_and_what_was_not_logged_is_no_leap():
     assert leaps(wild) == [] and leaps(lost) == []
     kept = np.delete(np.arange(600), slice(300, 304))
     assert leaps(moved[kept], TIMES[kept]) == []
+    # It rose, and falls after a hole, as fast as elsewhere in as many rows.
+    fell = np.append(moved[:300], moved[300:] - 8 * np.abs(np.diff(moved)).max())
+    assert leaps(fell) == [299]
+    assert leaps(fell, np.append(TIMES[:300], TIMES[300:] + 0.1)) == []
     unseen = moved.copy()
     unseen[50:60] = np.nan
     assert leaps(unseen) == []
