@@ -23,7 +23,7 @@ class DriveLimit(Effect):
     Amplifiers limit a motor's current, and servos their torque, so that a large voltage or a far
     goal makes no more than a smaller one, until the speed has come. The force is the simulator's
     ``drive_force``; of a first-order system that does not tell it, all change beyond that at rest
-    without input.
+    without input, less what parameters of the family ``dissipation`` make.
 
     Hosted by systems that are written out as equations, where an input is no force itself: of a
     force a saturation does the same.
