@@ -186,7 +186,7 @@ def find_gap(
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
     says = [*log.left_out, *other, *read.says, *on_more, *known.says]
     says += [*_searched(answer.found.search.fitter), *inquiry.untried(answer)]
-    says += [*lost(answer.found.search, table), *out_of_proportion(answer)]
+    says += [*judged.says, *lost(answer.found.search, table), *out_of_proportion(answer)]
     quality = (*log.findings, *(Finding("search", "", one) for one in says))
     result = told(answer, table, judged.table, offered.sets, tolerance, quality, clock.laps)
     late = nearly_in_sensors(result.effects, answer.found.search)

@@ -24,11 +24,18 @@ from residual.gap.result import Gap
 from residual.gap.search.pool import Key, all_but
 from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
+from sims.effects.store import SecondStore
 
 Array = NDArray[np.float64]
 
 #: Part of what an effect takes off where it was found that it has to take off elsewhere.
 AS_WELL = 0.25
+#: What is to be said of a hidden store where such records have larger errors than they may have.
+FILLED = (
+    "a second store is taken to be in balance where a record begins: of records set aside that "
+    "begin amid a change, as the tail of one that was cut in two does, the errors are too large; "
+    "set whole records aside"
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,11 +46,13 @@ class Apart:
         table: Their errors; None without such records.
         refuted: Whether the corrected simulator is worse on them.
         helpless: Otherwise, the effects that do not help there, though they could.
+        says: What is to be known of that.
     """
 
     table: Gap | None
     refuted: bool
     helpless: frozenset[int]
+    says: tuple[str, ...] = ()
 
 
 #: Nothing was set aside.
@@ -82,7 +91,8 @@ def judged_apart(
     floor = noise_floor(other, fits[1], sigma)
     judged = held_out(table, other, fits[0], fits[1], floor)
     if judged.refutes:
-        return Apart(judged, True, frozenset())
+        hidden = any(isinstance(e, SecondStore) for e in answer.corrected.effects)
+        return Apart(judged, True, frozenset(), (FILLED,) if hidden else ())
     shown = forecasts(other, fits[1])
     useless = (
         number

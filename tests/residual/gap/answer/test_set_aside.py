@@ -1,13 +1,18 @@
 """Records set aside may measure other channels than those that are fitted."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 import pytest
+from held import path
 from oven import Oven, steps
 
 from residual.gap import find_gap
+from residual.trajectories import Trajectory
+from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
+from sims.simulator import Channel, Parameter
 from studies.gap.lead import lead
 from studies.hidden.data import Truth, make_logs
 
@@ -112,3 +117,33 @@ def test_how_far_their_forecasts_go_is_told_of_them(runs):
     told = found.held_out.horizon_s
     assert told == pytest.approx(step * round(told / step))
     assert found.gap.horizon_s != pytest.approx(step * round(found.gap.horizon_s / step))
+
+
+class Mug(FirstOrderSystem):
+    """Its temperature above that of the room; it is of one piece."""
+
+    dt = 5.0
+    state_channels = (Channel("warmth", "K", "other", scale=20.0),)
+    action_channels = (Channel("power", "W", "input", scale=20.0, low=0.0, high=60.0),)
+    parameters: ClassVar = {"loss": Parameter(4e-4, "1/s", "loss", low=1e-6)}
+
+    def derivative(self, x, u, p):
+        return (u[:, 0] / 900.0 - p.loss * x[:, 0])[:, None]
+
+
+def test_a_tail_of_which_nobody_knows_what_its_second_store_holds_is_told():
+    """Of a record that was cut in two, its second part: the wall is still warm there."""
+    powers = np.repeat([60.0, 0.0, 40.0, 0.0, 55.0, 0.0, 60.0, 0.0], 60)
+
+    def rates(_, x, power):
+        return [power / 900 - 4e-4 * x[0] + 4e-3 * (x[1] - x[0]), (x[0] - x[1]) / 1500]
+
+    warmth = path(rates, [0.0, 0.0], powers, 5.0)[:-1, 0]
+    warmth = warmth + 0.02 * np.random.default_rng(0).standard_normal(len(powers))
+    whole = Trajectory("mug", 5.0 * np.arange(len(powers)), warmth[:, None], powers[:-1, None])
+    first, tail = whole.piece(0, 420), whole.piece(420, 480)
+    found = find_gap(Mug(), [first], held_out=[tail], effects=["second_store"])
+    assert found.held_out.refutes
+    assert any("in balance where a record begins" in one.says for one in found.quality)
+    other = find_gap(Mug(), [first], held_out=[first], effects=["second_store"])
+    assert not any("in balance where a record begins" in one.says for one in other.quality)
