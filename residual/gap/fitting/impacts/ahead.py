@@ -65,9 +65,18 @@ def units(data: WindowData, shown: Array, by_start: Array, moved: Array) -> Arra
     ahead = moved[:, data.windows.index.shape[1] :]
     spread = np.linalg.pinv(by_start.transpose(0, 2, 1) @ by_start, rcond=1e-10, hermitian=True)
     variance = np.einsum("wtmi,wij,wtmj->wtm", ahead, spread, ahead)
-    usual = np.sqrt(np.nanmedian(errors(data, shown) ** 2, axis=0))
-    noise = np.sqrt(np.nanmedian(np.maximum(variance, 0.0), axis=0) + data.sigma**2)
-    return np.maximum(noise, LEAST * np.nan_to_num(usual))
+    usual = np.sqrt(_middle(errors(data, shown) ** 2))
+    noise = np.sqrt(_middle(np.maximum(variance, 0.0)) + data.sigma**2)
+    return np.maximum(noise, LEAST * usual)
+
+
+def _middle(values: Array) -> Array:
+    """The median of what is known over all windows, (W, steps, m) -> (steps, m); zero where nothing
+    is, as past windows that are whole records."""
+    known = np.isfinite(values).any(axis=0)
+    found = np.zeros(values.shape[1:])
+    found[known] = np.nanmedian(values[:, known], axis=0)
+    return found
 
 
 def errors(data: WindowData, shown: Array) -> Array:
