@@ -10,9 +10,10 @@ import operator
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, TypeVar
 
 from sims.altered import carrying, held_back, in_flows
+from sims.effects.base import Effect
 from sims.effects.coupling import Coupling
 from sims.effects.drive_limit import DriveLimit
 from sims.effects.exchange import Exchange
@@ -34,6 +35,9 @@ from sims.values import Values
 #: What a thread asked for last: a path asks for the same motion at every step.
 _last = threading.local()
 
+#: Effects that alter what an author wrote.
+E = TypeVar("E", AmbientFlow, DriveLimit)
+Numbered = dict[str, tuple[int, E]]
 #: Where a channel stands: among positions (0), rates (1) or inputs (2), and its row there.
 Places = Mapping[str, tuple[int, int]]
 
@@ -105,16 +109,8 @@ def motion_of(
         for i, e in enumerate(there)
         if isinstance(e, InertiaEffect)
     }
-    mediums = {
-        f"{e} {i}": (names.index(e.joint), e)
-        for i, e in enumerate(there)
-        if isinstance(e, AmbientFlow)
-    }
-    limits = {
-        f"{e} {i}": (names.index(e.joint), e)
-        for i, e in enumerate(there)
-        if isinstance(e, DriveLimit)
-    }
+    mediums = _at_joints(there, names, AmbientFlow)
+    limits = _at_joints(there, names, DriveLimit)
     altering = {
         f"{name} {field}": getattr(e, field)
         for name, (_, e) in {**added, **mediums, **limits}.items()
@@ -142,6 +138,12 @@ def motion_of(
         flows=tuple(flows),
         parts=tuple(parts),
     )
+
+
+def _at_joints(there: Sequence[Effect], names: Sequence[str], kind: type[E]) -> Numbered[E]:
+    """The effects of one kind with the number of their joint, by a name of their own."""
+    own = [(i, e) for i, e in enumerate(there) if isinstance(e, kind)]
+    return {f"{e} {i}": (names.index(e.joint), e) for i, e in own}
 
 
 def _turn(host: HostSimulator, effect: JointEffect | InertiaEffect) -> float:
