@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from residual.gap.answer.changing import Course, courses_of
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.left import half_beyond_noise, much_is_left
+from residual.gap.answer.left import SEVERAL, half_beyond_noise, much_is_left
 from residual.gap.data.levels import levels
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts
@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 #: Times what the best of them leaves, up to which others are asked for, and how many at the most.
 NEARLY, MOST = 2.0, 4
+#: Loss over that of several effects up to which one is asked for in their place.
+ABOUT = 1.25
 #: Part of what one does that lies beyond a curve by points, below which it is that curve.
 BEYOND = 0.1
 #: Loss over that of a law up to which a parameter that follows a channel does the same.
@@ -68,12 +70,22 @@ def _beside(answer: Answer, key: Key) -> list[Course]:
 
 def _from_the_nominal(answer: Answer) -> list[Course]:
     """What changes with a channel and alone leaves half of what all that was named leaves: laws
-    that imitate what changes leave nothing of its shape."""
+    that imitate what changes leave nothing of its shape. Or less than all that, fitted in full: a
+    change that makes most of the gap is no small one, of which the linear picture would hold."""
     search = answer.found.search
-    if not (isinstance(search.fitter, SmoothFitter) and much_is_left(answer)):
+    fitter, left = search.fitter, search.tried[answer.key].merit
+    if not (isinstance(fitter, SmoothFitter) and much_is_left(answer)):
         return []
-    most = half_beyond_noise(answer, search.tried[answer.key].merit)
-    return [one for one in _beside(answer, ()) if one.fall.loss < most]
+    most = half_beyond_noise(answer, left)
+
+    def fits_about_as_well(course: Course) -> bool:
+        if course.curve is None or len(answer.key) < SEVERAL:
+            return False
+        (one,) = candidates(search.simulator, [course.curve], fitter.samples)
+        model = Model(search.simulator, [one])
+        return fitter.fit(model, one.trials[0].values[0], search.nominal).merit < ABOUT * left
+
+    return [one for one in _beside(answer, ()) if one.fall.loss < most or fits_about_as_well(one)]
 
 
 def over_unused(

@@ -74,8 +74,8 @@ def errors_of(
         if sizes is not None:
             column = samples.measured == sizes
             shown = np.where(column, np.abs(shown), shown)
-        miss = np.where(there, (shown - seen) / np.where(usual > 0, usual, 1.0), 0.0)
         with np.errstate(over="ignore"):  # what runs away is wrong, too
+            miss = np.where(there, (shown - seen) / np.where(usual > 0, usual, 1.0), 0.0)
             squares = np.nan_to_num(miss, nan=np.inf) ** 2
         each: Array = np.sqrt(squares.sum(axis=(1, 2)) / np.maximum(count.sum(axis=1), 1))
         return each
