@@ -22,8 +22,9 @@ Array = NDArray[np.float64]
 
 #: Sizes on either side, as shares of a number, or of its usual step where that is more.
 SHARES, STEP = (0.08, 0.16), 0.15
-#: How far the first round of one number reaches, in these; most rounds of one and of several.
-WIDE, ROUNDS, FEWER = 2.5, 4, 2
+#: How far the first round reaches, in these, and every round after one within whose reach luck
+#: hides the size, in that; most rounds.
+WIDE, ROUNDS = 2.5, 4
 #: Part of what a round reaches within which the least value has to lie; how far losses count about
 #: it, in such reaches.
 WITHIN, ABOUT = 0.8, 1.5
@@ -43,26 +44,27 @@ def by_profile(
         blocks: Which block each of them is in, (W,); one after the other is left out.
     """
     spread = np.zeros(len(found.theta))
-    alone = len(found.theta) == 1
     for number in range(len(found.theta)):
         way, origin = _along(found, number), found.theta
         line, lost = np.zeros(0), np.zeros((0, len(data)))
-        for turn in range(ROUNDS if alone else FEWER):
-            reach = _unit(found, number) * SHARES[-1]
-            wide = WIDE if alone and not turn else 1.0
+        wide = WIDE
+        for _ in range(ROUNDS):
+            reach = wide * SHARES[-1] * _unit(found, number)
             middle = found.theta[number] - origin[number]
             fits = there_and_back(found, data, number, wide * way)
             line = np.append(line, [fit.theta[number] - origin[number] for fit in fits])
             lost = np.concatenate([lost, [fit.loss for fit in fits]])
-            near = np.abs(line - middle) <= ABOUT * wide * reach
+            near = np.abs(line - middle) <= ABOUT * reach
             least, spread[number] = lowest(line[near], lost[near], blocks)
             to = origin + way * np.clip(least, line.min(), line.max())
             to = np.clip(to, found.model.low, found.model.high)
             best = min(fits, key=lambda fit: abs(fit.theta[number] - to[number])).fitted
             fresh = settle(found.model, to, data, best.starts, 1, best.by_start)
             found = dataclasses.replace(fresh, slopes=found.slopes)
-            if wide == 1.0 and abs(least - middle) <= WITHIN * reach:
+            told = spread[number] <= reach
+            if told and wide == 1.0 and abs(least - middle) <= WITHIN * reach:
                 break
+            wide = 1.0 if told else WIDE * wide
     return found, spread
 
 

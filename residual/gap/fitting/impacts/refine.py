@@ -64,17 +64,19 @@ class Refined:
         model, theta = self.model, self.theta
         begin = begun(model, theta, data, other.starts, other.by_start)
         found = descend(model, theta, data, begin, SOME)
-        won = np.flatnonzero(found.costs < self.fitted.costs)
+        trial = Refined.of(model, theta, found, data)
+        won = np.flatnonzero(trial.loss < self.loss)
         if not len(won):
             return self
         part, ahead = data.take(won), self.ahead.copy()
         better = renewed(model, theta, part, found.take(won))
-        ahead[won] = _ahead(model, theta, part, better)
+        ahead[won] = trial.ahead[won]
         return dataclasses.replace(self, fitted=self.fitted.with_windows(won, better), ahead=ahead)
 
     def with_better(self, other: Refined) -> Refined:
-        """The same strengths, with the windows that another fit of them has begun better."""
-        won = np.flatnonzero(other.fitted.costs < self.fitted.costs)
+        """The same strengths, with the windows that another fit of them has begun better: so that
+        they and what follows err less together."""
+        won = np.flatnonzero(other.loss < self.loss)
         fitted = self.fitted.with_windows(won, other.fitted.take(won))
         ahead = self.ahead.copy()
         ahead[won] = other.ahead[won]
