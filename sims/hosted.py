@@ -25,6 +25,7 @@ from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
 from sims.effects.link import Link
 from sims.effects.parameter_curve import ParameterCurve
+from sims.effects.reaction import Reaction
 from sims.effects.response import AsymmetricResponse
 from sims.effects.store import stores
 from sims.host import HostSimulator
@@ -99,7 +100,7 @@ def motion_of(
     flows: list[tuple[int, int, Flow]] = [
         (names.index(e.pair[0]), names.index(e.pair[1]), e)
         for e in there
-        if isinstance(e, Exchange | Coupling | Link)
+        if isinstance(e, Exchange | Reaction | Coupling | Link)
     ]
     flows += [(names.index(e.joint), len(names) + i, e) for i, e in enumerate(stores(host))]
     states = len(names) + len(stores(host))

@@ -19,6 +19,7 @@ from sims.effects.friction import CoulombFriction, DryFriction
 from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
 from sims.effects.link import Link
+from sims.effects.reaction import Reaction
 from sims.effects.response import AsymmetricResponse
 from sims.effects.store import SecondStore
 from sims.rows import Mask, Rows, State
@@ -27,7 +28,7 @@ from sims.values import Values
 
 Acceleration = Callable[[Array, Array, Array, Array, SimpleNamespace], Array]
 DriveForce = Callable[[Array, Array, Array, SimpleNamespace], Array]
-Flow = Exchange | SecondStore | Coupling | Link
+Flow = Exchange | Reaction | SecondStore | Coupling | Link
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,6 +15,7 @@ from residual.gap.answer.changing import changing, in_place
 from residual.gap.answer.confirmed import matters
 from residual.gap.answer.encoders import by_sensor_or_clock
 from residual.gap.answer.ends import with_fitted_ends
+from residual.gap.answer.form import rare_beside_much
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.out_of_proportion import out_of_proportion
 from residual.gap.answer.periodic import periodic
@@ -164,12 +165,14 @@ def find_gap(
             rested = any(run.before is not None for run in log.runs)
             judged = judged_apart(answer, known.prepared, log.apart, table, rested)
         either = swapped(answer.found.search, answer.key)
+        rare = rare_beside_much(answer, offered.further)
         answer = replace(
             answer,
             claims=tuple(
                 replace(
                     claim,
                     swapped=claim.number in either,
+                    rare=claim.number in rare,
                     counted=conventions is not None
                     or by_sensor_or_clock(claim, answer.found.search, log.rescaled),
                     cut_off=bool(log.cut_off),

@@ -25,8 +25,8 @@ Doubt = Literal[
     "not_needed", "unsteady", "creeps", "drift", "one_way", "law", "numerics", "at_bound", "clock",
     "within_step", "swapped", "conventions", "cut_off", "extreme", "stretched", "orders", "levels",
     "loop", "records", "set_aside", "no_help", "sensor", "no_time", "may_be_zero", "size_open",
-    "share_may_be_zero", "calibration", "within", "slight", "company", "few_blocks", "rivals",
-    "instead",
+    "share_may_be_zero", "calibration", "within", "slight", "company", "rare", "few_blocks",
+    "rivals", "instead",
 ]  # fmt: skip
 #: Forecast error over that of the nominal simulator from which on the corrected one is worse.
 WORSE = 1.05

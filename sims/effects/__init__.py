@@ -55,11 +55,13 @@ from sims.effects.limit import RateLimit as RateLimit
 from sims.effects.link import AsymmetricCouplingDamping as AsymmetricCouplingDamping
 from sims.effects.link import CouplingDamper as CouplingDamper
 from sims.effects.link import CouplingSpring as CouplingSpring
+from sims.effects.link import CouplingUnbalance as CouplingUnbalance
 from sims.effects.link import Link as Link
 from sims.effects.loss import PowerLoss as PowerLoss
 from sims.effects.loss import ProportionalLoss as ProportionalLoss
 from sims.effects.parameter import ParameterChange as ParameterChange
 from sims.effects.parameter_curve import ParameterCurve as ParameterCurve
+from sims.effects.reaction import Reaction as Reaction
 from sims.effects.response import AsymmetricResponse as AsymmetricResponse
 from sims.effects.sensor import EncoderScale as EncoderScale
 from sims.effects.sensor import SensorEffect as SensorEffect

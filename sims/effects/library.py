@@ -55,11 +55,13 @@ from sims.effects.link import (
     AsymmetricCouplingDamping,
     CouplingDamper,
     CouplingSpring,
+    CouplingUnbalance,
     linked_joints,
 )
 from sims.effects.loss import PowerLoss, ProportionalLoss
 from sims.effects.parameter import ParameterChange
 from sims.effects.pull import pulled_by_position, pulled_by_turn
+from sims.effects.reaction import Reaction
 from sims.effects.response import AsymmetricResponse
 from sims.effects.sensor import EncoderScale, SensorOffset, SensorScale
 from sims.effects.slew import SlewLimit
@@ -177,9 +179,9 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
 
     Friction by load and a limited drive of every joint that the inputs move by themselves; states
     that fall at another pace than they rise, rub otherwise backwards, lose a constant or by a
-    power, have an inertia by their angle, run into stops, act on others or are linked to them;
-    what moves in a medium that does, too; inputs that act otherwise below zero or through a play,
-    and, but for goals, that are followed at a limited pace; encoders off their axis.
+    power, have an inertia by their angle, run into stops, act on others, react with them or are
+    linked to them; what moves in a medium that does, too; inputs that act otherwise below zero or
+    through a play, and, but for goals, that are followed at a limited pace; encoders off axis.
     """
     found: list[Effect] = [*_geared(simulator), *_in_mediums(simulator)]
     inputs = [channel.name for channel in simulator.action_channels]
@@ -190,7 +192,8 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     )  # fmt: skip
     both: list[Effect] = [kind(joint.name) for kind in kinds for joint in simulator.joints]
     both += [Coupling(BY.join(names)) for names in coupled_states(simulator)]
-    joined = CouplingSpring, CouplingDamper, AsymmetricCouplingDamping
+    both += [Reaction(AND.join(names)) for names in like_states(simulator)]
+    joined = CouplingSpring, CouplingDamper, AsymmetricCouplingDamping, CouplingUnbalance
     links = itertools.product(joined, linked_joints(simulator))
     both += [kind(AND.join(names)) for kind, names in links]
     slow = [name for name in inputs if name not in goals(simulator)]

@@ -132,6 +132,35 @@ class AsymmetricCouplingDamping(Link):
         return super().measures(simulator)
 
 
+@dataclasses.dataclass(frozen=True)
+class CouplingUnbalance(Link):
+    """A weight that two joints turn: ``sine sin(q1 - ratio q2) + cosine cos(q1 - ratio q2)``.
+
+    The forearm of an arm that was to move in a plane, on a base that tilts: gravity pulls at both
+    joints by the sum of their angles, which is a ratio of -1. It goes by angles in rad, and is
+    hosted by written-out equations.
+    """
+
+    ratio: Value = number(-1.0, role="shape", low=-8.0, high=8.0, starts=(-1.0, 1.0))
+    sine: Value = number(force=1, share=0.1)
+    cosine: Value = number(force=1, share=0.1)
+
+    name: ClassVar[str] = "coupling_unbalance"
+    sentence: ClassVar[str] = "A weight that two joints turn: a forearm on a base that tilts."
+    needs: ClassVar[str] = "a quarter of a turn or more, of the two together"
+
+    def pull(self, away: Value, parting: Value) -> Value:
+        """Torque that gravity makes."""
+        return self.sine * np.sin(away) + self.cosine * np.cos(away)
+
+    def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
+        """As for every link; the joints have to turn, in rad, and the system to be written out."""
+        found = super().measures(simulator)
+        if not simulator.written_out or found["position"][0] != "rad":
+            raise ValueError(f"{self.name} needs a system of written-out equations, in rad")
+        return found
+
+
 def linked_joints(simulator: HostSimulator) -> list[tuple[str, str]]:
     """Every two neighbours among the joints whose positions, rates and forces have one unit."""
     if not simulator.hosts_links:

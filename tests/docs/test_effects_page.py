@@ -79,6 +79,7 @@ OTHERS = [
     effects.UpperStop("pivot"), effects.LowerStop("pivot"), effects.AmbientFlow("pivot"),
     effects.DriveLimit("pivot"),
     effects.AsymmetricCouplingDamping("pivot and elbow"),
+    effects.CouplingUnbalance("pivot and elbow"), effects.Reaction("level and next level"),
 ]  # fmt: skip
 HOSTED = (*library(PendulumEquation()), *library(Tank()), *CURVES, *OTHERS)
 LIBRARY = {e.name: e for e in reversed(HOSTED) if not isinstance(e, effects.ParameterChange)}

@@ -47,6 +47,8 @@ DOUBTS: dict[Doubt, str] = {
     "size_open": "it may be many times as large as what fits best",
     "share_may_be_zero": "what it takes off the gap may be nothing: most of that is in few blocks",
     "company": "it only helps beside another effect that may not be there",
+    "rare": "it is rare, and what has no name is many times the noise, so that it may stand for a "
+    "law of another form",
     "calibration": "parameters that are a few percent off would do nearly as well",
     "within": "its interval reaches into the few percent that are allowed to every parameter",
     "slight": "without it errors are less than twice as large, and what has no name may favour "
@@ -100,6 +102,7 @@ def doubts(
         "size_open": wide,
         "share_may_be_zero": not claim.gains,
         "company": claim.in_company,
+        "rare": claim.rare,
         "few_blocks": thin,
         "rivals": bool(claim.rivals or claim.alike),
         "instead": bool(claim.instead),

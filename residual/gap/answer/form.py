@@ -1,4 +1,4 @@
-"""Named laws whose form the data reject, where no curve by points was on offer in their place."""
+"""Named laws whose form is open: the data reject it, or it is rare beside much that is left."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import dataclasses
 import functools
 from collections.abc import Sequence
 
-from residual.gap.answer.confirmed import Answer
+from residual.gap.answer.confirmed import Answer, much
 from residual.gap.answer.curves import over_the_log
 from residual.gap.answer.laws import LESS, is_law, open_to
 from residual.gap.answer.left import much_is_left
@@ -17,6 +17,7 @@ from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
 from residual.gap.search.significance import price
+from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.library import curves_in
 
@@ -54,6 +55,25 @@ def of_open_form(answer: Answer, offered: Sequence[Curve], tolerance: float) -> 
         if _rejects(answer, search.fitter, free(), curve):
             claims = open_to(curve, claims, laws, search)
     return dataclasses.replace(answer, claims=tuple(claims))
+
+
+def rare_beside_much(answer: Answer, further: Sequence[Effect]) -> frozenset[int]:
+    """What was named of the effects that are rarer than the library, where what is left is many
+    times the noise.
+
+    There are many of these, each asked for because nothing else took most of what was left. One
+    that is there leaves little: of 36 such names that were certain and right on other people's
+    logs none left ten times the noise.
+
+    Args:
+        answer: What was found.
+        further: Those effects.
+    """
+    if not much(answer):
+        return frozenset()
+    labels = {str(effect) for effect in further}
+    search = answer.found.search
+    return frozenset(n for n in answer.key if search.candidates[n].label in labels)
 
 
 def _rejects(answer: Answer, fitter: SmoothFitter, fit: Fit, curve: Curve) -> bool:

@@ -108,7 +108,8 @@ def beside_further(
     first: Answer, second: Answer, further: Sequence[Effect], late: Callable[[], bool]
 ) -> Answer:
     """The first answer, with every rarer effect that does nearly as well in place of what is
-    certain among its rivals, as any effect of the library is.
+    certain among its rivals, as any effect of the library is; in place of all that was named, too,
+    if it has no more numbers.
 
     Args:
         first: Without them.
@@ -119,14 +120,18 @@ def beside_further(
     search, again = first.found.search, second.found.search
     numbers, most = _numbers(again), CLEARLY * search.error(first.key)
     claims: Sequence[Claim] = first.claims
-    for effect in further:
-        for claim in first.claims:
-            own = numbers.get(search.candidates[claim.number].effect, -1)
-            if not claim.sure or effect not in numbers or late():
+    sure = [claim.number for claim in first.claims if claim.sure]
+    for effect in further if sure else ():
+        if effect not in numbers:
+            continue
+        few = len(again.candidates[numbers[effect]].knobs) <= search.numbers(first.key)
+        for group in (*((number,) for number in sure), *([first.key] if few else [])):
+            if late():
                 continue
-            for key in _in_place(search, first.key, again, numbers[effect], {own}):
+            gone = {numbers.get(search.candidates[number].effect, -1) for number in group}
+            for key in _in_place(search, first.key, again, numbers[effect], gone):
                 if search.currency.error(again.validated[key].squares) <= most:
-                    claims = open_to(effect, claims, [claim.number], search)
+                    claims = open_to(effect, claims, group, search)
     return dataclasses.replace(first, claims=tuple(claims))
 
 

@@ -29,6 +29,8 @@ HALF = 0.5
 #: Loss over that of one of its family, up to which an effect fits about as well; squared forecast
 #: error over that of more effects, up to which what fits down to the noise forecasts so.
 NEARLY = 1.25
+#: Rarer effects that are fitted from the nominal simulator on.
+NEAREST = 3
 #: Effects fewer with which an answer that forecasts as well is the simpler one, whatever numbers
 #: these have.
 FEWER = 2
@@ -55,7 +57,7 @@ def worth_a_part(answer: Answer, parts: Sequence[FlexiblePart]) -> Sequence[Flex
 def worth_asking_for(answer: Answer, further: Sequence[Effect]) -> list[Effect]:
     """The rarer effects to ask for, where clearly more than noise is left: those that take half of
     it in the linear picture, or that fit about as well in place of what is of their family, and at
-    their place, so that a search is not made in vain."""
+    their place, or of all but one that was named, so that a search is not made in vain."""
     search, key = answer.found.search, answer.key
     fitter, fit = search.fitter, search.tried[key]
     if not isinstance(fitter, SmoothFitter) or not much_is_left(answer):
@@ -75,6 +77,7 @@ def worth_asking_for(answer: Answer, further: Sequence[Effect]) -> list[Effect]:
     for alike in of_one_kind(pool):
         if _fit_in_place_of_pushes([pool[n] for n in alike], fitter, fit):
             worth |= set(alike)
+    worth |= _fit_in_place_of_most(pool, answer)
     return [
         one.effect for n, one in enumerate(pool) if n in worth or _fits_in_place(one, fitter, fit)
     ]
@@ -104,6 +107,34 @@ def _fit_in_place_of_pushes(several: Sequence[Candidate], fitter: SmoothFitter, 
     own = fit.theta[np.isin(fit.model.owner, kept)]
     start = np.concatenate([own, *(one.trials[0].values[0] for one in several)])
     return fitter.fit(model, start, fit).merit < NEARLY * fit.merit
+
+
+def _fit_in_place_of_most(pool: Sequence[Candidate], answer: Answer) -> set[int]:
+    """Numbers of those that, alone or beside one effect that was named, fit about as well as all of
+    these, with no more numbers: the slope of a bent law and a constant come near to it.
+
+    They are told from the nominal simulator on, in the linear picture there, and fitted in full,
+    since they are to make most of the gap.
+    """
+    search, key = answer.found.search, answer.key
+    fitter, fit, nominal = search.fitter, search.tried[key], search.nominal
+    if len(key) < 2:
+        return set()
+    assert isinstance(fitter, SmoothFitter)
+    moved = [beside_starts(nominal, fitter.columns(nominal, [one])) for one in pool]
+    loss = np.array([beside(nominal, [columns], fitter.cap).loss for columns in moved])
+
+    def fits(one: Candidate, kept: Key) -> bool:
+        model = Model(search.simulator, [*(search.candidates[n] for n in kept), one])
+        own = fit.theta[np.isin(fit.model.owner, [key.index(n) for n in kept])]
+        starts = (np.append(own, trial.values[0]) for trial in one.trials)
+        return len(model) <= len(fit.theta) and any(
+            fitter.fit(model, start, nominal).merit < NEARLY * fit.merit for start in starts
+        )
+
+    nearest = np.argsort(loss)[:NEAREST].tolist()
+    beside_one: list[Key] = [(), *((n,) for n in key)]
+    return {n for n in nearest if any(fits(pool[n], kept) for kept in beside_one)}
 
 
 def _in_whose_place(further: Effect, chosen: Sequence[Effect]) -> list[list[int]]:

@@ -63,6 +63,7 @@ class Claim:
         swapped: Whether it is a lag of a drive or a time of what it drives, which may have each
             other's size.
         in_company: Whether it only helps beside another effect that may not be there.
+        rare: Whether it is rarer than the library, beside what is many times the noise.
         sensor: Whether it is a sensor wrong as sensors seldom are, beside a remainder.
         by_fit: Whether a fit to all data leaves three times as much without it: forecasts of single
             blocks may go astray all the same, where motion hangs on a hair.
@@ -107,6 +108,7 @@ class Claim:
     one_way: bool = False
     other_law: bool = False
     in_company: bool = False
+    rare: bool = False
     instead: tuple[str, ...] = ()
     meant: tuple[Meant, ...] = ()
     beside: tuple[Meant, ...] = ()
@@ -151,6 +153,7 @@ class Claim:
             self.one_way,
             self.other_law,
             self.in_company,
+            self.rare,
         )
         return self.needed and self.gains and self.steady and self.sound and not any(against)
 

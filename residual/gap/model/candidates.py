@@ -32,6 +32,7 @@ from sims.effects.limit import RateLimit
 from sims.effects.link import Link
 from sims.effects.loss import PowerLoss
 from sims.effects.pull import ELSEWHERE
+from sims.effects.reaction import Reaction
 from sims.effects.sensor import SensorEffect
 from sims.effects.stop import Stop
 from sims.effects.store import SecondStore
@@ -220,7 +221,7 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     The start state of every window is free, so that such a force has a free size in each of them,
     and would explain anything.
     """
-    if isinstance(effect, Exchange):
+    if isinstance(effect, Exchange | Reaction):
         return not set(effect.pair) <= measured
     if isinstance(effect, SecondStore):
         return effect.joint not in measured

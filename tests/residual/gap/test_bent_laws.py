@@ -1,0 +1,118 @@
+"""Laws that are bent where the simulator's are straight, in systems of first order."""
+
+import numpy as np
+import pytest
+from held import path
+
+from residual.gap import find_gap
+from residual.trajectories import Trajectory
+from sims.equations import FirstOrderSystem
+from sims.simulator import Channel, Parameter
+
+
+class Prey(FirstOrderSystem):
+    """What grows without end, and what hunts it (Lotka and Volterra)."""
+
+    dt = 0.3
+    state_channels = (
+        Channel("hares", "1", "other", scale=15.0),
+        Channel("lynxes", "1", "other", scale=8.0),
+    )
+    action_channels = ()
+
+    def __init__(self):
+        self.parameters = {
+            "growth": Parameter(0.8, "1/s", "of hares", low=0.01),
+            "hunting": Parameter(0.09, "1/s", "by lynxes", low=0.0),
+            "thriving": Parameter(0.02, "1/s", "of lynxes", low=0.0),
+            "death": Parameter(0.28, "1/s", "of lynxes", low=0.0),
+        }
+        super().__init__()
+
+    def derivative(self, x, u, p):
+        hares, lynxes = x.T
+        born = hares * (p.growth - p.hunting * lynxes)
+        return np.stack([born, lynxes * (p.thriving * hares - p.death)], axis=1)
+
+
+def crowded(seed, start, n=160):
+    """Hares stand in each other's way, by the square of their number."""
+    rng = np.random.default_rng(seed)
+
+    def rates(_, x, u):
+        hares, lynxes = x
+        born = hares * (0.81 - 0.025 * hares - 0.0885 * lynxes)
+        return [born, lynxes * (0.02 * hares - 0.28)]
+
+    seen = path(rates, start, np.zeros(n), 0.3)
+    seen = seen + rng.normal(0.0, (0.12, 0.05), seen.shape)
+    return Trajectory(f"run {seed}", 0.3 * np.arange(n + 1), seen, np.zeros((n, 0)))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(3))
+def test_growth_that_ends_is_no_tenth_of_the_growth_and_a_constant(seed):
+    starts = ([12.0, 5.0], [17.0, 4.0])
+    found = find_gap(Prey(), [crowded(10 * seed + i, s) for i, s in enumerate(starts)])
+    sure = {v.effect for v in found.verdicts if v.kind == "confirmed"}
+    assert sure <= {"power_loss", "state_curve"}
+    offered = {v.effect for v in found.verdicts} | {
+        one.split("@")[0] for v in found.verdicts for one in v.alternatives
+    }
+    assert {"power_loss", "state_curve"} & offered
+
+
+class Reactor(FirstOrderSystem):
+    """A is fed and turns to B, and B to something else, each by itself."""
+
+    dt = 90.0
+    state_channels = (
+        Channel("a", "mol/L", "other", scale=2.0),
+        Channel("b", "mol/L", "other", scale=0.5),
+    )
+    action_channels = (
+        Channel("space", "1/s", "input", scale=0.001, low=0.0, high=0.01),
+        Channel("feed", "mol/L", "input", scale=3.0, low=0.0, high=20.0),
+    )
+
+    def __init__(self):
+        self.parameters = {
+            "first": Parameter(0.0011, "1/s", "of A to B", low=0.0),
+            "second": Parameter(0.0007, "1/s", "of B", low=0.0),
+        }
+        super().__init__()
+
+    def derivative(self, x, u, p):
+        a, b = x.T
+        made = p.first * a
+        fed = u[:, 0] * (u[:, 1] - a) - made
+        return np.stack([fed, made - (u[:, 0] + p.second) * b], axis=1)
+
+
+def reacting(seed, rate, n=240):
+    """The same, in which A and B use each other up; both rates are a percent off."""
+    rng = np.random.default_rng(seed)
+    space = np.repeat(rng.uniform(0.0003, 0.003, n // 30), 30)
+    feed = np.repeat(rng.uniform(1.0, 5.0, n // 20), 20)
+
+    def rates(_, x, inputs):
+        a, b = x
+        meet, made = rate * a * b, 0.00111 * a
+        return [inputs[0] * (inputs[1] - a) - made - meet,
+                made - (inputs[0] + 0.000695) * b - meet]  # fmt: skip
+
+    inputs = [tuple(one) for one in np.stack([space, feed], axis=1)]
+    seen = path(rates, [1.0, 0.3], inputs, 90.0)[:-1]
+    seen = seen + rng.normal(0.0, (0.008, 0.004), seen.shape)
+    return Trajectory(f"run {seed}", 90.0 * np.arange(n), seen, np.array(inputs[:-1]))
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2))])
+def test_two_that_use_each_other_up_are_told_as_that(seed):
+    found = find_gap(Reactor(), [reacting(10 * seed + run, 4e-4) for run in range(3)])
+    sure = {v.label: v for v in found.verdicts if v.kind == "confirmed"}
+    assert "reaction@a and b" in sure and set(sure) <= {"reaction@a and b", "first", "second"}
+    numbers = sure["reaction@a and b"].parameters
+    for number in numbers.values():
+        assert number.low <= 4e-4 <= number.high
+        assert number.value == pytest.approx(4e-4, rel=0.1)
