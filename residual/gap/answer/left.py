@@ -161,9 +161,9 @@ def half_beyond_noise(answer: Answer, loss: float) -> float:
 
 def much_is_left(answer: Answer) -> bool:
     """Whether what was named leaves clearly more than noise; more than noise where it is several
-    effects, which together come near to any law."""
-    left = answer.left
-    least = FOOTNOTE if len(answer.key) >= SEVERAL else NOTABLE
+    effects, which together come near to any law, or has a size that can hardly be."""
+    left, key = answer.left, answer.key
+    least = FOOTNOTE if len(key) >= SEVERAL or key in answer.found.search.extreme else NOTABLE
     return not left.adequate and left.ratio > least
 
 
