@@ -14,6 +14,7 @@ import numpy as np
 from residual.gap.data.bound import bound
 from residual.gap.data.bursts import without_bursts
 from residual.gap.data.copies import once
+from residual.gap.data.cut_inputs import cut_inputs
 from residual.gap.data.inspection import (
     bounds,
     clipped,
@@ -124,8 +125,8 @@ def findings(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
     found = _refusals(simulator, trajectories)
     if not found:
         checks = (same_columns, sampling, bounds, bound, speeds, sizes, other_zero, wrapped,
-                  wrapped_inputs, still, faults, clipped, rounded, sums, sweeps, nominal,
-                  unanswered)  # fmt: skip
+                  wrapped_inputs, still, faults, clipped, cut_inputs, rounded, sums, sweeps,
+                  nominal, unanswered)  # fmt: skip
         found = [one for check in checks for one in check(simulator, trajectories)]
     ranks = {"refuse": 0, "warning": 1, "note": 2}
     return sorted(found, key=lambda one: ranks[one.severity])
