@@ -16,7 +16,7 @@ from sims.altered import carrying, held_back, in_flows
 from sims.effects.base import Effect
 from sims.effects.coupling import Coupling
 from sims.effects.drive_limit import DriveLimit
-from sims.effects.exchange import Exchange
+from sims.effects.exchange import BetweenStates
 from sims.effects.flexible import flexible_parts
 from sims.effects.flow import AmbientFlow
 from sims.effects.friction import DryFriction
@@ -25,7 +25,6 @@ from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
 from sims.effects.link import Link
 from sims.effects.parameter_curve import ParameterCurve
-from sims.effects.reaction import Reaction
 from sims.effects.response import AsymmetricResponse
 from sims.effects.store import stores
 from sims.host import HostSimulator
@@ -100,7 +99,7 @@ def motion_of(
     flows: list[tuple[int, int, Flow]] = [
         (names.index(e.pair[0]), names.index(e.pair[1]), e)
         for e in there
-        if isinstance(e, Exchange | Reaction | Coupling | Link)
+        if isinstance(e, BetweenStates | Coupling | Link)
     ]
     flows += [(names.index(e.joint), len(names) + i, e) for i, e in enumerate(stores(host))]
     states = len(names) + len(stores(host))

@@ -13,13 +13,12 @@ import numpy as np
 
 from sims.effects.backlash import Backlash
 from sims.effects.coupling import Coupling
-from sims.effects.exchange import Exchange
+from sims.effects.exchange import BetweenStates
 from sims.effects.flexible import FlexiblePart
 from sims.effects.friction import CoulombFriction, DryFriction
 from sims.effects.joint import JointEffect
 from sims.effects.limit import RateLimit
 from sims.effects.link import Link
-from sims.effects.reaction import Reaction
 from sims.effects.response import AsymmetricResponse
 from sims.effects.store import SecondStore
 from sims.rows import Mask, Rows, State
@@ -28,7 +27,7 @@ from sims.values import Values
 
 Acceleration = Callable[[Array, Array, Array, Array, SimpleNamespace], Array]
 DriveForce = Callable[[Array, Array, Array, SimpleNamespace], Array]
-Flow = Exchange | Reaction | SecondStore | Coupling | Link
+Flow = BetweenStates | SecondStore | Coupling | Link
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,7 +1,8 @@
-"""What flows between two states of a first-order system."""
+"""What two states of a first-order system do to each other, and what flows between them."""
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 import itertools
 from collections.abc import Mapping
@@ -17,35 +18,25 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True)
-class Exchange(Effect):
-    """Two states draw to each other: ``x1' += into_first (x2 - x1)`` and the same the other way.
-
-    Heat that is conducted from one body to the other, water in a pipe between two tanks. Each rate
-    is the conductance over the capacity of what takes it in, so that they differ if the bodies do.
+class BetweenStates(Effect):
+    """What two states of one unit do to the rate of change of each other.
 
     Attributes:
         joint: Names of both states, ``"first and second"``.
     """
 
     joint: str
-    into_first: Value = number(low=0.0, force=1, position=-1)
-    into_second: Value = number(low=0.0, force=1, position=-1)
 
-    name: ClassVar[str] = "exchange"
-    sentence: ClassVar[str] = "Two states draw to each other: heat is conducted, water levels out."
     enters: ClassVar = "joint"
-    needs: ClassVar[str] = "times at which the two differ"
 
     @property
     def pair(self) -> tuple[str, ...]:
         """Names of the two states."""
         return tuple(self.joint.split(AND))
 
+    @abc.abstractmethod
     def flows(self, positions: Both, rates: Both) -> Both:
-        """Rates of change of both states, by row."""
-        first, second = rates
-        lead = second - first
-        return self.into_first * lead, -self.into_second * lead
+        """Rates of change of both states, by row; the states count as rates."""
 
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
         """Unit and typical size of the first state and its rate of change."""
@@ -57,6 +48,28 @@ class Exchange(Effect):
             "force": (joint.unit, simulator.force_scale(joint)),
             "position": (channel.unit, channel.scale),
         }
+
+
+@dataclasses.dataclass(frozen=True)
+class Exchange(BetweenStates):
+    """Two states draw to each other: ``x1' += into_first (x2 - x1)`` and the same the other way.
+
+    Heat that is conducted from one body to the other, water in a pipe between two tanks. Each rate
+    is the conductance over the capacity of what takes it in, so that they differ if the bodies do.
+    """
+
+    into_first: Value = number(low=0.0, force=1, position=-1)
+    into_second: Value = number(low=0.0, force=1, position=-1)
+
+    name: ClassVar[str] = "exchange"
+    sentence: ClassVar[str] = "Two states draw to each other: heat is conducted, water levels out."
+    needs: ClassVar[str] = "times at which the two differ"
+
+    def flows(self, positions: Both, rates: Both) -> Both:
+        """Rates of change of both states, by row."""
+        first, second = rates
+        lead = second - first
+        return self.into_first * lead, -self.into_second * lead
 
 
 def like_states(simulator: HostSimulator) -> list[tuple[str, str]]:

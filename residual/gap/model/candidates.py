@@ -23,7 +23,7 @@ from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect, Quantity
 from sims.effects.coupling import Coupling
 from sims.effects.curve import Curve
-from sims.effects.exchange import Exchange
+from sims.effects.exchange import BetweenStates
 from sims.effects.flexible import FlexiblePart
 from sims.effects.friction import ConstantLoss
 from sims.effects.joint import AsymmetricDamping, JointEffect
@@ -32,7 +32,6 @@ from sims.effects.limit import RateLimit
 from sims.effects.link import Link
 from sims.effects.loss import PowerLoss
 from sims.effects.pull import ELSEWHERE
-from sims.effects.reaction import Reaction
 from sims.effects.sensor import SensorEffect
 from sims.effects.stop import Stop
 from sims.effects.store import SecondStore
@@ -221,7 +220,7 @@ def _follows_unseen(effect: Effect, simulator: HostSimulator, measured: set[str]
     The start state of every window is free, so that such a force has a free size in each of them,
     and would explain anything.
     """
-    if isinstance(effect, Exchange | Reaction):
+    if isinstance(effect, BetweenStates):
         return not set(effect.pair) <= measured
     if isinstance(effect, SecondStore):
         return effect.joint not in measured
