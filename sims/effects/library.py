@@ -181,7 +181,8 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     that fall at another pace than they rise, rub otherwise backwards, lose a constant or by a
     power, have an inertia by their angle, run into stops, act on others, react with them or are
     linked to them; what moves in a medium that does, too; inputs that act otherwise below zero or
-    through a play, and, but for goals, that are followed at a limited pace; encoders off axis.
+    through a play, and, but for goals, that are followed at a limited pace; encoders off their
+    axis.
     """
     found: list[Effect] = [*_geared(simulator), *_in_mediums(simulator)]
     inputs = [channel.name for channel in simulator.action_channels]

@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 #: Sizes on either side, as shares of a number, or of its usual step where that is more.
 SHARES, STEP = (0.08, 0.16), 0.15
 #: How far the first round reaches, in these, and every round after one within whose reach luck
-#: hides the size, in that; most rounds.
-WIDE, ROUNDS = 2.5, 4
+#: hides the size, in that; how far one reaches at the most; most rounds.
+WIDE, WIDEST, ROUNDS = 2.5, 6.25, 4
 #: Part of what a round reaches within which the least value has to lie; how far losses count about
 #: it, in such reaches.
 WITHIN, ABOUT = 0.8, 1.5
@@ -64,7 +64,7 @@ def by_profile(
             told = spread[number] <= reach
             if told and wide == 1.0 and abs(least - middle) <= WITHIN * reach:
                 break
-            wide = 1.0 if told else WIDE * wide
+            wide = 1.0 if told else min(WIDE * wide, WIDEST)
     return found, spread
 
 
