@@ -71,7 +71,8 @@ def _beside(answer: Answer, key: Key) -> list[Course]:
 def _from_the_nominal(answer: Answer) -> list[Course]:
     """What changes with a channel and alone leaves half of what all that was named leaves: laws
     that imitate what changes leave nothing of its shape. Or hardly more than all that, fitted in
-    full: a change that makes most of the gap is no small one, of which the linear picture would hold."""
+    full: a change that makes most of the gap is no small one, for which the linear picture holds.
+    """
     search = answer.found.search
     fitter, left = search.fitter, search.tried[answer.key].merit
     if not (isinstance(fitter, SmoothFitter) and much_is_left(answer)):
