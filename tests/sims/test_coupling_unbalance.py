@@ -13,18 +13,22 @@ INERTIA, COUPLED, FOREARM = 0.06, 0.011, 0.012
 BOTH, OUTER = 0.2, 0.05
 
 
-class Arm(EquationOfMotion):
-    """Two links in a plane, the elbow's angle counted from the upper arm."""
-
-    dt, unit = 0.01, "rad"
-    state_channels = tuple(
+def joints(unit):
+    return tuple(
         channel
         for name in ("shoulder", "elbow")
         for channel in (
-            Channel(name, "rad", "position", angle=True),
-            Channel(f"{name} rate", "rad/s", "rate", rate_of=name, scale=2.0),
+            Channel(name, unit, "position", angle=unit == "rad"),
+            Channel(f"{name} rate", f"{unit}/s", "rate", rate_of=name, scale=2.0),
         )
     )
+
+
+class Arm(EquationOfMotion):
+    """Two links in a plane, the elbow's angle counted from the upper arm."""
+
+    dt = 0.01
+    state_channels = joints("rad")
     action_channels = (Channel("torque", "N m", "input", scale=0.2),)
 
     def acceleration(self, q, v, u, force, p):
@@ -32,20 +36,12 @@ class Arm(EquationOfMotion):
         a, b, d = INERTIA + 2 * c, FOREARM + c, FOREARM
         first = u[:, 0] + force[:, 0] + s * (2 * v[:, 0] * v[:, 1] + v[:, 1] ** 2)
         other = force[:, 1] - s * v[:, 0] ** 2
-        return (
-            np.stack([d * first - b * other, a * other - b * first], 1) / (a * d - b * b)[:, None]
-        )
+        moved = np.stack([d * first - b * other, a * other - b * first], axis=1)
+        return moved / (a * d - b * b)[:, None]
 
 
 class InDegrees(Arm):
-    state_channels = tuple(
-        channel
-        for name in ("shoulder", "elbow")
-        for channel in (
-            Channel(name, "deg", "position"),
-            Channel(f"{name} rate", "deg/s", "rate", rate_of=name, scale=100.0),
-        )
-    )
+    state_channels = joints("deg")
 
 
 def test_an_arm_on_a_base_that_tilts_keeps_its_energy():

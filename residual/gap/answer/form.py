@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from residual.gap.answer.confirmed import Answer, much
 from residual.gap.answer.curves import over_the_log
 from residual.gap.answer.laws import LESS, is_law, open_to
-from residual.gap.answer.left import much_is_left
+from residual.gap.answer.left import much_is_left, named_of
 from residual.gap.confirmation.drift import beside
 from residual.gap.confirmation.tolerance import allowed, calibrated
 from residual.gap.fitting.contract import Fit
@@ -69,11 +69,7 @@ def rare_beside_much(answer: Answer, further: Sequence[Effect]) -> frozenset[int
         answer: What was found.
         further: Those effects.
     """
-    if not much(answer):
-        return frozenset()
-    labels = {str(effect) for effect in further}
-    search = answer.found.search
-    return frozenset(n for n in answer.key if search.candidates[n].label in labels)
+    return frozenset(named_of(answer, further) if much(answer) else ())
 
 
 def _rejects(answer: Answer, fitter: SmoothFitter, fit: Fit, curve: Curve) -> bool:

@@ -200,8 +200,7 @@ def takes_what_is_left(second: Answer, first: Answer, more: Sequence[Effect]) ->
 def takes_most_by_itself(answer: Answer, more: Sequence[Effect]) -> bool:
     """Whether further effects were named that take most of what all else named would leave."""
     search, key = answer.found.search, answer.key
-    labels = {str(effect) for effect in more}
-    own = tuple(number for number in key if search.candidates[number].label in labels)
+    own = named_of(answer, more)
     if not own:
         return False
     rest, start = search.merged(key, (), drop=own)
@@ -210,6 +209,12 @@ def takes_most_by_itself(answer: Answer, more: Sequence[Effect]) -> bool:
     left, least = beside_noise(answer, rest)
     now = search.error(key) ** 2
     return now - least < QUARTER * (left - least)
+
+
+def named_of(answer: Answer, effects: Sequence[Effect]) -> Key:
+    """Which of some effects were named."""
+    labels, search = {str(effect) for effect in effects}, answer.found.search
+    return tuple(number for number in answer.key if search.candidates[number].label in labels)
 
 
 def names_more(answer: Answer, earlier: Answer) -> bool:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.logs.checks import Finding
+from residual.logs.faults import stretches
 from residual.trajectories import Trajectory, moment
 from sims.host import HostSimulator
 from sims.simulator import Channel
@@ -36,27 +36,24 @@ def cut_inputs(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> 
     """
     found = []
     for column, channel in enumerate(simulator.action_channels):
-        inputs = [run.actions[:, column] for run in trajectories if len(run.actions)]
-        if not inputs:
-            continue
+        inputs = [run.actions[:, column] for run in trajectories]
         every = np.concatenate(inputs)
         ends = [e for e in (every.min(), every.max()) if not _meant(channel, e, np.ptp(every))]
         at = [(e, stays) for e in ends if (stays := _stays(inputs, e))]
         if not at:
             continue
         values = " and ".join(f"{e:.4g}" for e, _ in at)
-        stretches = [one for _, stays in at for one in stays]
-        samples = sum(stop - start for _, start, stop in stretches)
-        kept = [run for run in trajectories if len(run.actions)]
-        run, start, _ = min(stretches)
+        there = [one for _, stays in at for one in stays]
+        samples = sum(stop - start for _, start, stop in there)
+        number, start, _ = min(there)
+        run = trajectories[number]
         says = (
-            f"stays at {values}{channel.unit_text}, the end of all its values, {len(stretches)} "
-            f"times ({samples} of {len(every)} samples, the first at "
-            f"{moment(float(kept[run].times[start]))} of {kept[run].name}), and comes back to "
-            "no other value so often: if the recorder cut it off, log what acts; if the controller "
-            "did, all is well"
+            f"stays at {values}{channel.unit_text}, the end of all its values, {len(there)} times "
+            f"({samples} of {len(every)} samples, the first at {moment(float(run.times[start]))} "
+            f"of {run.name}), and comes back to no other value so often: if the recorder cut it "
+            "off, log what acts; if the controller did, all is well"
         )
-        found.append(Finding("clipped", channel.name, says, {"samples": samples}, "warning"))
+        found.append(Finding("cut", channel.name, says, {"samples": samples}, "warning"))
     return found
 
 
@@ -67,14 +64,13 @@ def _meant(channel: Channel, end: float, span: float) -> bool:
 
 def _stays(inputs: Sequence[Array], end: float) -> list[tuple[int, int, int]]:
     """Stretches at an end, as (run, first sample, one past the last), if they are such."""
-    levels, found = [], []
-    for run, values in enumerate(inputs):
-        starts = np.concatenate([[0], np.flatnonzero(np.diff(values)) + 1, [len(values)]])
-        levels.append(values[starts[:-1]])
-        for start, stop in itertools.pairwise(starts):
-            if values[start] == end and stop - start >= LONG:
-                found.append((run, int(start), int(stop)))
-    every = np.concatenate(levels)
+    found = [
+        (run, start, stop)
+        for run, values in enumerate(inputs)
+        for start, stop in stretches(values == end)
+        if stop - start >= LONG
+    ]
+    every = np.concatenate([values[np.diff(values, prepend=np.nan) != 0] for values in inputs])
     others, times = np.unique(every[every != end], return_counts=True)
     near = times[np.abs(others - end) <= OUTER * np.ptp(every)]
     often = max(OFTEN, TIMES * int(near.max(initial=0)))

@@ -64,7 +64,7 @@ def test_what_was_cut_off_is_told(shape, seed):
         for run in runs(shape, seed)
     ]
     (found,) = cut_inputs(slider(), cut)
-    assert (found.kind, found.where, found.severity) == ("clipped", "force", "warning")
+    assert (found.kind, found.where, found.severity) == ("cut", "force", "warning")
     assert "0.6 N" in found.says
     at = sum(int((np.abs(run.actions) == 0.6).sum()) for run in cut)
     assert 0.8 * at <= found.numbers["samples"] <= at
