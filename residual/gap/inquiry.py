@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from residual.gap.answer.confirmed import Answer, confirm
 from residual.gap.answer.curves import over_the_log
-from residual.gap.answer.varying import with_parameters_as_twins
+from residual.gap.answer.parameter_twins import with_parameters_as_twins
 from residual.gap.clock import Clock, seldom
 from residual.gap.confirmation.instead import with_other_answers
 from residual.gap.confirmation.twins import exact_twins, with_twins
@@ -19,6 +19,7 @@ from residual.gap.offered import Offered
 from residual.gap.once_more import OnceMore
 from residual.gap.preparation.prepare import Prepared, finely, prepare
 from residual.gap.search.explain import Explanation, explain
+from residual.gap.search.orders import kept_orders, of_order
 from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
 from sims.effects.base import Effect
@@ -57,6 +58,7 @@ class Inquiry:
                 if str(curve) not in map(str, more):
                     offered += over_the_log(curve, ready.fitter, simulator)
         there = candidates(simulator, offered, samples, ready.fitter.seconds)
+        there += kept_orders(earlier.candidates, there) if earlier else []
         pool = ready.pool([*there, *less])
         pool = [candidate for candidate in pool if candidate.label not in free]
         further = self._further(simulator, ready, earlier, more)
@@ -89,7 +91,9 @@ class Inquiry:
             return []
         asked = set(map(str, more))
         rest = [effect for effect in self.offered.further if str(effect) not in asked]
-        return candidates(simulator, rest, ready.fitter.samples)
+        samples = ready.fitter.samples
+        orders = of_order(simulator, self.offered.orders, samples)
+        return [*candidates(simulator, rest, samples), *orders]
 
     def _kept(self, earlier: Search | None, more: Sequence[Effect]) -> list[Effect]:
         """The rarer effects that stood out in an earlier search."""

@@ -9,11 +9,13 @@ from typing import Any
 from residual.gap.answer.curves import curves_for
 from residual.gap.confirmation.aliases import aliases, beyond_parameters, representatives
 from residual.gap.log import Log
+from residual.gap.search.orders import higher_orders
 from sims.chosen import LIBRARY, chosen_effects
 from sims.effects.actuator import ActuatorEffect
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.flexible import FlexiblePart
+from sims.effects.joint import Cogging
 from sims.effects.library import curves_in, further_in, library, parts_in
 from sims.effects.parameter_curve import ParameterCurve
 from sims.host import HostSimulator
@@ -35,6 +37,8 @@ class Offered:
         further: Rarer effects, for where one of them takes much of what is left.
         asked: Curves by points that a user asks for.
         losses: That parameters, gains and loads make together, for where one stands for several.
+        orders: Cogging of higher orders that the log shows, for where it takes much of what is
+            left.
     """
 
     by_label: Mapping[str, Effect]
@@ -47,6 +51,7 @@ class Offered:
     further: Sequence[Effect]
     asked: Sequence[Curve] = ()
     losses: Sequence[Effect] = ()
+    orders: Sequence[Cogging] = ()
 
     @classmethod
     def of(
@@ -104,7 +109,10 @@ class Offered:
         groups, sets = aliases(log.simulator, offered, log.runs)
         kept, less = representatives(log.simulator, offered, groups)
         by_label = {str(effect): effect for effect in offered}
-        return cls(by_label, kept, less, groups, sets, curves, parts, further, asked, losses)
+        orders = () if log.simulator.has_contacts else higher_orders(log.simulator, log.runs, kept)
+        return cls(
+            by_label, kept, less, groups, sets, curves, parts, further, asked, losses, orders
+        )
 
 
 def _inputs(effect: Effect) -> tuple[str, ...]:

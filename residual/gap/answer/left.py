@@ -29,7 +29,7 @@ HALF = 0.5
 #: Loss over that of one of its family, up to which an effect fits about as well; squared forecast
 #: error over that of more effects, up to which what fits down to the noise forecasts so.
 NEARLY = 1.25
-#: Rarer effects that are fitted from the nominal simulator on.
+#: Effects that are fitted from the nominal simulator on.
 NEAREST = 3
 #: Effects fewer with which an answer that forecasts as well is the simpler one, whatever numbers
 #: these have.
@@ -77,7 +77,7 @@ def worth_asking_for(answer: Answer, further: Sequence[Effect]) -> list[Effect]:
     for alike in of_one_kind(pool):
         if _fit_in_place_of_pushes([pool[n] for n in alike], fitter, fit):
             worth |= set(alike)
-    worth |= _fit_in_place_of_most(pool, answer)
+    worth |= fit_in_place_of_most(pool, answer)
     return [
         one.effect for n, one in enumerate(pool) if n in worth or _fits_in_place(one, fitter, fit)
     ]
@@ -109,12 +109,16 @@ def _fit_in_place_of_pushes(several: Sequence[Candidate], fitter: SmoothFitter, 
     return fitter.fit(model, start, fit).merit < NEARLY * fit.merit
 
 
-def _fit_in_place_of_most(pool: Sequence[Candidate], answer: Answer) -> set[int]:
+def fit_in_place_of_most(pool: Sequence[Candidate], answer: Answer) -> set[int]:
     """Numbers of those that, alone or beside one effect that was named, fit about as well as all of
     these, with no more numbers: the slope of a bent law and a constant come near to it.
 
     They are told from the nominal simulator on, in the linear picture there, and fitted in full,
     since they are to make most of the gap.
+
+    Args:
+        pool: What may stand in their place.
+        answer: Of a system without impacts.
     """
     search, key = answer.found.search, answer.key
     fitter, fit, nominal = search.fitter, search.tried[key], search.nominal

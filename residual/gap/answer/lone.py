@@ -137,9 +137,10 @@ def _by_block(answer: Answer) -> tuple[Array, Array]:
     """Squared error of the nominal simulator and of the answer by block, joints averaged, (B,)."""
     search = answer.found.search
     before, after = search.before.squares, search.validated[answer.key].squares
+    currency = search.currency
     return (
-        search.currency.by_block(before).mean(axis=1),
-        search.currency.by_block(after).mean(axis=1),
+        currency.averaged(currency.by_block(before)),
+        currency.averaged(currency.by_block(after)),
     )
 
 

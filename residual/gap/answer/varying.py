@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 
 from residual.gap.answer.changing import Course, courses_of
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.left import SEVERAL, half_beyond_noise, much_is_left
+from residual.gap.answer.left import fit_in_place_of_most, half_beyond_noise, much_is_left
 from residual.gap.data.levels import levels
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
-from residual.gap.model.model import Model
-from residual.gap.search.continuation import in_place
 from residual.gap.search.pool import Key
 from sims.effects.curve import Curve
 from sims.effects.parameter_curve import ParameterCurve
@@ -26,12 +24,8 @@ Array = NDArray[np.float64]
 
 #: Times what the best of them leaves, up to which others are asked for, and how many at the most.
 NEARLY, MOST = 2.0, 4
-#: Loss over that of several effects up to which one is asked for in their place.
-ABOUT = 1.25
 #: Part of what one does that lies beyond a curve by points, below which it is that curve.
 BEYOND = 0.1
-#: Loss over that of a law up to which a parameter that follows a channel does the same.
-AS_WELL = 1.1
 
 
 def worth_varying(
@@ -48,15 +42,15 @@ def worth_varying(
         offered: Labels of the effects that may be missing.
     """
     search = answer.found.search
-    courses = _beside(answer, answer.key) or _from_the_nominal(answer)
-    if not courses or not search.simulator.written_out:
+    if not (isinstance(search.fitter, SmoothFitter) and search.simulator.written_out):
         return []
+    courses = _beside(answer, answer.key) or _from_the_nominal(answer)
     near = [one for one in courses if one.fall.loss <= NEARLY * courses[0].fall.loss]
     found = [one.curve for one in near if one.curve and one.curve.parameter in offered]
-    assert isinstance(search.fitter, SmoothFitter)
+    found = found or _in_place_of_most(answer, offered)
     fitter, fit = search.fitter, search.tried[answer.key]
-    laws = [_moved(fitter, fit, curve) for curve in curves] if found else []
-    own = [one for one in found if not _is_one_of(_moved(fitter, fit, one), laws)]
+    laws = [moved(fitter, fit, curve) for curve in curves] if found else []
+    own = [one for one in found if not is_one_of(moved(fitter, fit, one), laws)]
     # Beside what was named another parameter may show that alone would explain all.
     names = [name for name in search.simulator.parameters if name in offered]
     others = [dataclasses.replace(one, parameter=name) for one in own for name in names]
@@ -70,23 +64,29 @@ def _beside(answer: Answer, key: Key) -> list[Course]:
 
 def _from_the_nominal(answer: Answer) -> list[Course]:
     """What changes with a channel and alone leaves half of what all that was named leaves: laws
-    that imitate what changes leave nothing of its shape. Or hardly more than all that, fitted in
-    full: a change that makes most of the gap is no small one, for which the linear picture holds.
+    that imitate what changes leave nothing of its shape.
+    """
+    if not much_is_left(answer):
+        return []
+    most = half_beyond_noise(answer, answer.found.search.tried[answer.key].merit)
+    return [one for one in _beside(answer, ()) if one.fall.loss < most]
+
+
+def _in_place_of_most(answer: Answer, offered: Collection[str]) -> list[ParameterCurve]:
+    """The parameters that, if they follow a channel, fit about as well as all but one that was
+    named: a change that makes most of the gap is no small one, for which the linear picture holds.
     """
     search = answer.found.search
-    fitter, left = search.fitter, search.tried[answer.key].merit
-    if not (isinstance(fitter, SmoothFitter) and much_is_left(answer)):
+    if not much_is_left(answer):
         return []
-    most = half_beyond_noise(answer, left)
-
-    def fits_about_as_well(course: Course) -> bool:
-        if course.curve is None or len(answer.key) < SEVERAL:
-            return False
-        (one,) = candidates(search.simulator, [course.curve], fitter.samples)
-        model = Model(search.simulator, [one])
-        return fitter.fit(model, one.trials[0].values[0], search.nominal).merit < ABOUT * left
-
-    return [one for one in _beside(answer, ()) if one.fall.loss < most or fits_about_as_well(one)]
+    curves = [
+        ParameterCurve(name, level.channel, of_size=level.of_size).suited_to(*level.reach)
+        for level in levels(search.simulator, search.fitter.samples)
+        for name in search.simulator.parameters
+        if name in offered
+    ]
+    pool = candidates(search.simulator, curves, search.fitter.samples)
+    return [curves[n] for n in sorted(fit_in_place_of_most(pool, answer))]
 
 
 def over_unused(
@@ -134,65 +134,14 @@ def no_surer(answer: Answer, earlier: Answer) -> Answer:
     return dataclasses.replace(answer, claims=claims)
 
 
-def with_parameters_as_twins(answer: Answer, offered: Collection[str]) -> Answer:
-    """An answer whose curves by points have the parameters as twins that would do the same if they
-    followed a channel: a curve of the speed is a wheelbase that grows with it.
-
-    Args:
-        answer: What was found.
-        offered: Labels of the effects that may be missing.
-    """
-    search = answer.found.search
-    fitter, simulator = search.fitter, search.simulator
-    if not (isinstance(fitter, SmoothFitter) and simulator.written_out):
-        return answer
-    claims = []
-    for claim in answer.claims:
-        law = search.candidates[claim.number].effect
-        if isinstance(law, Curve) and not isinstance(law, ParameterCurve) and claim.sure:
-            others = [
-                ParameterCurve(name, level.channel).suited_to(*level.reach)
-                for level in levels(simulator, fitter.samples)
-                for name, parameter in simulator.parameters.items()
-                if name in offered and not level.of_size
-                if not (law.family and parameter.family == law.family)
-            ]
-            found = _that_move_as(answer, claim.number, law, others)
-            claim = dataclasses.replace(claim, twins=(*claim.twins, *found[:MOST]))
-        claims.append(claim)
-    return dataclasses.replace(answer, claims=tuple(claims))
-
-
-def _that_move_as(
-    answer: Answer, number: int, law: Curve, others: Sequence[ParameterCurve]
-) -> list[str]:
-    """Labels of the curves that fit as well in place of a law of the answer."""
-    search, key = answer.found.search, answer.key
-    fitter, fit = search.fitter, search.tried[key]
-    assert isinstance(fitter, SmoothFitter)
-    does, own = _moved(fitter, fit, law), fit.model.owner == key.index(number)
-    found = []
-    for other in others:
-        moved = _moved(fitter, fit, other)
-        if not _is_one_of(moved, [does]):
-            continue
-        (heir,) = candidates(search.simulator, [other], fitter.samples)
-        values = np.linalg.lstsq(moved, does @ fit.theta[own], rcond=1e-10)[0]
-        chosen, theta = in_place(search, key, number, heir, values)
-        again = fitter.fit(Model(search.simulator, chosen), theta, fit)
-        if again.merit <= AS_WELL * fit.merit + fitter.tie(search.nominal):
-            found.append(str(other))
-    return found
-
-
-def _moved(fitter: SmoothFitter, fit: Fit, curve: Curve) -> Array:
+def moved(fitter: SmoothFitter, fit: Fit, curve: Curve) -> Array:
     """What a curve does at each of its points, one column each."""
     pool = candidates(fit.model.simulator, [curve], fitter.samples)
     columns = beside_starts(fit, fitter.columns(fit, pool))
     return columns.reshape(-1, columns.shape[-1])
 
 
-def _is_one_of(moved: Array, laws: Sequence[Array]) -> bool:
+def is_one_of(moved: Array, laws: Sequence[Array]) -> bool:
     """Whether all that columns do lies within what one of the laws can do."""
     size = np.linalg.norm(moved)
     for law in laws:

@@ -22,6 +22,8 @@ LONG, ENOUGH, MOST = 10.0, 10, 0.8
 #: Part of the time between bursts that one lasts, and of its range that a channel moves in it, at
 #: most: else it is a record of its own.
 BRIEF, STILL = 0.1, 0.1
+#: Rows of a usual burst at the least.
+SEVERAL = 2
 
 
 def without_bursts(
@@ -43,7 +45,7 @@ def without_bursts(
     if (total - apart.sum()) / len(apart) > BRIEF * np.median(apart):
         return runs, []
     ends = [np.append(run.durations > least, True) for run in runs]
-    if _moves(runs, ends):
+    if _are_alone(runs, ends, float(np.median(apart))) or _moves(runs, ends):
         return runs, []
     kept, rows = [], 0
     for run, last in zip(runs, ends, strict=True):
@@ -60,6 +62,18 @@ def without_bursts(
         "sensor's own time"
     )
     return kept, [Finding("bursts", "", says, {"every_s": every, "rows": rows}, "warning")]
+
+
+def _are_alone(runs: Sequence[Trajectory], ends: Sequence[NDArray[np.bool_]], apart: float) -> bool:
+    """Whether most rows that end a burst have none before them, or one burst lasts longer than two
+    usually are ``apart``: a logger that is slow at rest and fast where something happens."""
+    times = [
+        part
+        for run, last in zip(runs, ends, strict=True)
+        for part in np.split(run.times, np.flatnonzero(last)[:-1] + 1)
+    ]
+    longest = max(part[-1] - part[0] for part in times)
+    return bool(np.median([len(part) for part in times]) < SEVERAL or longest > apart)
 
 
 def _moves(runs: Sequence[Trajectory], ends: Sequence[NDArray[np.bool_]]) -> bool:

@@ -45,7 +45,8 @@ def run(
     grown: set[Key] = set()
     reached = 1.0
     if seeds:
-        frontier = best_of(search, search.add(seeds)) or frontier
+        known = [*search.add(seeds), *(key for key in seeds if key in search.validated)]
+        frontier = best_of(search, known) or frontier
         reached = search.error(frontier[0])
         frontier = _alone(search, quiet) or frontier
     for level in range(1, effort.most + 1):

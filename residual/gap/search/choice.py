@@ -129,10 +129,11 @@ def _fits_far_better(search: Search, key: Key, among: list[Key]) -> Key:
     Where one block alone makes its forecasts the better ones, less says that it is none: what lies
     in one block, such as a single step, is foretold from data that do not hold it.
     """
-    own = search.currency.by_block(search.validated[key].squares).mean(axis=1)
+    currency = search.currency
+    own = currency.averaged(currency.by_block(search.validated[key].squares))
 
     def seldom_behind(other: Key) -> bool:
-        its = search.currency.by_block(search.validated[other].squares).mean(axis=1)
+        its = currency.averaged(currency.by_block(search.validated[other].squares))
         return bool((its > own + SAME / len(own)).mean() <= ASTRAY)
 
     def out(other: Key) -> bool:

@@ -43,9 +43,10 @@ def takes_off(currency: Currency, worse: Array, better: Array) -> bool:
     """The same of mean squared errors of blocks, each (B, m)."""
     before, after = currency.by_group(worse), currency.by_group(better)
     gained = before - after
-    if gained.mean() <= 0:
+    in_all = currency.averaged(gained)
+    if in_all <= 0:
         return False
-    over_all = gained.mean() > max(MATERIAL * before.mean(), TRIFLE)
+    over_all = in_all > max(MATERIAL * currency.averaged(before), TRIFLE)
     return bool(over_all or ((gained > AT_ONE * before) & (gained > TRIFLE)).any())
 
 

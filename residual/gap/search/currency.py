@@ -1,13 +1,15 @@
 """What is compared: the error of forecasts, in units of what the nominal simulator makes of them.
 
 0 is perfect, 1 as bad as the nominal simulator. Errors of a channel are summed over blocks, the
-channels of one joint (its position and its rate) are averaged, and then all joints.
+channels of one joint (its position and its rate) are averaged, and then all joints, each weighed
+by the part of its error that noise alone would not make.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,22 +43,32 @@ class Currency:
     Attributes:
         nominal: Of the nominal simulator, (B, m).
         groups: Channels that count as one.
+        weights: Weight of each group in the mean of all; alike by default.
     """
 
     nominal: Array
     groups: tuple[tuple[int, ...], ...]
+    weights: tuple[float, ...] = ()
 
     def only_where_wrong(self, floor: Array) -> Currency:
-        """The same without joints at which the nominal simulator errs no more than noise does.
+        """The same without joints at which the nominal simulator errs no more than noise does, and
+        less of those at which it errs little more.
 
-        What moves there is noise, and a force that calms it would pass for physics.
+        What moves there is noise, and a force that calms it would pass for physics. A joint that
+        errs by a third more than noise has next to no gap, and what is left of that is no half of
+        the whole.
 
         Args:
             floor: Mean squared errors of blocks if only noise were left, (B, m).
         """
         times = np.nanmean(self.nominal, axis=0) / np.maximum(np.nanmean(floor, axis=0), 1e-300)
         kept = tuple(g for g in self.groups if (times[list(g)] > NOISY).any())
-        return dataclasses.replace(self, groups=kept or self.groups)
+        beyond = tuple(float(1 - 1 / np.sqrt(np.nanmax(times[list(g)]))) for g in kept)
+        return dataclasses.replace(self, groups=kept or self.groups, weights=beyond)
+
+    def averaged(self, by_group: Array) -> Any:
+        """Mean over groups, the last axis, by their weights."""
+        return np.average(by_group, axis=-1, weights=self.weights or None)
 
     def by_block(self, squares: Array) -> Array:
         """Share of every block and group in the relative error, (B, g); sums over B are errors."""
@@ -70,12 +82,12 @@ class Currency:
 
     def error(self, squares: Array) -> float:
         """Relative error, all groups averaged."""
-        return float(self.by_group(squares).mean())
+        return float(self.averaged(self.by_group(squares)))
 
     def difference(self, one: Array, other: Array, group: int | None = None) -> tuple[float, float]:
         """Relative error of one less that of another, and its standard error over blocks."""
         change = self.by_block(one) - self.by_block(other)
-        per_block = change.mean(axis=1) if group is None else change[:, group]
+        per_block = self.averaged(change) if group is None else change[:, group]
         n = len(per_block)
         spread = float(per_block.std(ddof=1) * np.sqrt(n)) if n > 1 else np.inf
         return float(per_block.sum()), spread
@@ -132,6 +144,6 @@ class Currency:
         picks = np.vstack([np.arange(n)[None], rng.integers(0, n, (400, n))])
         base = np.maximum(np.nan_to_num(self.nominal)[picks].sum(axis=1), 1e-300)
         gained = np.nan_to_num(less - more)[picks].sum(axis=1) / base
-        drawn = np.stack([gained[:, list(g)].mean(axis=1) for g in self.groups], axis=1).mean(1)
+        drawn = self.averaged(np.stack([gained[:, list(g)].mean(1) for g in self.groups], axis=1))
         low, high = np.quantile(drawn[1:], [0.025, 0.975])
         return float(drawn[0]), float(min(low, drawn[0])), float(max(high, drawn[0]))

@@ -86,6 +86,17 @@ def is_in_vain(earlier: Search, search: Search) -> bool:
     return bool(fresh) and errors[True] > HELPS * errors[False]
 
 
+def worth_another_look(earlier: Search, search: Search) -> list[Key]:
+    """Sets to be judged in other weights before nothing that was lacking is said to help: what is
+    chosen, and of those with something new the ones that forecast and fit best."""
+    fresh = _lacked(earlier, search)
+    new = [key for key in search.usable() if not fresh.isdisjoint(key)]
+    best = (
+        [min(new, key=search.error), min(new, key=lambda k: search.tried[k].merit)] if new else []
+    )
+    return [key for key in dict.fromkeys([near_best(search)[0], *best]) if key]
+
+
 def _lacked(earlier: Search, search: Search) -> set[int]:
     """Candidates that an earlier search did not have."""
     known = {candidate.effect for candidate in earlier.candidates}

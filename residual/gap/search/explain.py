@@ -20,7 +20,13 @@ from residual.gap.search.at_sight import at_sight
 from residual.gap.search.beam import extend, improves, run
 from residual.gap.search.choice import Choice, choose
 from residual.gap.search.continuation import add_handed_over
-from residual.gap.search.earlier import add_what_it_lacked, carried, is_in_vain, near_best
+from residual.gap.search.earlier import (
+    add_what_it_lacked,
+    carried,
+    is_in_vain,
+    near_best,
+    worth_another_look,
+)
 from residual.gap.search.exchange import add_exchanged, add_pairs_exchanged, as_good_splits
 from residual.gap.search.pairs import every_two
 from residual.gap.search.pool import Key, Twins
@@ -156,7 +162,14 @@ def explain(
                 add_what_it_lacked(earlier, search)
             search.add(curves_in_place(search, near_best(search)))
             if earlier is not None and is_in_vain(earlier, search):
-                return settle(search, floor, exchanges=0)
+                # What is small does not show where the nominal simulator's error is the measure.
+                seeds = {key: search.own(key) for key in worth_another_look(earlier, search)}
+                finer, around = weigh(fitter, search.tried[near_best(search)[0]])
+                closer = begun(finer, around, search)
+                closer.add(seeds)
+                if is_in_vain(earlier, closer):
+                    return settle(search, floor, exchanges=0)
+                fitter, floor, search = finer, around, closer
         run(search, seeds, functools.partial(_quiet, search, floor))
         in_pairs = every_pair and not (seeds or simulator.has_contacts)
         if in_pairs and not _quiet(search, floor, search.best()):

@@ -113,3 +113,63 @@ def test_two_that_use_each_other_up_are_told_as_that(seed):
     for number in numbers.values():
         assert number.low <= 4e-4 <= number.high
         assert number.value == pytest.approx(4e-4, rel=0.1)
+
+
+class Chain(FirstOrderSystem):
+    """X turns to Y and Y to Z, which takes up N, as if there were always enough of it."""
+
+    dt = 1.0
+    state_channels = tuple(
+        Channel(name, "mmol/L", "other", scale=scale)
+        for name, scale in (("X", 2.0), ("Y", 1.0), ("Z", 1.0), ("N", 2.0))
+    )
+    action_channels = (
+        Channel("dilution", "1/min", "input", scale=0.05, low=0.0, high=0.3),
+        Channel("feed", "mmol/L", "input", scale=3.0, low=0.0, high=20.0),
+        Channel("cofactor", "mmol/L", "input", scale=3.0, low=0.0, high=20.0),
+    )
+
+    def __init__(self):
+        self.parameters = {
+            "first": Parameter(0.0588, "1/min", "of X", low=0.0),
+            "second": Parameter(0.055, "1/min", "of Y", low=0.0),
+        }
+        super().__init__()
+
+    def derivative(self, x, u, p):
+        return chain(x.T, u.T, p.first, p.second)
+
+
+def chain(x, u, first, second):
+    rates = [first * x[0], second * x[1]]
+    return np.stack([u[0] * (u[1] - x[0]) - rates[0], rates[0] - rates[1] - u[0] * x[1],
+                     rates[1] - u[0] * x[2], u[0] * (u[2] - x[3]) - rates[1]], axis=-1)  # fmt: skip
+
+
+def short_of_cofactor(seed, n=200):
+    """The second step goes with N, too, as by the law of mass action."""
+    rng = np.random.default_rng(seed)
+    inputs = np.stack(
+        [
+            np.repeat(rng.uniform(*reach, n // 20), 20)
+            for reach in ((0.01, 0.08), (1.0, 6.0), (1.0, 6.0))
+        ],
+        axis=1,
+    )
+
+    def rates(_, x, u):
+        return chain(x, u, 0.06, 0.05 * x[3])
+
+    seen = path(rates, [2.0, 0.5, 0.5, 2.0], [tuple(one) for one in inputs], 1.0)[:-1]
+    seen = seen + 0.006 * rng.standard_normal(seen.shape)
+    return Trajectory(f"run {seed}", np.arange(float(n)), seen, inputs[:-1])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rate_that_goes_with_another_state_is_no_push_at_each_state(seed):
+    found = find_gap(Chain(), [short_of_cofactor(10 * seed + run) for run in range(2)])
+    (curve,) = [one for one in found.effects if one.name == "parameter_curve"]
+    assert str(curve) == "parameter_curve@second over N"
+    seen = np.linspace(*curve.reach, 5)
+    np.testing.assert_allclose(0.055 + curve.at(seen), 0.05 * seen, atol=0.01)

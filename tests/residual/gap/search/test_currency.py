@@ -55,6 +55,23 @@ def test_a_joint_counts_once_however_many_of_its_channels_were_measured():
     assert currency.error(nominal * [0.0, 1.0, 0.0]) == pytest.approx(0.5)
 
 
+def test_a_joint_counts_by_the_part_of_its_error_that_is_no_noise():
+    """One that errs 50 times as noise does is mended, and one with next to no gap stays."""
+    nominal = np.array([[2500.0, 1.44]] * 6)
+    currency = Currency(nominal, ((0,), (1,))).only_where_wrong(np.ones((6, 2)))
+    assert currency.error(nominal) == pytest.approx(1.0)
+    left = currency.error(nominal * [0.0, 1.0])
+    assert 0.1 < left < 0.2
+    share, low, high = currency.share(nominal, nominal * [0.0, 1.0], np.random.default_rng(0))
+    assert low <= share <= high and share == pytest.approx(1 - left)
+
+
+def test_a_joint_that_errs_as_noise_does_counts_for_nothing():
+    nominal = np.array([[2500.0, 1.1]] * 6)
+    currency = Currency(nominal, ((0,), (1,))).only_where_wrong(np.ones((6, 2)))
+    assert currency.error(nominal * [0.0, 9.0]) == 0.0
+
+
 def test_missing_blocks_count_for_nothing():
     nominal = np.ones((6, 1))
     nominal[2] = np.nan
