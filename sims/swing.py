@@ -18,6 +18,7 @@ from sims.effects.joint import (
     CubicSpring,
     JointEffect,
     LinearSpring,
+    NegativeStiffness,
     QuadraticDrag,
     Value,
     ViscousFriction,
@@ -29,6 +30,11 @@ C_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_double)
 
 # Where the kernel keeps the numbers of an effect, and how they are called there and here.
 COLUMNS = {name: i for i, name in enumerate((*DrivenJoint._fields[:10], *Field._fields[:2]))}
+SPRINGS: dict[type[Effect], tuple[int, int]] = {  # sign and power of the distance
+    LinearSpring: (1, 1),
+    NegativeStiffness: (-1, 1),
+    CubicSpring: (1, 3),
+}
 NUMBERS: dict[type[Effect], dict[str, str]] = {
     ViscousFriction: {"damping": "coefficient"},
     QuadraticDrag: {"drag": "coefficient"},
@@ -69,10 +75,9 @@ def swing(
     waves: list[Sequence[Value]] = []
     own: list[JointEffect] = []
     for effect in effects:
-        if type(effect) in (LinearSpring, CubicSpring):
-            springs.append(
-                (effect.stiffness, effect.rest, 1 if type(effect) is LinearSpring else 3)
-            )
+        if type(effect) in SPRINGS:
+            sign, power = SPRINGS[type(effect)]
+            springs.append((sign * effect.stiffness, effect.rest, power))
         elif type(effect) is Cogging:
             waves.append((effect.sine, effect.cosine, effect.order))
         elif type(effect) in NUMBERS and not (

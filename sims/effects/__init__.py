@@ -46,6 +46,7 @@ from sims.effects.joint import ConstantLoad as ConstantLoad
 from sims.effects.joint import CubicSpring as CubicSpring
 from sims.effects.joint import JointEffect as JointEffect
 from sims.effects.joint import LinearSpring as LinearSpring
+from sims.effects.joint import NegativeStiffness as NegativeStiffness
 from sims.effects.joint import QuadraticDrag as QuadraticDrag
 from sims.effects.joint import Unbalance as Unbalance
 from sims.effects.joint import ViscousFriction as ViscousFriction

@@ -163,6 +163,27 @@ class CubicSpring(JointEffect):
 
 
 @dataclasses.dataclass(frozen=True)
+class NegativeStiffness(JointEffect):
+    """What pushes away from where it is balanced: ``stiffness (q - rest)``.
+
+    A magnet on iron, a weight above its pivot, a hull that the depth compresses.
+    """
+
+    stiffness: Value = number(low=0.0, force=1, position=-1)
+    rest: Value = number(role="shape", position=1, starts=RESTS)
+
+    name: ClassVar[str] = "negative_stiffness"
+    sentence: ClassVar[str] = "A force that grows the farther away it pushes: a magnet on iron."
+    needs: ClassVar[str] = "a wide range of positions"
+    family: ClassVar[str] = "spring"
+    follows_rate: ClassVar[bool] = False
+
+    def force(self, q: Value, v: Value) -> Value:
+        """Force away from where it is balanced."""
+        return self.stiffness * (q - self.rest)
+
+
+@dataclasses.dataclass(frozen=True)
 class ConstantLoad(JointEffect):
     """A force that never changes; on a first-order system, a constant rate of change."""
 

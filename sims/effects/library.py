@@ -46,6 +46,7 @@ from sims.effects.joint import (
     CubicSpring,
     JointEffect,
     LinearSpring,
+    NegativeStiffness,
     QuadraticDrag,
     Unbalance,
     ViscousFriction,
@@ -178,18 +179,18 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     """What is rarer than the library, at zero strength.
 
     Friction by load and a limited drive of every joint that the inputs move by themselves; states
-    that fall at another pace than they rise, rub otherwise backwards, lose a constant or by a
-    power, have an inertia by their angle, run into stops, act on others, react with them or are
-    linked to them; what moves in a medium that does, too; inputs that act otherwise below zero or
-    through a play, and, but for goals, that are followed at a limited pace; encoders off their
-    axis.
+    that fall at another pace than they rise, rub otherwise backwards, are pushed away from their
+    balance, lose a constant or by a power, have an inertia by their angle, run into stops, act on
+    others, react with them or are linked to them; what moves in a medium that does, too; inputs
+    that act otherwise below zero or through a play, and, but for goals, that are followed at a
+    limited pace; encoders off their axis.
     """
     found: list[Effect] = [*_geared(simulator), *_in_mediums(simulator)]
     inputs = [channel.name for channel in simulator.action_channels]
     inputs += [AND.join(names) for names in like_inputs(simulator)]
     kinds = (
-        AsymmetricResponse, AsymmetricDamping, ConstantLoss, PowerLoss, CrankInertia, UpperStop,
-        LowerStop,
+        AsymmetricResponse, AsymmetricDamping, NegativeStiffness, ConstantLoss, PowerLoss,
+        CrankInertia, UpperStop, LowerStop,
     )  # fmt: skip
     both: list[Effect] = [kind(joint.name) for kind in kinds for joint in simulator.joints]
     both += [Coupling(BY.join(names)) for names in coupled_states(simulator)]

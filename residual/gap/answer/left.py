@@ -211,8 +211,9 @@ def takes_most_by_itself(answer: Answer, more: Sequence[Effect]) -> bool:
     if rest not in search.tried:
         search.fit(rest, start)
     left, least = beside_noise(answer, rest)
-    now = search.error(key) ** 2
-    return now - least < QUARTER * (left - least)
+    # What swings from a state of its own is foretold from noise as well.
+    now, by_noise = beside_noise(answer, key)
+    return now - max(least, by_noise) < QUARTER * (left - least)
 
 
 def named_of(answer: Answer, effects: Sequence[Effect]) -> Key:

@@ -1,4 +1,4 @@
-"""Parameters that would do what a curve by points does if they followed a channel.
+"""Parameters that would do what a law does if they followed the channel that it goes by.
 
 Some do in any motion: a damping that follows the speed is a friction by speed. Others do as the
 log goes: what falls at its final speed is at one speed wherever it is, so that a drag which follows
@@ -9,34 +9,36 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.varying import MOST, is_one_of, moved
+from residual.gap.answer.likeness import in_any_motion, is_one_of, moved
+from residual.gap.answer.varying import MOST
 from residual.gap.data.levels import levels
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.model.model import Model
 from residual.gap.search.continuation import in_place
-from sims.effects.aliases import shortly_after
+from sims.effects.base import Effect
 from sims.effects.curve import Curve
+from sims.effects.joint import CubicSpring, LinearSpring
 from sims.effects.parameter_curve import ParameterCurve
+from sims.host import HostSimulator
 
 Array = NDArray[np.float64]
 
 #: Loss over that of a law up to which a parameter that follows a channel does the same.
 AS_WELL = 1.1
-#: States at which motions are compared.
-ROWS = 200
 
 
 def with_parameters_as_twins(answer: Answer, offered: Collection[str]) -> Answer:
-    """An answer whose curves by points know the parameters that would do the same if they followed
-    a channel: those that do in any motion are twins, as of a curve of the speed a wheelbase that
-    grows with it, others are alike in these data.
+    """An answer whose curves by points and springs know the parameters that would do the same if
+    they followed a channel: those that do in any motion are twins, as of a curve of the speed a
+    wheelbase that grows with it, others are alike in these data.
 
     Args:
         answer: What was found.
@@ -49,16 +51,22 @@ def with_parameters_as_twins(answer: Answer, offered: Collection[str]) -> Answer
     claims = []
     for claim in answer.claims:
         law = search.candidates[claim.number].effect
-        if isinstance(law, Curve) and not isinstance(law, ParameterCurve) and claim.sure:
+        if _follows_one(law) and claim.sure:
+            where = _position(simulator, law)
             others = [
                 ParameterCurve(name, level.channel).suited_to(*level.reach)
                 for level in levels(simulator, fitter.samples)
                 for name, parameter in simulator.parameters.items()
                 if name in offered and not level.of_size
                 if not (law.family and parameter.family == law.family)
+                if isinstance(law, Curve) or level.channel == where
             ]
-            found = _that_move_as(answer, claim.number, law, others)[:MOST]
-            exact = [other for other in found if _in_any_motion(answer, law, other)]
+            found = _that_move_as(answer, claim.number, others)[:MOST]
+            exact = [
+                other
+                for other in found
+                if isinstance(law, Curve) and in_any_motion(fitter, simulator, law, other)
+            ]
             twins = (*claim.twins, *map(str, exact))
             alike = (*claim.alike, *(str(other) for other in found if other not in exact))
             claim = dataclasses.replace(claim, twins=twins, alike=alike)
@@ -66,48 +74,37 @@ def with_parameters_as_twins(answer: Answer, offered: Collection[str]) -> Answer
     return dataclasses.replace(answer, claims=tuple(claims))
 
 
+def _follows_one(law: Effect) -> bool:
+    """Whether a law goes by one channel, and is no parameter: a curve by points, or a spring."""
+    return isinstance(law, Curve | LinearSpring | CubicSpring) and not isinstance(
+        law, ParameterCurve
+    )
+
+
+def _position(simulator: HostSimulator, law: Effect) -> str:
+    """The position of the joint that a law acts on, empty of what acts on none."""
+    return next((one.position for one in simulator.joints if one.name == law.where), "")
+
+
 def _that_move_as(
-    answer: Answer, number: int, law: Curve, others: Sequence[ParameterCurve]
+    answer: Answer, number: int, others: Sequence[ParameterCurve]
 ) -> list[ParameterCurve]:
     """The curves that fit as well in place of a law of the answer."""
     search, key = answer.found.search, answer.key
     fitter, fit = search.fitter, search.tried[key]
     assert isinstance(fitter, SmoothFitter)
-    most = AS_WELL * fit.merit + fitter.tie(search.nominal)
-    does = moved(fitter, fit, law)
-    alike = [other for other in others if is_one_of(moved(fitter, fit, other), [does])]
-    return [
-        other
-        for other in alike
-        if any(again.merit <= most for again in _fits_in_place(answer, number, does, other))
-    ]
-
-
-def _in_any_motion(answer: Answer, law: Curve, other: ParameterCurve) -> bool:
-    """Whether a law can do what a parameter that follows a channel does wherever each state and
-    each input may be: each at values of the log, drawn for itself."""
-    fitter, simulator = answer.found.search.fitter, answer.found.search.simulator
-    assert isinstance(fitter, SmoothFitter)
-    rng, samples = np.random.default_rng(0), fitter.samples
-    rows = rng.integers(0, len(samples), ROWS)
-    states = rng.permuted(fitter.nodes[rows, : len(simulator.physical_channels)], axis=0)
-    inputs = rng.permuted(samples.actions[rows], axis=0)
-    plain = simulator.with_effects(())
-    scale = np.array([channel.scale for channel in simulator.physical_channels])
-
-    def does(curve: Curve) -> Array:
-        columns = []
-        for field in curve.strengths():
-            small = 1e-3 * curve.quantities(simulator)[field].scale
-            ends = [
-                shortly_after(plain.with_effects([curve.with_values(**{field: size})]), *drawn)
-                for size in (small, -small)
-            ]
-            columns.append(((ends[0] - ends[1]) / scale).ravel())
-        return np.stack(columns, axis=1)
-
-    drawn = states, inputs
-    return is_one_of(does(other), [does(law)])
+    most, law = AS_WELL * fit.merit + fitter.tie(search.nominal), search.candidates[number]
+    own = np.flatnonzero(fit.model.owner == key.index(number))[law.linear]
+    columns = fit.by_knob[..., own].reshape(-1, len(own))
+    does = columns @ fit.theta[own]
+    found = []
+    for other in others:
+        there = moved(fitter, fit, other)
+        if not (is_one_of(there, [columns]) or is_one_of(does[:, None], [there])):
+            continue
+        if any(again.merit <= most for again in _fits_in_place(answer, number, does, other)):
+            found.append(other)
+    return found
 
 
 def _fits_in_place(
@@ -116,20 +113,19 @@ def _fits_in_place(
     """Fits with a parameter that follows a channel in place of a law.
 
     From where it moves as the law does; from the nominal simulator on, since what changes many
-    times over leads elsewhere; and through about as many points as the law has, in two halves.
+    times over leads elsewhere; and through about as many points as a curve has, in two halves.
 
     Args:
         answer: With the law.
         number: The law.
-        does: What that does at each of its points, one column each.
+        does: What that does in the log.
         other: What comes in its place.
     """
     search, key = answer.found.search, answer.key
     fitter, fit = search.fitter, search.tried[key]
     assert isinstance(fitter, SmoothFitter)
-    own = fit.model.owner == key.index(number)
     (heir,) = candidates(search.simulator, [other], fitter.samples)
-    values = np.linalg.lstsq(moved(fitter, fit, other), does @ fit.theta[own], rcond=1e-10)[0]
+    values: Any = np.linalg.lstsq(moved(fitter, fit, other), does, rcond=1e-10)[0]
     chosen, theta = in_place(search, key, number, heir, values)
     fits = [fitter.fit(Model(search.simulator, chosen), theta, fit)]
     yield fits[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -11,9 +12,8 @@ from numpy.typing import NDArray
 from residual.gap.answer.changing import Course, courses_of
 from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.left import fit_in_place_of_most, half_beyond_noise, much_is_left
+from residual.gap.answer.likeness import in_any_motion
 from residual.gap.data.levels import levels
-from residual.gap.fitting.contract import Fit
-from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
 from residual.gap.search.pool import Key
@@ -24,8 +24,6 @@ Array = NDArray[np.float64]
 
 #: Times what the best of them leaves, up to which others are asked for, and how many at the most.
 NEARLY, MOST = 2.0, 4
-#: Part of what one does that lies beyond a curve by points, below which it is that curve.
-BEYOND = 0.1
 
 
 def worth_varying(
@@ -33,8 +31,8 @@ def worth_varying(
 ) -> list[ParameterCurve]:
     """The parameters that follow a channel in the linear picture, to ask for.
 
-    Those that do what a curve by points does are left to that: a damper that follows its own speed
-    is a friction by speed.
+    Those that do in any motion what a curve by points does are left to that: a damper that follows
+    its own speed is a friction by speed.
 
     Args:
         answer: What was found with the effects on offer.
@@ -48,9 +46,8 @@ def worth_varying(
     near = [one for one in courses if one.fall.loss <= NEARLY * courses[0].fall.loss]
     found = [one.curve for one in near if one.curve and one.curve.parameter in offered]
     found = found or _in_place_of_most(answer, offered)
-    fitter, fit = search.fitter, search.tried[answer.key]
-    laws = [moved(fitter, fit, curve) for curve in curves] if found else []
-    own = [one for one in found if not is_one_of(moved(fitter, fit, one), laws)]
+    laws = functools.partial(in_any_motion, search.fitter, search.simulator)
+    own = [one for one in found if not any(laws(curve, one) for curve in curves)]
     # Beside what was named another parameter may show that alone would explain all.
     names = [name for name in search.simulator.parameters if name in offered]
     others = [dataclasses.replace(one, parameter=name) for one in own for name in names]
@@ -132,20 +129,3 @@ def no_surer(answer: Answer, earlier: Answer) -> Answer:
         for claim in answer.claims
     )
     return dataclasses.replace(answer, claims=claims)
-
-
-def moved(fitter: SmoothFitter, fit: Fit, curve: Curve) -> Array:
-    """What a curve does at each of its points, one column each."""
-    pool = candidates(fit.model.simulator, [curve], fitter.samples)
-    columns = beside_starts(fit, fitter.columns(fit, pool))
-    return columns.reshape(-1, columns.shape[-1])
-
-
-def is_one_of(moved: Array, laws: Sequence[Array]) -> bool:
-    """Whether all that columns do lies within what one of the laws can do."""
-    size = np.linalg.norm(moved)
-    for law in laws:
-        left = moved - law @ np.linalg.lstsq(law, moved, rcond=1e-10)[0] if law.size else moved
-        if np.linalg.norm(left) <= BEYOND * size:
-            return True
-    return False

@@ -14,14 +14,17 @@ from numpy.typing import NDArray
 from residual.gap.data.samples import Samples
 from residual.gap.search.sets import Search
 from sims.effects.actuator import ActuatorBias, ActuatorGain
-from sims.effects.joint import LinearSpring, ViscousFriction
+from sims.effects.joint import LinearSpring, NegativeStiffness, ViscousFriction
 from sims.effects.loss import ProportionalLoss
 from sims.effects.sensor import ScaledSensor
 
 Array = NDArray[np.float64]
 
 #: Laws in proportion to a state or an input.
-LINEAR = ActuatorGain | LinearSpring | ProportionalLoss | ScaledSensor | ViscousFriction
+LINEAR = (
+    ActuatorGain | LinearSpring | NegativeStiffness | ProportionalLoss | ScaledSensor
+    | ViscousFriction
+)  # fmt: skip
 #: Part of an input's standard deviation that an affine law of the states misses at the most.
 MISSED = 0.05
 #: Values from which on an input is more than switched, and rows for every number of the law.

@@ -2,7 +2,7 @@
 
 A vibration of which a log holds thirty readings a period, and the rows that are searched two,
 scatters from row to row as noise does. From reading to reading it is smooth, and so are the errors
-of a simulator that answers late.
+of a simulator that answers late. A swing that is little above the noise is told by its frequency.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.data.samples import Samples
+from residual.gap.data.spectrum import line
 from residual.gap.fitting import noise
 from residual.gap.model import paths
 from residual.gap.model.model import Model
@@ -24,6 +25,8 @@ Mask = NDArray[np.bool_]
 
 #: Times what local cubics leave of the readings, beyond which noise is not believed.
 SMOOTH = 5.0
+#: The same where what the simulator misses from reading to reading has a frequency of its own.
+SWINGING = 1.5
 #: Part of successive readings that are equal, beyond which a sensor may be slower than its log.
 HELD = 0.4
 #: Part of rows with a reading, below which it is.
@@ -54,7 +57,9 @@ def read_closer(
     most = AT_ONCE if simulator.advances_rows_at_once else BY_ROW
     samples = Samples.join(_stretches(trajectories, most), simulator.substeps)
     scatter = noise.local_noise(samples)
-    doubtful = (floor.sigma > SMOOTH * scatter) & _reads_each_row(samples)
+    above = floor.sigma / scatter
+    swinging = (above > SWINGING).any() and _swings(simulator, trajectories)
+    doubtful = (above > (SWINGING if swinging else SMOOTH)) & _reads_each_row(samples)
     if not doubtful.any():
         return floor
     model, none = Model(simulator), np.zeros(0)
@@ -64,6 +69,17 @@ def read_closer(
     return noise.Noise(
         np.where(lower, closer.sigma, floor.sigma), np.where(lower, closer.error, floor.error)
     )
+
+
+def _swings(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> bool:
+    """Whether what a simulator misses from each reading to the next has a frequency of its own."""
+    if not simulator.advances_rows_at_once:
+        return False
+    samples, model, none = Samples.join(trajectories, 1), Model(simulator), np.zeros(0)
+    nodes = paths.measured(model, samples, none)
+    after = model.advance(samples, nodes[None], none[None])[0]
+    missed = np.append(nodes[1:] - after[:-1], np.zeros((1, nodes.shape[1])), axis=0)
+    return any(line(samples, missed[:, column]) for column in samples.measured)
 
 
 def _reads_each_row(samples: Samples) -> Mask:
