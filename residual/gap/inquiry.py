@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 from residual.gap.answer.confirmed import Answer, confirm
 from residual.gap.answer.curves import over_the_log
+from residual.gap.answer.from_readings import not_kept, worse_from_readings
 from residual.gap.answer.parameter_twins import with_parameters_as_twins
 from residual.gap.clock import Clock, seldom
 from residual.gap.confirmation.instead import with_other_answers
@@ -119,6 +120,9 @@ class Inquiry:
         known = Confirmed(prepared, answer, ())
         if matters:
             known = OnceMore(self, log, tolerance).of(known)
+        if times := worse_from_readings(known.answer):
+            answer, says = not_kept(known.answer, times)
+            return dataclasses.replace(known.and_says(says), answer=answer)
         answer = with_parameters_as_twins(known.answer, self.offered.by_label)
         search, found = answer.found.search, answer.found
         claims = with_other_answers(

@@ -12,6 +12,8 @@ from residual.gap.search.sets import Proposals, Search
 
 #: Error with an effect that was lacking over that without, from which on none of them helps.
 HELPS = 0.95
+#: The same where sets were judged in vain before, in weights in which little shows.
+HELPS_MUCH = 0.7
 #: Sets that a new search begins with, and their error over that of the best.
 SEEDS, HOPEFUL = 12, 3.0
 
@@ -75,26 +77,34 @@ def add_what_it_lacked(earlier: Search, search: Search) -> None:
         add_in_place_of_pushes(search, key, sorted(fresh))
 
 
-def is_in_vain(earlier: Search, search: Search) -> bool:
+def is_in_vain(earlier: Search, search: Search, helps: float = HELPS) -> bool:
     """Whether nothing that an earlier search lacked helps beside what was found: the search that is
-    made for it has no need to grow sets."""
+    made for it has no need to grow sets.
+
+    Args:
+        earlier: That search.
+        search: The one that is made.
+        helps: Error with something new over that without, up to which it does.
+    """
     fresh = _lacked(earlier, search)
     errors: dict[bool, float] = {True: np.inf, False: np.inf}
     for key in search.usable():
         new = not fresh.isdisjoint(key)
         errors[new] = min(errors[new], search.error(key))
-    return bool(fresh) and errors[True] > HELPS * errors[False]
+    return bool(fresh) and errors[True] > helps * errors[False]
 
 
 def worth_another_look(earlier: Search, search: Search) -> list[Key]:
     """Sets to be judged in other weights before nothing that was lacking is said to help: what is
-    chosen, and of those with something new the ones that forecast and fit best."""
+    chosen, and of those with something new, and of those without, the ones that forecast and fit
+    best."""
     fresh = _lacked(earlier, search)
     new = [key for key in search.usable() if not fresh.isdisjoint(key)]
-    best = (
-        [min(new, key=search.error), min(new, key=lambda k: search.tried[k].merit)] if new else []
-    )
-    return [key for key in dict.fromkeys([near_best(search)[0], *best]) if key]
+    old = [key for key in search.usable() if fresh.isdisjoint(key)]
+    best = [near_best(search)[0]]
+    for some in filter(None, (old, new)):
+        best += [min(some, key=search.error), min(some, key=lambda k: search.tried[k].merit)]
+    return [key for key in dict.fromkeys(best) if key]
 
 
 def _lacked(earlier: Search, search: Search) -> set[int]:

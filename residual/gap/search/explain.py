@@ -21,6 +21,7 @@ from residual.gap.search.beam import extend, improves, run
 from residual.gap.search.choice import Choice, choose
 from residual.gap.search.continuation import add_handed_over
 from residual.gap.search.earlier import (
+    HELPS_MUCH,
     add_what_it_lacked,
     carried,
     is_in_vain,
@@ -167,7 +168,7 @@ def explain(
                 finer, around = weigh(fitter, search.tried[near_best(search)[0]])
                 closer = begun(finer, around, search)
                 closer.add(seeds)
-                if is_in_vain(earlier, closer):
+                if is_in_vain(earlier, closer, HELPS_MUCH):
                     return settle(search, floor, exchanges=0)
                 fitter, floor, search = finer, around, closer
         run(search, seeds, functools.partial(_quiet, search, floor))
