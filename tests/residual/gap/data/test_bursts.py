@@ -43,6 +43,19 @@ def test_even_rows_and_records_with_pauses_stay(inside):
     assert not said and kept == [run]
 
 
+def test_a_logger_that_is_slow_at_rest_stays():
+    """A cycler writes every 10 s at rest, and ten times a second in its few pulses."""
+    times = np.concatenate(
+        [1000.0 * k + np.concatenate([10.0 * np.arange(80), 800 + 0.1 * np.arange(400)])
+         for k in range(3)]
+    )  # fmt: skip
+    pulse = (times % 1000.0) > 799
+    states = np.where(pulse, 3.9, 4.1)[:, None] + 1e-4 * np.sin(times)[:, None]
+    run = Trajectory("cell", times, states, pulse[:-1, None].astype(float))
+    kept, said = without_bursts([run])
+    assert not said and kept == [run]
+
+
 def test_brief_records_between_long_rests_stay():
     """The fast part of every step alone: within it the state moves as far as ever."""
     rise = 1 - np.exp(-np.arange(40) / 8.0)

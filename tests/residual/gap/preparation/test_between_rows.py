@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from held import path
 from scipy.integrate import solve_ivp
 
 from residual.gap import find_gap
 from residual.trajectories import Trajectory
-from sims import Channel, EquationOfMotion, Parameter
+from sims import Channel, EquationOfMotion, FirstOrderSystem, Parameter
 
 NOISE = 2e-5
 
@@ -76,3 +77,43 @@ def test_noise_of_a_slow_sensor_is_not_read_between_its_readings():
     runs = [run(seed, noise=0.01, hold=16) for seed in (0, 1)]
     (sigma, _) = find_gap(Gantry(), runs, effects=["mass", "damping"]).noise["x"]
     assert sigma > 0.005
+
+
+class Truck(FirstOrderSystem):
+    """The speed of a tank truck by its drive."""
+
+    dt = 0.05
+    state_channels = (Channel("speed", "m/s", "rate", scale=8.0),)
+    action_channels = (Channel("drive", "kN", "input", scale=10.0),)
+    parameters = {
+        "mass": Parameter(18.0, "t", "of all", low=1.0),
+        "roll": Parameter(0.9, "kN s/m", "resistance", low=0.0, family="dissipation"),
+    }
+
+    def derivative(self, x, u, p):
+        return ((u[:, 0] - p.roll * x[:, 0]) / p.mass)[:, None]
+
+
+def sloshing(seed, n=3600):
+    """A part of the load swings at 0.55 Hz, by little more than the noise of 0.02 m/s."""
+    rng = np.random.default_rng(seed)
+    drive = np.repeat(rng.uniform(0.0, 14.0, n // 120), 120)
+    swing, load = 2 * np.pi * 0.55, 0.26
+    own = 18.0 * (1 - load)
+    spring, damper = swing**2 * own * load / 1.0, 0.08 * swing * own * load
+
+    def rates(_, x, u):
+        pull = spring * x[1] + damper * (x[2] - x[0])
+        return [(u - 0.9 * x[0] + pull) / own, x[2] - x[0], -pull / (18.0 * load)]
+
+    seen = path(rates, [5.0, 0.0, 5.0], drive, 0.05)[:-1, 0]
+    seen = 0.01 * np.round((seen + 0.02 * rng.standard_normal(n)) / 0.01)
+    return Trajectory(f"run {seed}", 0.05 * np.arange(n), seen[:, None], drive[:-1, None])
+
+
+@pytest.mark.long
+def test_a_swing_little_above_the_noise_is_no_noise_over_long_forecasts():
+    found = find_gap(Truck(), [sloshing(seed) for seed in range(2)])
+    assert found.noise["speed"].value == pytest.approx(0.02, rel=0.15)
+    (part,) = [e for e in found.effects if e.name == "flexible_part"]
+    assert part.frequency == pytest.approx(0.55, rel=0.2)
