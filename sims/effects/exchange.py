@@ -15,19 +15,26 @@ from sims.effects.store import is_stored
 
 if TYPE_CHECKING:
     from sims.host import HostSimulator
+    from sims.simulator import Joint
+
+#: Units of a concentration: volumes below the line, and moles by the litre.
+VOLUMES = ("L", "l", "dL", "dl", "mL", "ml", "uL", "µL", "m^3", "m³", "cm^3", "dm^3")
+MOLAR = ("M", "mM", "uM", "µM", "nM")
 
 
 @dataclasses.dataclass(frozen=True)
 class BetweenStates(Effect):
-    """What two states of one unit do to the rate of change of each other.
+    """What two states do to the rate of change of each other.
 
     Attributes:
         joint: Names of both states, ``"first and second"``.
+        between: What it may be between, in words.
     """
 
     joint: str
 
     enters: ClassVar = "joint"
+    between: ClassVar[str] = "pair of states of one unit"
 
     @property
     def pair(self) -> tuple[str, ...]:
@@ -38,15 +45,25 @@ class BetweenStates(Effect):
     def flows(self, positions: Both, rates: Both) -> Both:
         """Rates of change of both states, by row; the states count as rates."""
 
+    @staticmethod
+    def pairs(simulator: HostSimulator) -> list[tuple[str, str]]:
+        """The pairs of states that it may be between."""
+        return like_states(simulator)
+
     def measures(self, simulator: HostSimulator) -> Mapping[str, tuple[str, float]]:
-        """Unit and typical size of the first state and its rate of change."""
-        known = {AND.join(names): names for names in like_states(simulator)}
-        first, _ = place("pair of states of one unit", self.joint, known)
-        joint = next(joint for joint in simulator.joints if joint.name == first)
-        channel = next(c for c in simulator.state_channels if c.name == joint.position)
+        """Unit and typical size of the first state and its rate of change; ``other`` of both are
+        the second's."""
+        known = {AND.join(names): names for names in self.pairs(simulator)}
+        names = place(self.between, self.joint, known)
+        joints = {joint.name: joint for joint in simulator.joints}
+        first, second = (joints[name] for name in names)
+        channels = {channel.name: channel for channel in simulator.state_channels}
+        own, other = channels[first.position], channels[second.position]
         return {
-            "force": (joint.unit, simulator.force_scale(joint)),
-            "position": (channel.unit, channel.scale),
+            "force": (first.unit, simulator.force_scale(first)),
+            "position": (own.unit, own.scale),
+            "other_force": (second.unit, simulator.force_scale(second)),
+            "other": (other.unit, other.scale),
         }
 
 
@@ -74,8 +91,29 @@ class Exchange(BetweenStates):
 
 def like_states(simulator: HostSimulator) -> list[tuple[str, str]]:
     """Every two states of a first-order system that have one unit, and are of what is stored."""
+    return [(a.name, b.name) for a, b in _stored_pairs(simulator) if a.unit == b.unit]
+
+
+def meeting_states(simulator: HostSimulator) -> list[tuple[str, str]]:
+    """The same, and every two concentrations, whatever their units."""
+    units = {channel.name: channel.unit for channel in simulator.state_channels}
+    return [
+        (a.name, b.name)
+        for a, b in _stored_pairs(simulator)
+        if a.unit == b.unit or (_dissolved(units[a.position]) and _dissolved(units[b.position]))
+    ]
+
+
+def _stored_pairs(simulator: HostSimulator) -> list[tuple[Joint, Joint]]:
+    """Every two states of a first-order system that are of what is stored."""
     if not simulator.written_out:
         return []
     stored = {channel.name for channel in simulator.state_channels if is_stored(channel)}
     still = [j for j in simulator.joints if j.rate is None and j.position in stored]
-    return [(a.name, b.name) for a, b in itertools.combinations(still, 2) if a.unit == b.unit]
+    return list(itertools.combinations(still, 2))
+
+
+def _dissolved(unit: str) -> bool:
+    """Whether a unit is of a concentration: an amount by a volume, or molar."""
+    amount, _, volume = unit.rpartition("/")
+    return (bool(amount) and volume in VOLUMES) or unit in MOLAR

@@ -27,7 +27,7 @@ from sims.effects.curve import Curve
 from sims.effects.curves import CURVES
 from sims.effects.drive_limit import DriveLimit
 from sims.effects.encoder_error import EncoderError
-from sims.effects.exchange import Exchange, like_states
+from sims.effects.exchange import Exchange, like_states, meeting_states
 from sims.effects.flexible import FlexibleJoint, FlexiblePart
 from sims.effects.flow import AmbientFlow
 from sims.effects.friction import (
@@ -194,7 +194,7 @@ def further_in(simulator: HostSimulator) -> tuple[Effect, ...]:
     )  # fmt: skip
     both: list[Effect] = [kind(joint.name) for kind in kinds for joint in simulator.joints]
     both += [Coupling(BY.join(names)) for names in coupled_states(simulator)]
-    both += [Reaction(AND.join(names)) for names in like_states(simulator)]
+    both += [Reaction(AND.join(names)) for names in meeting_states(simulator)]
     joined = CouplingSpring, CouplingDamper, AsymmetricCouplingDamping, CouplingUnbalance
     links = itertools.product(joined, linked_joints(simulator))
     both += [kind(AND.join(names)) for kind, names in links]

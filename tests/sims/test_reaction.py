@@ -43,11 +43,41 @@ def test_a_reaction_runs_as_scipy_says(first, second):
         assert path[k + 1] == pytest.approx(x, abs=1e-6)
 
 
+class Bloom(FirstOrderSystem):
+    """Algae in g/L and a herbicide in mg/L, at a temperature."""
+
+    dt = 5.0
+    state_channels = (
+        Channel("algae", "g/L", "other", scale=2.0),
+        Channel("herbicide", "mg/L", "other", scale=30.0),
+        Channel("temperature", "degC", "other", scale=20.0),
+    )
+    action_channels = ()
+
+    def derivative(self, x, u, p):
+        return 0.01 * x
+
+
+def test_concentrations_meet_whatever_their_units():
+    (reaction,) = (e for e in further_in(Bloom()) if isinstance(e, Reaction))
+    assert str(reaction) == "reaction@algae and herbicide"
+    known = reaction.quantities(Bloom())
+    assert known["from_first"].unit in ("L/(s mg)", "L/(mg s)")
+    assert known["from_second"].unit in ("L/(s g)", "L/(g s)")
+    bloom = Bloom(effects=[reaction.with_values(from_first=1e-3)], substeps=4)
+    after = bloom.rollout([2.0, 30.0, 20.0], np.zeros((1, 0)))[-1]
+    exact = solve_ivp(
+        lambda _, x: [0.01 * x[0] - 1e-3 * x[0] * x[1], 0.01 * x[1]], (0, 5.0), [2.0, 30.0],
+        rtol=1e-10,
+    ).y[:, -1]  # fmt: skip
+    assert after[:2] == pytest.approx(exact, rel=1e-4)
+
+
 def test_only_what_has_one_unit_reacts():
     reactions = [str(e) for e in further_in(Tank()) if isinstance(e, Reaction)]
     assert reactions == ["reaction@acid and alcohol"]
     assert not [e for e in library(Tank()) if isinstance(e, Reaction)]
-    with pytest.raises(ValueError, match="pair of states of one unit 'acid and temperature'"):
+    with pytest.raises(ValueError, match="two concentrations, 'acid and temperature'"):
         Tank(effects=[Reaction("acid and temperature", 0.1)])
 
 
