@@ -16,10 +16,9 @@ from sims.effects.base import Effect
 
 Array = NDArray[np.float64]
 
-#: Part of the cost that the library's best effects may leave without others being looked at.
-LITTLE = 0.05
-#: Part of what it leaves that one of these leaves at most.
-QUARTER = 0.25
+#: Part of what the library's best effects leave that one of these leaves at most; where these leave
+#: but a twentieth of the cost.
+QUARTER, TENTH, LITTLE = 0.25, 0.1, 0.05
 #: Part of what one leaves that two leave at most.
 HALF = 0.5
 #: Effects of the library beside which others are looked at, one after the other.
@@ -44,12 +43,11 @@ def at_sight(path: MeasuredPath, further: Sequence[Candidate]) -> list[Candidate
     left = [float(residual @ residual) for _, residual in after]
     found: set[int] = set()
     for beside in range(BESIDE):
-        if left[beside + 1] < LITTLE * whole:
-            break
+        part = QUARTER if left[beside + 1] >= LITTLE * whole else TENTH
         basis, residual = after[beside]
         matrix = project_out(basis, others.matrix)
         there = dataclasses.replace(others, residual=residual, matrix=matrix)
-        most = [QUARTER * one for one in left[beside + 1 : beside + 3]]
+        most = [part * one for one in left[beside + 1 : beside + 3]]
         found |= _standing_out(there, further, left[beside], most)
     return [one for number, one in enumerate(further) if number in found]
 
