@@ -23,9 +23,12 @@ from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.fitting.validation import by_block, validate
 from residual.gap.search.pool import Key
 from residual.gap.search.sets import Search
-from sims.effects.actuator import StaticActuatorEffect
+from sims.effects.actuator import ActuatorGain, StaticActuatorEffect
+from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.effects.joint import ConstantLoad
+from sims.effects.parameter import ParameterChange
+from sims.effects.sensor import ScaledSensor
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -41,6 +44,9 @@ ENOUGH = 2
 ASKED, TOLD = 4, 3
 #: Error over that of the best one up to which another does nearly as well.
 NEARLY = 1.15
+#: Part of a size by which it has to differ between records: a law that is a little bent makes other
+#: hundredths of a percent of where each was driven.
+HARDLY = 0.005
 
 
 def unlike(answer: Answer) -> tuple[Unlike, ...]:
@@ -174,12 +180,22 @@ def _asked(
         if error**2 - least > HALF * left or surely < CLEARLY:
             return None
     sizes = _sizes(fit, place, group, np.ones(len(group), bool))[: len(names), place]
+    usual = _usual(search, candidate.effect)
+    if np.ptp(sizes) < HARDLY * np.abs(usual + sizes).max():
+        return None
     by_record = dict(zip(names, map(float, sizes), strict=True))
     taken, *_ = currency.share(search.before.squares, apart, np.random.default_rng(0))
     knob, effect = candidate.knobs[0], candidate.effect
     return error, Unlike(
         effect.name, effect.where, knob.field, knob.unit, by_record, taken, instead=base != key
     )
+
+
+def _usual(search: Search, effect: Effect) -> float:
+    """What a number of an effect is added to: a parameter's value, one for a factor, or nothing."""
+    if isinstance(effect, ParameterChange):
+        return float(search.simulator.parameters[effect.parameter].value)
+    return float(isinstance(effect, ActuatorGain | ScaledSensor))
 
 
 def _with(search: Search, key: Key, number: int) -> Fit:
