@@ -26,10 +26,6 @@ RARE = 0.01
 _ACCIDENTS, _OF_SHORT = 3, 0.03
 # But none reaches out of nine tenths of all samples by so many times their range, in up to so many.
 _ABSURD, _SOME = 100.0, 0.1
-# Samples in a row at the end of a sensor's range.
-_CLIPPED = 4
-# Part of the usual motion by which they differ at most: noise of what comes after its range.
-_STILL = 0.3
 # Part of the samples that are one step on, where the sensor's steps made the samples.
 _STEPPED = 0.9
 # Share of the range of values above which a step of rounding is worth a word.
@@ -162,53 +158,6 @@ def in_full_motion(values: Array, least: float, steps: int) -> bool:
     first, _, last = speeds = np.abs(moves)
     ahead = last + min(0.0, steps * (last - first) / 2)
     return bool(speeds.mean() > least and ahead > speeds.mean() / 4)
-
-
-def clipped_samples(runs: Sequence[Array]) -> list[Mask]:
-    """Stays at the greatest or least value of all, reached and left in full motion twice or more;
-    noise moves them by far less than motion does.
-
-    A sensor at the end of its range shows so, and so does a joint at a stop; motion that turns back
-    by itself is slow there.
-
-    Args:
-        runs: As for ``wild_samples``.
-    """
-    found = [np.zeros(len(values), bool) for values in runs]
-    known = np.concatenate([values[np.isfinite(values)] for values in runs] or [np.zeros(0)])
-    moving = np.abs(np.concatenate([np.diff(values) for values in runs] or [np.zeros(0)]))
-    moving = moving[moving > 0]
-    if not moving.size:
-        return found
-    least = max(0.3 * float(np.median(moving)), 1.5 * rounding(runs))
-    for end in (known.min(), known.max()):
-        far = [np.abs(values - end) for values in runs]
-        for width in (0.0, _STILL * least):
-            stays = [
-                [(a, b) for a, b in stretches(there <= width) if b - a >= _CLIPPED] for there in far
-            ]
-            if _in_full_motion_twice(runs, stays, least):
-                for mask, spans in zip(found, stays, strict=True):
-                    for a, b in spans:
-                        mask[a:b] = True
-                break
-    return found
-
-
-def _in_full_motion_twice(
-    runs: Sequence[Array], stays: Sequence[Sequence[tuple[int, int]]], least: float
-) -> bool:
-    """Whether two stays at an end or more were reached and left in full motion."""
-    # The last step to the end is cut short, and so is the first from it.
-    times = sum(
-        all(
-            in_full_motion(part, least, 2)
-            for part in (values[max(a - 4, 0) : a], values[b : b + 4][::-1])
-        )
-        for values, spans in zip(runs, stays, strict=True)
-        for a, b in spans
-    )
-    return times > 1
 
 
 def rounding(runs: Sequence[Array]) -> float:

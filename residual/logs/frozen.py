@@ -83,7 +83,7 @@ def _frozen(runs: Sequence[Array], others: Sequence[Array]) -> list[Mask]:
         return found
     typical, step = float(np.median(moving)), rounding(runs)
     known = np.concatenate(list(runs))
-    chance, ends = _equal_by_chance(runs), (0.0, np.nanmin(known), np.nanmax(known))
+    chance, ends = equal_by_chance(runs), (0.0, np.nanmin(known), np.nanmax(known))
     for values, change, other, mask in zip(runs, changes, others, found, strict=True):
         for a, b in stretches(change == 0):  # samples a to b are equal
             if b - a < _STILL or a < 3:
@@ -139,7 +139,7 @@ def _owed(values: Array, a: int, b: int) -> bool:
     return bool(clear and 0.5 < leap / gone < 2.0)
 
 
-def _equal_by_chance(runs: Sequence[Array]) -> float:
+def equal_by_chance(runs: Sequence[Array]) -> float:
     """How many readings in a row may be equal where they scatter; infinite where they do not."""
     step = rounding(runs)
     changes = [np.diff(values) for values in runs]

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.logs.checks import Finding
+from residual.logs.clipped import clipped_samples
 from residual.logs.derived import differenced, summed_up
-from residual.logs.faults import clipped_samples, dropped_samples, rounding, wild_samples
+from residual.logs.faults import dropped_samples, rounding, wild_samples
 from residual.logs.frozen import frozen_samples
 from residual.trajectories import Trajectory, moment
 from sims.host import HostSimulator
@@ -186,7 +187,8 @@ def clipped(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> lis
             ends = " and ".join(f"{np.median(side):.4g}" for side in sides)
             says = (
                 f"{len(rows)} samples stay at {ends}{channel.unit_text}, the end of all values, "
-                f"and come and go in full motion{_first(rows)}: a sensor at the end of its range, "
+                "and come and go in full motion or are more in a row than noise leaves"
+                f"{_first(rows)}: a sensor at the end of its range, "
                 "or a stop. If the sensor, leave those cells empty: they count as measured here"
             )
             numbers = {"samples": len(rows)}
