@@ -29,8 +29,8 @@ HALF = 0.5
 #: Loss over that of one of its family, up to which an effect fits about as well; squared forecast
 #: error over that of more effects, up to which what fits down to the noise forecasts so.
 NEARLY = 1.25
-#: Effects that are fitted from the nominal simulator on.
-NEAREST = 3
+#: Effects that are fitted from the nominal simulator on, and effects in whose place one may stand.
+NEAREST, IN_PLACE = 3, (2, 4)
 #: Effects fewer with which an answer that forecasts as well is the simpler one, whatever numbers
 #: these have.
 FEWER = 2
@@ -122,7 +122,7 @@ def fit_in_place_of_most(pool: Sequence[Candidate], answer: Answer) -> set[int]:
     """
     search, key = answer.found.search, answer.key
     fitter, fit, nominal = search.fitter, search.tried[key], search.nominal
-    if len(key) < 2:
+    if not IN_PLACE[0] <= len(key) <= IN_PLACE[1]:
         return set()
     assert isinstance(fitter, SmoothFitter)
     moved = [beside_starts(nominal, fitter.columns(nominal, [one])) for one in pool]

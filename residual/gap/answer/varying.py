@@ -74,7 +74,7 @@ def _in_place_of_most(answer: Answer, offered: Collection[str]) -> list[Paramete
     named: a change that makes most of the gap is no small one, for which the linear picture holds.
     """
     search = answer.found.search
-    if not much_is_left(answer) or len(answer.key) > MOST:
+    if not much_is_left(answer):
         return []
     curves = [
         ParameterCurve(name, level.channel, of_size=level.of_size).suited_to(*level.reach)
