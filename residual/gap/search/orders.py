@@ -74,7 +74,7 @@ def kept_orders(earlier: Iterable[Candidate], there: Iterable[Candidate]) -> lis
 
 def _missed(simulator: HostSimulator, samples: Samples) -> tuple[Array, Array, Array]:
     """Where the simulator was begun, (n, n_s), with what input, (n, n_a), and by how much it missed
-    the next reading, (n, n_s); states that nobody measured are not a number."""
+    the next row, (n, n_s)."""
     model, none = Model(simulator), np.zeros(0)
     nodes = paths.measured(model, samples, none)
     rows = np.concatenate([np.arange(start, stop - 1) for start, stop in samples.runs])[:MANY]
