@@ -6,6 +6,7 @@ import re
 
 from residual.gap import GapResult
 from residual.gap.beside import Changing, Periodic, Unlike
+from sims.effects.parameter_curve import ParameterCurve
 from studies.gap.words import (
     FOOTNOTE,
     effect_name,
@@ -52,9 +53,13 @@ def changes_instead(result: GapResult) -> str:
 
 
 def _open(result: GapResult) -> bool:
-    """Whether something has no name, or what is named is an imitation."""
+    """Whether something has no name, or what is named is an imitation; what is named to change with
+    something is told already."""
     much = any(v.kind == "unexplained" and v.share.value >= FOOTNOTE for v in result.verdicts)
-    return much or any("law" in verdict.doubts for verdict in result.verdicts)
+    return much or any(
+        "law" in verdict.doubts and verdict.effect != ParameterCurve.name
+        for verdict in result.verdicts
+    )
 
 
 def _change(changing: Changing) -> str:

@@ -75,6 +75,10 @@ def test_a_law_that_may_be_another_one_leads_to_what_changes():
         says = lead(dataclasses.replace(result(verdict, rest(0.01)), changing=warm))
         assert says.endswith(" from about 2 mN m s/rad to 1 mN m s/rad.") == told
         assert ("The rest looks like damping that changes with rate," in says) == told
+    # That something changes is said already.
+    curve = dataclasses.replace(doubted, effect="parameter_curve", where="damping over rate")
+    says = lead(dataclasses.replace(result(curve, rest(0.0001)), changing=warm))
+    assert "The rest looks like" not in says
 
 
 @pytest.mark.parametrize(
