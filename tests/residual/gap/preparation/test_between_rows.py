@@ -97,7 +97,7 @@ class Truck(FirstOrderSystem):
 def sloshing(seed, n=3600):
     """A part of the load swings at 0.55 Hz, by little more than the noise of 0.02 m/s."""
     rng = np.random.default_rng(seed)
-    drive = np.repeat(rng.uniform(0.0, 14.0, n // 120), 120)
+    drive = np.repeat(rng.uniform(-10.0, 24.0, n // 120), 120)
     swing, load = 2 * np.pi * 0.55, 0.26
     own = 18.0 * (1 - load)
     spring, damper = swing**2 * own * load / 1.0, 0.08 * swing * own * load
