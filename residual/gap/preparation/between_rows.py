@@ -57,9 +57,9 @@ def read_closer(
     most = AT_ONCE if simulator.advances_rows_at_once else BY_ROW
     samples = Samples.join(_stretches(trajectories, most), simulator.substeps)
     scatter = noise.local_noise(samples)
-    above = floor.sigma / scatter
-    swinging = (above > SWINGING).any() and _swings(simulator, trajectories)
-    doubtful = (above > (SWINGING if swinging else SMOOTH)) & _reads_each_row(samples)
+    swinging = (floor.sigma > SWINGING * scatter).any() and _swings(simulator, trajectories)
+    above = (SWINGING if swinging else SMOOTH) * scatter
+    doubtful = (floor.sigma > above) & _reads_each_row(samples)
     if not doubtful.any():
         return floor
     model, none = Model(simulator), np.zeros(0)
