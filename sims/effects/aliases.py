@@ -164,10 +164,11 @@ def linear_columns(
     for effect in sorted(library(plain), key=lambda e: isinstance(e, SensorEffect)):
         if not _is_linear(plain, effect) or (among is not None and str(effect) not in among):
             continue
-        response = _response(plain, effect, states, inputs, 1e-4)
+        (strength,) = effect.strengths()
+        response = change(plain, effect, strength, states, inputs, 1e-4)
         if np.any(response):
             near[str(effect)] = response
-            far[str(effect)] = _response(plain, effect, states, inputs, 3e-4)
+            far[str(effect)] = change(plain, effect, strength, states, inputs, 3e-4)
     return _columns(near, far)
 
 
@@ -252,18 +253,30 @@ def _limit(blur: Array) -> Array:
     return np.maximum(1e-6, 2 * blur)
 
 
-def _response(
-    simulator: HostSimulator, effect: Effect, states: Array, inputs: Array, share: float
+def change(
+    simulator: HostSimulator,
+    effect: Effect,
+    strength: str,
+    states: Array,
+    inputs: Array,
+    share: float,
 ) -> Array:
-    """Change of the motion over a tenth of a control period per strength, (n, n_s)."""
-    (name,) = effect.strengths()
-    change = share * effect.quantities(simulator)[name].scale
+    """Change of the motion over a tenth of a control period per strength of an effect, (n, n_s).
+
+    Args:
+        simulator: Without effects.
+        effect: One whose other strengths are zero.
+        strength: The one that is changed.
+        states, inputs: Where, (n, n_s) and (n, n_a).
+        share: How far, in scales of the strength.
+    """
+    size = share * effect.quantities(simulator)[strength].scale
     ends = []
-    for value in (change, -change):
-        changed = effect.with_values(**{name: value})
+    for value in (size, -size):
+        changed = effect.with_values(**{strength: value})
         if isinstance(changed, SensorEffect):
             ends.append(_read_after(simulator, changed, states, inputs))
         else:
             ends.append(shortly_after(simulator.with_effects([changed]), states, inputs))
     scale = np.array([channel.scale for channel in simulator.physical_channels])
-    return (ends[0] - ends[1]) / (scale * change)
+    return (ends[0] - ends[1]) / (scale * size)

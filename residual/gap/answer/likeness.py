@@ -11,7 +11,7 @@ from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
-from sims.effects.aliases import shortly_after
+from sims.effects.aliases import change
 from sims.effects.curve import Curve
 from sims.host import HostSimulator
 
@@ -48,19 +48,9 @@ def in_any_motion(fitter: SmoothFitter, simulator: HostSimulator, law: Curve, ot
     states = rng.permuted(fitter.nodes[rows, : len(simulator.physical_channels)], axis=0)
     inputs = rng.permuted(samples.actions[rows], axis=0)
     plain = simulator.with_effects(())
-    scale = np.array([channel.scale for channel in simulator.physical_channels])
 
     def does(curve: Curve) -> Array:
-        columns = []
-        for field in curve.strengths():
-            small = SMALL * curve.quantities(simulator)[field].scale
-            ends = [
-                shortly_after(
-                    plain.with_effects([curve.with_values(**{field: size})]), states, inputs
-                )
-                for size in (small, -small)
-            ]
-            columns.append(((ends[0] - ends[1]) / scale).ravel())
-        return np.stack(columns, axis=1)
+        changes = [change(plain, curve, n, states, inputs, SMALL) for n in curve.strengths()]
+        return np.stack([one.ravel() for one in changes], axis=1)
 
     return is_one_of(does(other), [does(law)])

@@ -138,10 +138,7 @@ def _by_block(answer: Answer) -> tuple[Array, Array]:
     search = answer.found.search
     before, after = search.before.squares, search.validated[answer.key].squares
     currency = search.currency
-    return (
-        currency.averaged(currency.by_block(before)),
-        currency.averaged(currency.by_block(after)),
-    )
+    return currency.in_blocks(before), currency.in_blocks(after)
 
 
 def _stretch(answer: Answer, block: int, errors: Array, beside: bool = False) -> Stretch:

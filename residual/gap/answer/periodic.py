@@ -64,9 +64,7 @@ def _repeating(answer: Answer, key: Key) -> Periodic | None:
     if left.adequate or left.ratio < NOTABLE:
         return None
     samples, model = fitter.samples, fit.model
-    nodes = paths.measured(model, samples, fit.theta)
-    after = model.advance(samples, nodes[None], fit.theta[None])[0]
-    steps = np.append(nodes[1:] - after[:-1], np.zeros((1, nodes.shape[1])), axis=0)
+    _, steps = paths.misses(model, samples, fit.theta)
     names = [channel.name for channel in search.simulator.physical_channels]
     best, least = None, half_beyond_noise(answer, fit.merit)
     for joint in search.simulator.joints:

@@ -50,6 +50,27 @@ def measured(model: Model, samples: Samples, theta: Array) -> Array:
     return _reckoned(model, samples, nodes, theta, hidden) if hidden.size else nodes
 
 
+def misses(
+    model: Model, samples: Samples, theta: Array, rows: NDArray[np.int64] | None = None
+) -> tuple[Array, Array]:
+    """Where a model is begun as measured, and by how much it misses the row after that.
+
+    Args:
+        model: Without impacts.
+        samples: What was measured.
+        theta: Its numbers.
+        rows: Where it is begun, (n,); all but the last by default, of which those at the end of a
+            record miss the beginning of another.
+
+    Returns:
+        States, and the next ones less what the model makes of them, (n, n_s) each.
+    """
+    nodes = measured(model, samples, theta)
+    begun = np.arange(len(nodes) - 1) if rows is None else rows
+    after = model.advance(samples, nodes[begun][None], theta[None], begun)[0]
+    return nodes[begun], nodes[begun + 1] - after
+
+
 def _filled(nodes: Array, samples: Samples, channels: Sequence[Channel], bonds: Bonds) -> Array:
     """Nodes with what bonds tell of positions that were not measured, and their rates."""
     names = [channel.name for channel in channels]

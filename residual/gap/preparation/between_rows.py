@@ -76,9 +76,7 @@ def _swings(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> boo
     if not simulator.advances_rows_at_once:
         return False
     samples, model, none = Samples.join(trajectories, 1), Model(simulator), np.zeros(0)
-    nodes = paths.measured(model, samples, none)
-    after = model.advance(samples, nodes[None], none[None])[0]
-    missed = np.append(nodes[1:] - after[:-1], np.zeros((1, nodes.shape[1])), axis=0)
+    _, missed = paths.misses(model, samples, none)
     return any(line(samples, missed[:, column]) for column in samples.measured)
 
 

@@ -130,10 +130,10 @@ def _fits_far_better(search: Search, key: Key, among: list[Key]) -> Key:
     in one block, such as a single step, is foretold from data that do not hold it.
     """
     currency = search.currency
-    own = currency.averaged(currency.by_block(search.validated[key].squares))
+    own = currency.in_blocks(search.validated[key].squares)
 
     def seldom_behind(other: Key) -> bool:
-        its = currency.averaged(currency.by_block(search.validated[other].squares))
+        its = currency.in_blocks(search.validated[other].squares)
         return bool((its > own + SAME / len(own)).mean() <= ASTRAY)
 
     def out(other: Key) -> bool:

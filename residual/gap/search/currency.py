@@ -76,6 +76,11 @@ class Currency:
         shares = np.nan_to_num(np.sqrt(squares) * weights)
         return np.stack([shares[:, list(group)].mean(axis=1) for group in self.groups], axis=1)
 
+    def in_blocks(self, squares: Array) -> Array:
+        """The same, all groups averaged, (B,)."""
+        shares: Array = self.averaged(self.by_block(squares))
+        return shares
+
     def by_group(self, squares: Array) -> Array:
         """Relative error of every group, (g,)."""
         return self.by_block(squares).sum(axis=0)

@@ -75,13 +75,10 @@ def kept_orders(earlier: Iterable[Candidate], there: Iterable[Candidate]) -> lis
 def _missed(simulator: HostSimulator, samples: Samples) -> tuple[Array, Array, Array]:
     """Where the simulator was begun, (n, n_s), with what input, (n, n_a), and by how much it missed
     the next row, (n, n_s)."""
-    model, none = Model(simulator), np.zeros(0)
-    nodes = paths.measured(model, samples, none)
     rows = np.concatenate([np.arange(start, stop - 1) for start, stop in samples.runs])[:MANY]
-    after = model.advance(samples, nodes[rows][None], none[None], rows)[0]
-    good = np.isfinite(after).all(axis=1)
-    rows, missed = rows[good], (nodes[rows + 1] - after)[good]
-    return nodes[rows], samples.actions[rows], missed
+    begun, missed = paths.misses(Model(simulator), samples, np.zeros(0), rows)
+    good = np.isfinite(missed).all(axis=1)
+    return begun[good], samples.actions[rows[good]], missed[good]
 
 
 def _orders(

@@ -67,8 +67,8 @@ def _not_enough(search: Search, key: Key, chosen: Key) -> str:
 def _worst(search: Search, key: Key, chosen: Key) -> str:
     """The block in which a set falls behind most."""
     currency, blocks = search.currency, search.fitter.blocks
-    behind = currency.averaged(currency.by_block(search.validated[key].squares))
-    behind -= currency.averaged(currency.by_block(search.validated[chosen].squares))
+    behind = currency.in_blocks(search.validated[key].squares)
+    behind -= currency.in_blocks(search.validated[chosen].squares)
     number = int(behind.argmax())
     windows, samples = blocks.windows, search.fitter.samples
     first = int((blocks.block == number).argmax())
