@@ -90,9 +90,7 @@ def read_logs(
         )
         runs = continued(runs, channels, columns, findings)
         findings += _constant_actions(runs, action_channels, columns)
-        for path in dict.fromkeys(run.path for run in runs):
-            of_file = [run for run in runs if run.path == path]
-            findings += _check_numbers(path, of_file, channels, columns)
+        findings += _check_files(runs, channels, columns)
         findings += report_sampling(runs)
         trajectories = tuple(_trajectory(run, state_channels, channels, findings) for run in runs)
     findings += _unmeasured(channels, runs)
@@ -131,6 +129,36 @@ def _constant_actions(
     return findings
 
 
+def _check_files(
+    runs: Sequence[Run], channels: Sequence[Channel], columns: LogFormat
+) -> list[Finding]:
+    """Check the numbers of every file.
+
+    Raises:
+        LogError: One of them is in other units. Where not all are, so is said: a unit is set for
+            every file.
+    """
+    findings: list[Finding] = []
+    wrong: dict[Path, str] = {}
+    paths = list(dict.fromkeys(run.path for run in runs))
+    for path in paths:
+        of_file = [run for run in runs if run.path == path]
+        try:
+            findings += _check_numbers(path, of_file, channels, columns)
+        except ValueError as error:
+            wrong[path] = str(error)
+    if not wrong:
+        return findings
+    path, says = next(iter(wrong.items()))
+    if len(wrong) < len(paths):
+        right = len(paths) - len(wrong)
+        says += (
+            f"; {right} of {len(paths)} files look right as they are: convert the others, since a "
+            "unit is set for all"
+        )
+    raise LogError(says, path)
+
+
 def _check_numbers(
     path: Path, runs: Sequence[Run], channels: Sequence[Channel], columns: LogFormat
 ) -> list[Finding]:
@@ -143,17 +171,14 @@ def _check_numbers(
         if any(np.isfinite(values).any() for _, values in measured):
             signals[channel.name] = Signal(channel, column.column, column.unit, measured)
     rates = {channel.rate_of: channel for channel in channels if channel.kind == "rate"}
-    try:
-        for signal in signals.values():
-            position = signals.get(signal.channel.rate_of or "")
-            if signal.channel.kind == "rate" and position is not None:
-                findings += check_rate(position, signal, path.name)
-        for name, signal in signals.items():
-            rate = rates.get(name, signal.channel)
-            declared = rate.scale if rate.kind == "rate" and rate.scale != 1.0 else None
-            check_plausible(signal, declared)
-    except ValueError as error:
-        raise LogError(str(error), path) from None
+    for signal in signals.values():
+        position = signals.get(signal.channel.rate_of or "")
+        if signal.channel.kind == "rate" and position is not None:
+            findings += check_rate(position, signal, path.name)
+    for name, signal in signals.items():
+        rate = rates.get(name, signal.channel)
+        declared = rate.scale if rate.kind == "rate" and rate.scale != 1.0 else None
+        check_plausible(signal, declared)
     return findings
 
 

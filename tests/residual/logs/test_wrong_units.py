@@ -61,8 +61,14 @@ def test_one_file_in_degrees_among_many_is_found(tmp_path):
     good = [write(tmp_path / f"{n}.csv", swing()) for n in range(5)]
     columns = swing()
     bad = write(tmp_path / "bad.csv", columns | {"angle": DEG * columns["angle"]})
-    with pytest.raises(LogError, match=r"bad\.csv, column 'angle'|bad\.csv: column 'angle'"):
+    with pytest.raises(LogError, match=r"bad\.csv: column 'angle'.*5 of 6 files look right"):
         read_logs([*good, bad], STATES, ACTIONS)
+    worse = write(tmp_path / "worse.csv", columns | {"angle": DEG * columns["angle"]})
+    with pytest.raises(LogError, match=r"bad\.csv: column 'angle'.*5 of 7 files look right"):
+        read_logs([*good, bad, worse], STATES, ACTIONS)
+    with pytest.raises(LogError) as all_wrong:
+        read_logs([bad, worse], STATES, ACTIONS)
+    assert "look right" not in str(all_wrong.value)
 
 
 def test_degrees_without_a_measured_rate_are_found_by_plausibility(csv):
