@@ -17,8 +17,10 @@ from sims.simulator import TURNS, Channel
 
 Array = NDArray[np.float64]
 
-#: Bits of common counters.
+#: Bits of common counters; and of those whose counts were scaled before they were logged, of which
+#: a log shows no more than how fine its values are, and overflows that tell them.
 BITS = (8, 10, 12, 14, 16, 24, 32)
+SCALED, TWICE = (16, 24, 32), 2
 #: How far what is left of a jump may reach, as a multiple of the larger step beside it, or of the
 #: usual one.
 ALIKE = 2.0
@@ -26,6 +28,8 @@ ALIKE = 2.0
 FEW = 10
 #: Distance from whole numbers that scaling to a unit and back makes, at most.
 WHOLE = 1e-4
+#: Decimals that values may have, and the largest whole number that is one.
+DECIMALS, LARGEST = 6, 2.0**53
 
 
 class Jump(NamedTuple):
@@ -97,10 +101,28 @@ def jumps_by(values: Array, unit: str, factor: float) -> Jump | None:
         found += [
             Jump(float(2**bits), f"{2**bits}, as a counter of {bits} bits does,") for bits in BITS
         ]
+    elif fine := _resolution(values):
+        found += [
+            Jump(fine * 2**bits, f"{2**bits} times {fine:g}, as a counter of {bits} bits does,")
+            for bits in SCALED
+            if (np.abs(steps) > 0.5 * fine * 2**bits).sum() >= TWICE
+        ]
     if unit in TURNS:
         found.append(Jump(TURNS[unit] / abs(factor), "a whole turn"))
     found = [jump for jump in found if np.ptp(values) < jump.period * (1 + 1e-6)]
     return next((jump for jump in found if _goes_on(steps, jump.period)), None)
+
+
+def _resolution(values: Array) -> float | None:
+    """By whole times what all values lie apart, (n,), as far as their decimals show it."""
+    for digits in range(1, DECIMALS + 1):
+        scaled = values * 10**digits
+        whole = np.round(scaled)
+        if np.abs(whole).max() > LARGEST:
+            return None
+        if np.allclose(scaled, whole, rtol=0.0, atol=WHOLE):
+            return int(np.gcd.reduce(np.diff(whole).astype(np.int64))) / 10**digits or None
+    return None
 
 
 def _goes_on(steps: Array, period: float) -> bool:

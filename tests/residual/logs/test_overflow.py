@@ -42,6 +42,30 @@ def test_a_counter_that_overflows_goes_on(bits, start, back, signed, seed):
         assert np.array_equal(np.unwrap(counted, period=size) - counted[0], true - true[0])
 
 
+@given(fine=st.sampled_from([0.02, 0.005, 1.25, 0.1]), start=st.integers(0, 65535),
+       seed=st.integers(0, 9))  # fmt: skip
+def test_counts_that_were_scaled_before_they_were_logged_go_on(fine, start, seed):
+    """Two overflows tell that a position in millimetres was a counter's."""
+    true = start + 3.0 * moved(1200, 45.0, seed)  # two rounds and a half
+    logged = np.array([float(f"{fine * count:.10g}") for count in true % 65536])
+    jump = jumps_by(logged, "mm", 1.0)
+    assert jump is not None and jump.period == pytest.approx(65536 * fine, rel=1e-12)
+    assert np.unwrap(logged, period=jump.period) - logged[0] == pytest.approx(
+        fine * (true - true[0]), abs=0.01 * fine
+    )
+    first = slice(0, int(np.flatnonzero(np.diff(logged) < -30000 * fine)[0]) + 20)
+    assert jumps_by(logged[first], "mm", 1.0) is None  # one jump alone may be anything
+
+
+@pytest.mark.parametrize("values", [
+    np.tile(0.02 * moved(), 4),  # was set back to where it began, again and again
+    np.tile(np.r_[0.02 * moved(100), 1200 + 0.02 * moved(100)], 3),  # to and fro
+    np.where(np.arange(400) % 100 == 70, 1310.7, 0.02 * moved(400)),  # wild readings
+], ids=["reset", "elsewhere", "wild"])  # fmt: skip
+def test_other_jumps_of_fine_values_stay(values):
+    assert jumps_by(values, "mm", 1.0) is None
+
+
 @pytest.mark.parametrize("values", [
     np.r_[moved(), moved()],  # was set back to where it began
     np.r_[moved(100), 70000 + moved(100)],  # another place
