@@ -153,8 +153,8 @@ def _check_files(
     if len(wrong) < len(paths):
         right = len(paths) - len(wrong)
         says += (
-            f"; {right} of {len(paths)} files look right as they are: convert the others, since a "
-            "unit is set for all"
+            f"; {right} of {len(paths)} files look right as they are: if so, convert the others, "
+            "since a unit is set for all"
         )
     raise LogError(says, path)
 
