@@ -29,6 +29,7 @@ from residual.gap.search.earlier import (
     worth_another_look,
 )
 from residual.gap.search.exchange import add_exchanged, add_pairs_exchanged, as_good_splits
+from residual.gap.search.for_all import add_one_for_all
 from residual.gap.search.pairs import every_two
 from residual.gap.search.pool import Key, Twins
 from residual.gap.search.reasons import reasons
@@ -229,6 +230,9 @@ def settle(
         most = LEAST if search.late else max(LEAST, RIVALS // max(len(key), 1))
         reached = search.error(search.best())
         add_exchanged(search, key, most)
+        if not (quiet or search.simulator.has_contacts or search.out_of_time):
+            instead = add_one_for_all(search, key)
+            again |= choose(search, enough).key in instead
         if not quiet and improves(search, search.best(), reached):
             extend(search, search.best())
         for rival in [] if quiet or search.late else as_good_splits(search, key):
