@@ -18,6 +18,8 @@ from residual.gap.confirmation.numerics import STEADY, in_the_limit, survives
 from residual.gap.confirmation.one_way import may_hold_a_load
 from residual.gap.confirmation.resolution import untimed
 from residual.gap.confirmation.rivals import error_ratio, near, where_it_matters
+from residual.gap.data.blocks import Blocks
+from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.intervals import bounded, cut_off, deviations, scatter
 from residual.gap.fitting.plausible import doubtful_sensor
 from residual.gap.search.comparisons import AT_ONE, no_match
@@ -32,8 +34,9 @@ Array = NDArray[np.float64]
 #: Standard errors by which forecasts must be worse without the effect.
 WORSE = 2.0
 #: Times that a number scatters between blocks as noise makes it, where only noise is left, from
-#: which on it is not steady: a set that only imitates the truth. Of 85 logs 2.3 at the most.
-SCATTERED = 3.0
+#: which on it is not steady: a set that only imitates the truth. Of 85 logs 2.3 at the most. Not
+#: where all of it is known within a part of it: parameters a percent off do as much.
+SCATTERED, KNOWN = 3.0, 0.25
 #: Blocks below which nothing is sure.
 TOO_FEW = 4
 
@@ -57,7 +60,7 @@ def claims(
     fit = search.tried[key]
     half = 1.96 * deviations(fit, search.fitter.blocks)
     limits = in_the_limit(fit.theta, numerics)
-    scattered = adequate & (scatter(fit, search.fitter.blocks) > SCATTERED)
+    scattered = adequate & imitates(fit, search.fitter.blocks, half)
     found, drift, other_law = [], Drift(search), by_another_law(search, key, adequate)
     apart, loop = parted(search, key), fed_back(search.fitter.samples)
     for place, number in enumerate(key):
@@ -109,6 +112,19 @@ def claims(
             )
         )
     return sorted(found, key=lambda claim: -claim.share[0])
+
+
+def imitates(fit: Fit, blocks: Blocks, half: Array) -> NDArray[np.bool_]:
+    """Which numbers, (p,), scatter from block to block as those of an imitation do, and are not
+    known within a part of themselves.
+
+    Args:
+        fit: That leaves noise alone.
+        blocks: Of its windows.
+        half: Half the width of the numbers' intervals, (p,).
+    """
+    often = scatter(fit, blocks) > SCATTERED
+    return np.asarray(often & (half > KNOWN * np.abs(fit.theta)))
 
 
 def of_many_orders(search: Search, key: Key, number: int, adequate: bool) -> bool:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from residual.gap.confirmation.certainty import SCATTERED
+from residual.gap.confirmation.certainty import SCATTERED, imitates
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.intervals import bounded, cut_off, deviations, ended, scatter
 
@@ -133,3 +133,11 @@ def test_numbers_scatter_as_noise_does_only_where_the_law_is_right():
     )
     assert np.median(right) == pytest.approx(1.0, abs=0.3) and max(right) < SCATTERED
     assert np.mean(np.array(wrong) > SCATTERED) > 0.95
+
+
+@pytest.mark.parametrize(("size", "said"), [(2.0, True), (50.0, False)])
+def test_what_scatters_is_steady_all_the_same_if_it_is_well_known(size, said):
+    fit = slopes_by_block(np.random.default_rng(0), np.linspace(0.3, 1, 10), 1.0, 2)
+    half = 1.96 * deviations(fit, Ten())
+    fit = dataclasses.replace(fit, theta=size * half)
+    assert imitates(fit, Ten(), half).any() == said
