@@ -19,7 +19,12 @@ from residual.gap.answer.left import (
     worth_asking_for,
 )
 from residual.gap.answer.lone import few_stretches, left_stretch, lone_stretch, off_stretch
-from residual.gap.answer.varying import no_surer, over_unused, worth_varying
+from residual.gap.answer.varying import (
+    no_surer,
+    over_other_channels,
+    over_unused,
+    worth_varying,
+)
 from residual.gap.clock import OutOfTime
 from residual.gap.confirmed import Confirmed
 from residual.gap.data.windows import TooShort
@@ -110,12 +115,22 @@ class OnceMore(OtherWindows):
         varying |= {str(one): one for one in over_unused(answer, offered.by_label, unused)}
         found, second = self._asked_with(known, list(varying.values()), what, what)
         if found.answer is not answer:
-            return dataclasses.replace(found, answer=no_surer(found.answer, answer))
+            return self._over_other_channels(found, answer)
         if second is not None:
             beside = beside_others(answer, second, list(varying.values()), self._late)
             found = dataclasses.replace(found, answer=beside)
         late = found.unasked != known.unasked
         return found if late else dataclasses.replace(found, in_vain=tuple(varying.values()))
+
+    def _over_other_channels(self, known: Confirmed, earlier: Answer) -> Confirmed:
+        """An answer in which a parameter follows a channel, or what is found with it over another
+        one; none surer than an earlier answer was without."""
+        others, what = over_other_channels(known.answer), "the same parameter over other channels"
+        found, second = self._asked_with(known, others, what, what)
+        if second is not None and found.answer is not second:
+            beside = beside_others(found.answer, second, others, self._late)
+            found = dataclasses.replace(found, answer=beside)
+        return dataclasses.replace(found, answer=no_surer(found.answer, earlier))
 
     def with_curves(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with curves by points if they take most of what is left; then

@@ -13,6 +13,11 @@ ENOUGH = 20
 COARSE = 0.05
 #: Rounding takes less than itself off a step or adds it; a row that was lost adds a period.
 LOST = 1.05
+#: Spread of times about the even clock, in roundings, up to which it is their clock.
+SPREAD = 1.1
+#: Steps of two periods by which rounding is told, as few rows that were lost may lie evenly, and
+#: how near to whole numbers of periods these are.
+MANY, WHOLE = 8, 0.05
 #: Decimals of a second that are looked at.
 DECIMALS = 6
 
@@ -23,6 +28,7 @@ def even_clock(times: Array) -> tuple[Array, float]:
     Rows that come every 8.3 ms with times printed to 0.01 s seem to repeat some times and to leave
     others out. Where one even clock is within the rounding of every time, it is the better one,
     unless a step differs from its period by more than rounding makes it: then a row is missing.
+    Where a few steps are twice as long as the others, rows were lost there, wherever they lie.
 
     Args:
         times: In s, not decreasing, (n,).
@@ -41,9 +47,18 @@ def even_clock(times: Array) -> tuple[Array, float]:
     if not uneven or rounding < COARSE * period:
         return times, 0.0
     even = start + period * place
-    far = np.abs(times - even).max() > rounding
+    far = np.ptp(times - even) > SPREAD * rounding
     lost = np.abs(steps - period).max() > LOST * rounding
-    return (times, 0.0) if far or lost else (even, rounding)
+    if far or lost or _few_rows_lost(steps / np.median(steps)):
+        return times, 0.0
+    return even, rounding
+
+
+def _few_rows_lost(steps: Array) -> bool:
+    """Whether few steps, in usual ones, differ from those, and are whole numbers of them."""
+    others = steps[np.abs(steps - 1) > WHOLE]
+    whole = (np.abs(others - np.round(others)) < WHOLE) & (others > 1)
+    return bool(whole.all() and len(others) < MANY)
 
 
 def _rounding(times: Array) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.left import HALF, NOTABLE, half_beyond_noise
+from residual.gap.answer.left import HALF, half_beyond_noise
 from residual.gap.beside import Changing
 from residual.gap.confirmation.constancy import (
     CHANCE,
@@ -30,6 +30,7 @@ from residual.gap.fitting.plausible import FACTOR
 from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import Candidate, candidates
+from residual.gap.search.explain import NOTABLE
 from residual.gap.search.known import ANY_ZERO, size
 from residual.gap.search.pool import Key
 from residual.gap.search.sets import Search

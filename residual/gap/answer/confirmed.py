@@ -21,7 +21,7 @@ from residual.gap.fitting.plausible import ratios, stands_still
 from residual.gap.search.choice import better_fit
 from residual.gap.search.comparisons import material
 from residual.gap.search.exchange import add_exchanged, add_without_each
-from residual.gap.search.explain import LEAST, Explanation
+from residual.gap.search.explain import LEAST, NOTABLE, Explanation
 from residual.gap.search.imitation import imitated
 from residual.gap.search.known import KNOWN
 from residual.gap.search.pool import Key
@@ -34,7 +34,7 @@ RIVALS, FEW = 3, 3
 LIKELIER = 0.1
 #: Residual over noise from which on something clearly has no name, and times a parameter may be its
 #: nominal value, either way, to be believed beside that.
-NOTABLE, SEVERAL = 3.0, 4.0
+UNNAMED, SEVERAL = 3.0, 4.0
 #: Rise of the loss with inputs held the other way, as a share of it, that rules that out.
 OTHER_HOLD = 0.5
 
@@ -109,7 +109,8 @@ def confirm(
         fit = search.tried[key]
         slack = search.fitter.tie(search.tried[()]) if found.adequate else OTHER_HOLD * fit.merit
         numerics = other_numerics(search, key, slack) if key else []
-        made = claims(search, key, found.adequate, groups, numerics)
+        close = found.adequate or search.fitter.left(fit, found.floor).ratio < NOTABLE
+        made = claims(search, key, found.adequate, close, groups, numerics)
         if found.adequate and len(key) == 2:
             alone = imitated(search, key)
             made = [dataclasses.replace(c, rivals=(*c.rivals, *alone)) for c in made]
@@ -174,7 +175,7 @@ def much(answer: Answer) -> bool:
 def with_stand_ins(answer: Answer) -> Answer:
     """An answer in which parameters several times their nominal values, or a fraction of them, are
     not certain beside a remainder: so far off they may stand for a law of another form."""
-    if answer.found.adequate or answer.left.ratio < NOTABLE:
+    if answer.found.adequate or answer.left.ratio < UNNAMED:
         return answer
     fit = answer.found.search.tried[answer.key]
     found = ratios(fit.model.bind(fit.theta), fit.model.added(fit.theta))

@@ -15,7 +15,7 @@ from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import Candidate, candidates
 from residual.gap.model.model import Model
 from residual.gap.search.at_sight import of_one_pair
-from residual.gap.search.explain import FOOTNOTE
+from residual.gap.search.explain import FOOTNOTE, NOTABLE
 from residual.gap.search.pool import Key
 from residual.gap.search.pushes import constant, of_one_kind
 from sims.effects.base import Effect
@@ -34,8 +34,6 @@ NEAREST, IN_PLACE = 3, (2, 4)
 #: Effects fewer with which an answer that forecasts as well is the simpler one, whatever numbers
 #: these have.
 FEWER = 2
-#: Residual over noise from which on laws may only imitate the true one.
-NOTABLE = 1.5
 #: Effects from which on they are several.
 SEVERAL = 3
 #: Part of the gap without a name that is much, however little it is beside noise.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from residual.gap.answer.confirmed import Answer
-from residual.gap.answer.left import NOTABLE, half_beyond_noise
+from residual.gap.answer.left import half_beyond_noise
 from residual.gap.beside import Periodic
 from residual.gap.confirmation.drift import beside
 from residual.gap.data.samples import Samples
@@ -23,6 +23,7 @@ from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model import paths
 from residual.gap.model.candidates import candidates
+from residual.gap.search.explain import NOTABLE
 from residual.gap.search.pool import Key
 from sims.effects.flexible import FlexiblePart
 from sims.effects.joint import ConstantLoad

@@ -14,8 +14,11 @@ from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.left import fit_in_place_of_most, half_beyond_noise, much_is_left
 from residual.gap.answer.likeness import in_any_motion
 from residual.gap.data.levels import levels
+from residual.gap.fitting.screening import gains
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
+from residual.gap.search.at_sight import at_sight
+from residual.gap.search.explain import NOTABLE
 from residual.gap.search.pool import Key
 from sims.effects.curve import Curve
 from sims.effects.parameter_curve import ParameterCurve
@@ -45,7 +48,7 @@ def worth_varying(
     courses = _beside(answer, answer.key) or _from_the_nominal(answer)
     near = [one for one in courses if one.fall.loss <= NEARLY * courses[0].fall.loss]
     found = [one.curve for one in near if one.curve and one.curve.parameter in offered]
-    found = found or _in_place_of_most(answer, offered)
+    found = [*_at_sight(answer, offered), *found] or _in_place_of_most(answer, offered)
     laws = functools.partial(in_any_motion, search.fitter, search.simulator)
     own = [one for one in found if not any(laws(curve, one) for curve in curves)]
     # Beside what was named another parameter may show that alone would explain all.
@@ -69,6 +72,21 @@ def _from_the_nominal(answer: Answer) -> list[Course]:
     return [one for one in _beside(answer, ()) if one.fall.loss < most]
 
 
+def _at_sight(answer: Answer, offered: Collection[str]) -> list[ParameterCurve]:
+    """The parameters that, if they follow a channel, leave a fraction of what the library does
+    along the measured path, those that leave least first: what changes many times over does not
+    show around the simulator's own."""
+    search = answer.found.search
+    if not much_is_left(answer):
+        return []
+    curves, path = _every_one(answer, offered), search.measured_path
+    pool = at_sight(path, candidates(search.simulator, curves, search.fitter.samples))
+    found = path.of(pool)
+    ranked = [found.variants[gain.variants[0]].candidate for gain in gains(found)] if pool else []
+    by_label = {str(curve): curve for curve in curves}
+    return [by_label[pool[number].label] for number in dict.fromkeys(ranked)]
+
+
 def _in_place_of_most(answer: Answer, offered: Collection[str]) -> list[ParameterCurve]:
     """The parameters that, if they follow a channel, fit about as well as all but one that was
     named: a change that makes most of the gap is no small one, for which the linear picture holds.
@@ -76,14 +94,20 @@ def _in_place_of_most(answer: Answer, offered: Collection[str]) -> list[Paramete
     search = answer.found.search
     if not much_is_left(answer):
         return []
-    curves = [
+    curves = _every_one(answer, offered)
+    pool = candidates(search.simulator, curves, search.fitter.samples)
+    return [curves[n] for n in sorted(fit_in_place_of_most(pool, answer))]
+
+
+def _every_one(answer: Answer, offered: Collection[str]) -> list[ParameterCurve]:
+    """Every parameter on offer over every channel."""
+    search = answer.found.search
+    return [
         ParameterCurve(name, level.channel, of_size=level.of_size).suited_to(*level.reach)
         for level in levels(search.simulator, search.fitter.samples)
         for name in search.simulator.parameters
         if name in offered
     ]
-    pool = candidates(search.simulator, curves, search.fitter.samples)
-    return [curves[n] for n in sorted(fit_in_place_of_most(pool, answer))]
 
 
 def over_unused(
@@ -113,11 +137,31 @@ def over_unused(
     ][:MOST]
 
 
-def no_surer(answer: Answer, earlier: Answer) -> Answer:
-    """An answer in which a parameter follows a channel, nothing surer than before where more than
-    noise is left: it takes the shape of whatever is missing, and what it leaves others that of it.
+def over_other_channels(answer: Answer) -> list[ParameterCurve]:
+    """The parameters that were named as following a channel, over all others that were not asked
+    for: what grows and what it makes go together, and either may be what slows the growth.
+
+    Args:
+        answer: What was found.
     """
-    if answer.found.adequate:
+    search = answer.found.search
+    effects = [search.candidates[number].effect for number in answer.key]
+    named = [effect.parameter for effect in effects if isinstance(effect, ParameterCurve)]
+    asked = {candidate.label for candidate in search.candidates}
+    others = [
+        ParameterCurve(name, level.channel, of_size=level.of_size).suited_to(*level.reach)
+        for name in named
+        for level in levels(search.simulator, search.fitter.samples)
+    ]
+    return [one for one in others if str(one) not in asked]
+
+
+def no_surer(answer: Answer, earlier: Answer) -> Answer:
+    """An answer in which a parameter follows a channel, nothing surer than before where clearly
+    more than noise is left: it takes the shape of whatever is missing, and what it leaves others
+    that of it.
+    """
+    if answer.found.adequate or answer.left.ratio < NOTABLE:
         return answer
     known = earlier.found.search.candidates
     sure = {known[claim.number].label for claim in earlier.claims if claim.sure}

@@ -45,6 +45,7 @@ def claims(
     search: Search,
     key: Key,
     adequate: bool,
+    close: bool,
     groups: dict[str, tuple[str, ...]],
     numerics: Sequence[Array],
 ) -> list[Claim]:
@@ -54,6 +55,7 @@ def claims(
         search: With the chosen set, what is left of it without each member, and exchanges.
         key: The chosen set.
         adequate: Whether it leaves no more than noise, so that chance alone decides.
+        close: Whether it leaves little more, so that it is more than an imitation.
         groups: Exact twins by label.
         numerics: Its numbers at half the step and with the other hold, each (p,).
     """
@@ -61,7 +63,7 @@ def claims(
     half = 1.96 * deviations(fit, search.fitter.blocks)
     limits = in_the_limit(fit.theta, numerics)
     scattered = adequate & imitates(fit, search.fitter.blocks, half)
-    found, drift, other_law = [], Drift(search), by_another_law(search, key, adequate)
+    found, drift, other_law = [], Drift(search), by_another_law(search, key, adequate, close)
     apart, loop = parted(search, key), fed_back(search.fitter.samples)
     for place, number in enumerate(key):
         own = [int(j) for j in np.flatnonzero(fit.model.owner == place)]

@@ -28,23 +28,24 @@ Array = NDArray[np.float64]
 LESS, CLEARLY_LESS = 0.95, 0.8
 
 
-def by_another_law(search: Search, key: Key, adequate: bool) -> frozenset[int]:
+def by_another_law(search: Search, key: Key, adequate: bool, close: bool) -> frozenset[int]:
     """Members of a set in whose place a parameter or gain beside them leaves clearly less if it
     changes in proportion to what was measured, those parameters, and curves beside them.
 
     In the linear picture, so that it is as many numbers for one. What strikes the ground is not
     asked. A parameter that follows a channel comes near to many a law; it is the true one where
-    nothing is left. Two that do fit whatever acts there, and nothing is sure beside them.
+    next to nothing is left. Two that do fit whatever acts there, and nothing is sure beside them.
 
     Args:
         search: With the set, and what is left of it without each member.
         key: The set.
         adequate: Whether it leaves no more than noise.
+        close: Whether it leaves little more.
     """
     found = {n for n in key if isinstance(search.candidates[n].effect, ParameterCurve)}
     if len(found) > 1:
         return frozenset(key)
-    if adequate:
+    if close:
         found.clear()
     if not isinstance(search.fitter, SmoothFitter) or len(search.fitter.blocks) < FEW:
         return frozenset(found)

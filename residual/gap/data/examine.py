@@ -21,19 +21,18 @@ from residual.gap.data.inspection import (
     faults,
     faulty,
     measured,
-    other_clock,
     refusal,
     rounded,
     sampling,
     speeds,
     still,
     sums,
-    times_in,
 )
 from residual.gap.data.kinematics import kinematics
 from residual.gap.data.lost_rows import timed_halfway
 from residual.gap.data.nominal import nominal
 from residual.gap.data.onset import begun_late
+from residual.gap.data.other_clock import any_other_clock
 from residual.gap.data.repeats import without_repeats
 from residual.gap.data.resets import cut_at_resets
 from residual.gap.data.same_columns import same_columns
@@ -144,7 +143,7 @@ def _refusals(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> l
     for run in trajectories:
         if run.durations.min() > _SLOWEST * simulator.dt:
             period = float(np.median(run.durations))
-            otherwise = other_clock(period / simulator.dt) or times_in("ms")
+            otherwise = any_other_clock(period / simulator.dt)
             says = (
                 f"a sample every {period:.4g} s, {period / simulator.dt:.0f} control periods of "
                 f"{simulator.name}: {otherwise}"

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from residual.gap.data.other_clock import other_clock
 from residual.logs.checks import Finding
 from residual.logs.clipped import clipped_samples
 from residual.logs.derived import differenced, summed_up
@@ -32,10 +33,6 @@ _MISREAD = {"rad": "deg", "rad/s": "deg/s", "m": "mm", "m/s": "km/h", "A": "mA",
 _FAR_BEYOND = 3.0
 # No more than this share of them are accidents.
 _FEW_WILD = 0.01
-# Units of time that are taken for seconds if samples come so many times as often, or nearly so.
-_LONGER, _ALMOST = {"min": 60.0, "h": 3600.0}, 0.15
-# What seconds that were taken for milliseconds make of that.
-_FINER = 1000.0
 
 
 def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:
@@ -58,23 +55,6 @@ def sampling(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> li
         "control period if you can"
     )
     return [Finding("sampling", "", says, numbers, "warning")]
-
-
-def other_clock(times: float) -> str:
-    """What to say of the times of a log, perhaps, if samples come so many control periods apart;
-    empty if no other clock is likely."""
-    for unit, seconds in _LONGER.items():
-        if abs(seconds * times - 1) < _ALMOST:
-            return times_in(unit)
-        if abs(times / seconds - 1) < _ALMOST:
-            scale = f"{{column: time, scale: {1 / seconds:.6g}}}"
-            return f"{times_in('s')}; if the simulator counts in {unit}, to {scale}"
-    return times_in("s") if abs(_FINER * times - 1) < _ALMOST else ""
-
-
-def times_in(unit: str) -> str:
-    """What to set if times are in a unit that they were not taken to be in."""
-    return f"if the times are in {unit}, set columns.time to {{column: time, unit: {unit}}}"
 
 
 def bounds(simulator: HostSimulator, trajectories: Sequence[Trajectory]) -> list[Finding]:

@@ -42,6 +42,8 @@ Array = NDArray[np.float64]
 
 #: Residual over noise below which a remainder is a footnote.
 FOOTNOTE = 1.1
+#: Residual over noise from which on laws may only imitate the true one.
+NOTABLE = 1.5
 #: Forecast error over that by noise below which residuals are believed.
 WELL = 1.5
 #: Times that channels are weighed anew by what the best set leaves of them.

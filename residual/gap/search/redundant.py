@@ -10,6 +10,7 @@ import numpy as np
 from residual.gap.fitting.screening import Signatures
 from sims.effects.base import Effect
 from sims.effects.curve import Curve
+from sims.effects.parameter_curve import ParameterCurve
 from sims.effects.sensor import SensorEffect
 
 if TYPE_CHECKING:
@@ -50,6 +51,8 @@ def _misplaces(search: Search, sensor: Effect, curve: Effect) -> bool:
     """Whether a sensor's zero or scale only moves the points of a curve by what it shows."""
     if not (isinstance(sensor, SensorEffect) and isinstance(curve, Curve)):
         return False
+    if isinstance(curve, ParameterCurve):
+        return sensor.where == curve.over
     joints = {joint.name: joint.position for joint in search.simulator.joints}
     return curve.along == "position" and sensor.where == joints[curve.where]
 

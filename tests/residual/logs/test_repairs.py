@@ -92,6 +92,18 @@ def test_a_lost_row_is_no_rounded_clock(tmp_path):
     assert np.array_equal(run.times, columns["time"])
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 6, 12, 40])
+def test_rows_lost_at_random_are_no_rounded_clock(tmp_path, count):
+    """Of 900 rows 10 ms apart six that were lost made a clock of 10.07 ms, up to 8 ms off."""
+    for seed in range(5):
+        lost = np.random.default_rng(seed).choice(np.arange(1, 899), count, replace=False)
+        columns = {name: np.delete(v, lost) for name, v in swing(900, dt=0.01).items()}
+        columns["time"] = np.round(columns["time"], 2)
+        data = read(write(tmp_path / f"log{seed}.csv", columns))
+        assert "rounded_clock" not in kinds(data)
+        np.testing.assert_array_equal(data.trajectories[0].times, columns["time"])
+
+
 def test_jitter_is_kept_and_reported(tmp_path):
     rng = np.random.default_rng(0)
     t = np.cumsum(rng.uniform(0.03, 0.07, 200))

@@ -29,13 +29,18 @@ def test_what_cannot_be_right_without_the_others_goes_too(monkeypatch):
         tried=dict.fromkeys([(), (0,), (0, 1), (0, 1, 2)], fit),
         refused={(0, 1): "outdoor would have 0.05 of its strength"},
         candidates=[SimpleNamespace(label=name) for name in ("load", "gain", "loss")],
-        fitter=SimpleNamespace(blocks=range(8), tie=lambda nominal: 0.0, profiled=lambda fit: fit),
+        fitter=SimpleNamespace(
+            blocks=range(8),
+            tie=lambda nominal: 0.0,
+            profiled=lambda fit: fit,
+            left=lambda fit, floor: SimpleNamespace(ratio=2.0),
+        ),
         merged=lambda key, _, drop: (tuple(k for k in key if k not in drop), None),
         add=lambda fits: None,
         usable=lambda: [],
         labels=lambda key: (),
     )
-    found = SimpleNamespace(search=search, key=(0, 1, 2), adequate=False)
+    found = SimpleNamespace(search=search, key=(0, 1, 2), adequate=False, floor=None)
     left = confirmed.confirm(found, {})
     assert left.key == (0,)
     assert left.leads == ("gain", "loss")

@@ -105,4 +105,11 @@ def test_beside_two_parameters_that_follow_something_nothing_is_certain(key, dou
     curves = [ParameterCurve(name, "substrate") for name in ("growth", "gain")]
     effects = [ConstantLoad("biomass"), *curves]
     search = SimpleNamespace(candidates=[SimpleNamespace(effect=e) for e in effects], fitter=None)
-    assert by_another_law(search, key, adequate=True) == doubtful
+    assert by_another_law(search, key, adequate=True, close=True) == doubtful
+
+
+@pytest.mark.parametrize(("close", "doubtful"), [(True, set()), (False, {0})])
+def test_a_parameter_that_follows_something_is_sure_only_where_little_is_left(close, doubtful):
+    curve = ParameterCurve("growth", "substrate")
+    search = SimpleNamespace(candidates=[SimpleNamespace(effect=curve)], fitter=None)
+    assert by_another_law(search, (0,), adequate=False, close=close) == doubtful

@@ -11,6 +11,7 @@ from swing import changed, kinds, noisy
 from residual.gap import find_gap
 from residual.gap.data.examine import examine, findings
 from residual.gap.data.kinematics import kinematics
+from residual.gap.data.other_clock import any_other_clock
 from residual.trajectories import Trajectory
 from sims.leo import Leo
 from sims.pendulum_equation import PendulumEquation
@@ -298,3 +299,17 @@ def test_a_rate_whose_zero_is_off_is_not_on_another_scale(bias):
     wandering = run.states + np.stack([0.5 * run.times, np.full(501, 0.5 + bias)], axis=1)
     logs = [dataclasses.replace(run, states=wandering)]
     assert kinematics(PendulumEquation(), logs) == (logs, [])
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said", "unsaid"),
+    [
+        (3150.0, ("are in ms", "counts in h, to {column: time, scale: 0.000277778}"), ("in min",)),
+        (15.0, ("are in s,", "counts in min, to"), ("in ms", "counts in h,")),
+        (250.0, ("are in ms, set",), ("counts in h",)),
+    ],
+    ids=["h", "min", "ms"],
+)
+def test_a_log_of_too_few_samples_may_be_of_a_simulator_on_another_clock(seconds, said, unsaid):
+    told = any_other_clock(seconds / 0.25)
+    assert all(words in told for words in said) and not any(words in told for words in unsaid)
