@@ -33,6 +33,7 @@ from residual.gap.other_windows import OtherWindows
 from residual.gap.preparation.prepare import finely
 from residual.gap.search.redundant import by_points
 from sims.effects.base import Effect
+from sims.effects.curve import Curve
 
 
 class OnceMore(OtherWindows):
@@ -115,17 +116,20 @@ class OnceMore(OtherWindows):
         varying |= {str(one): one for one in over_unused(answer, offered.by_label, unused)}
         found, second = self._asked_with(known, list(varying.values()), what, what)
         if found.answer is not answer:
-            return self._over_other_channels(found, answer)
+            return self._over_other_channels(found, answer, curves)
         if second is not None:
             beside = beside_others(answer, second, list(varying.values()), self._late)
             found = dataclasses.replace(found, answer=beside)
         late = found.unasked != known.unasked
         return found if late else dataclasses.replace(found, in_vain=tuple(varying.values()))
 
-    def _over_other_channels(self, known: Confirmed, earlier: Answer) -> Confirmed:
+    def _over_other_channels(
+        self, known: Confirmed, earlier: Answer, curves: Sequence[Curve]
+    ) -> Confirmed:
         """An answer in which a parameter follows a channel, or what is found with it over another
         one; none surer than an earlier answer was without."""
-        others, what = over_other_channels(known.answer), "the same parameter over other channels"
+        what = "the same parameter over other channels"
+        others = over_other_channels(known.answer, curves)
         found, second = self._asked_with(known, others, what, what)
         if second is not None and found.answer is not second:
             beside = beside_others(found.answer, second, others, self._late)

@@ -49,12 +49,23 @@ def worth_varying(
     near = [one for one in courses if one.fall.loss <= NEARLY * courses[0].fall.loss]
     found = [one.curve for one in near if one.curve and one.curve.parameter in offered]
     found = [*_at_sight(answer, offered), *found] or _in_place_of_most(answer, offered)
-    laws = functools.partial(in_any_motion, search.fitter, search.simulator)
-    own = [one for one in found if not any(laws(curve, one) for curve in curves)]
+    own = _that_are_no_law(answer, found, curves)
     # Beside what was named another parameter may show that alone would explain all.
     names = [name for name in search.simulator.parameters if name in offered]
     others = [dataclasses.replace(one, parameter=name) for one in own for name in names]
     return list(dict.fromkeys([*own, *others]))[:MOST]
+
+
+def _that_are_no_law(
+    answer: Answer, asked: Sequence[ParameterCurve], laws: Sequence[Curve]
+) -> list[ParameterCurve]:
+    """Those that no curve by points can do in any motion, nor if they followed the size of their
+    channel, or all of it."""
+    search = answer.found.search
+    assert isinstance(search.fitter, SmoothFitter)
+    can = functools.partial(in_any_motion, search.fitter, search.simulator)
+    done = {(one.parameter, one.over) for one in asked if any(can(law, one) for law in laws)}
+    return [one for one in asked if (one.parameter, one.over) not in done]
 
 
 def _beside(answer: Answer, key: Key) -> list[Course]:
@@ -137,12 +148,13 @@ def over_unused(
     ][:MOST]
 
 
-def over_other_channels(answer: Answer) -> list[ParameterCurve]:
+def over_other_channels(answer: Answer, curves: Sequence[Curve]) -> list[ParameterCurve]:
     """The parameters that were named as following a channel, over all others that were not asked
     for: what grows and what it makes go together, and either may be what slows the growth.
 
     Args:
         answer: What was found.
+        curves: Curves by points that are asked for, too.
     """
     search = answer.found.search
     effects = [search.candidates[number].effect for number in answer.key]
@@ -153,7 +165,8 @@ def over_other_channels(answer: Answer) -> list[ParameterCurve]:
         for name in named
         for level in levels(search.simulator, search.fitter.samples)
     ]
-    return [one for one in others if str(one) not in asked]
+    others = [one for one in others if str(one) not in asked]
+    return _that_are_no_law(answer, others, curves) if others else []
 
 
 def no_surer(answer: Answer, earlier: Answer) -> Answer:

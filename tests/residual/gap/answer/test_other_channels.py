@@ -88,7 +88,7 @@ def test_what_was_asked_is_not_asked_again():
     pool = candidates(simulator, asked, fitter.samples)
     search = SimpleNamespace(candidates=pool, simulator=simulator, fitter=fitter)
     answer = SimpleNamespace(found=SimpleNamespace(search=search), key=(0,))
-    others = {str(one) for one in over_other_channels(answer)}
+    others = {str(one) for one in over_other_channels(answer, [])}
     over = {name.partition(" over ")[2] for name in others}
     assert {"ethanol", "feed", "bleed"} <= over and not {"biomass", "sugar"} & over
-    assert over_other_channels(SimpleNamespace(found=answer.found, key=())) == []
+    assert over_other_channels(SimpleNamespace(found=answer.found, key=()), []) == []
