@@ -21,7 +21,8 @@ class Confirmed:
         in_vain: Parameters that follow a channel, asked for and not named.
         unasked: What may be left, in words, and was not asked for lack of time.
         why: Why forecasts go over windows of another length than the usual one, in words.
-        lone: Where most of the error lies, if nothing explains it and it was not left out.
+        stretch: Where most of the error lies, if nothing that was named explains it and it was not
+            left out.
     """
 
     prepared: Prepared
@@ -30,7 +31,7 @@ class Confirmed:
     in_vain: tuple[ParameterCurve, ...] = ()
     unasked: tuple[str, ...] = ()
     why: str = ""
-    lone: Stretch | None = None
+    stretch: Stretch | None = None
 
     def lacks_time(self, *what: str) -> Confirmed:
         """The same with more that was not asked for lack of time."""

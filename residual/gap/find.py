@@ -19,7 +19,7 @@ from residual.gap.answer.form import rare_beside_much
 from residual.gap.answer.late import nearly_in_sensors
 from residual.gap.answer.out_of_proportion import out_of_proportion
 from residual.gap.answer.periodic import periodic
-from residual.gap.answer.records import stands_for, unlike
+from residual.gap.answer.records import explain_most, stands_for, unlike
 from residual.gap.answer.table import lost
 from residual.gap.clock import Clock, usual_minutes
 from residual.gap.confirmation.numerics import times_better
@@ -187,7 +187,9 @@ def find_gap(
         )
         clock.lap("forecast")
     other = other_length(simulator, horizon, table.horizon_s) if horizon else []
+    stretch = None if explain_most(differ) else known.stretch
     says = [*log.left_out, *other, *read.says, *on_more, *known.says]
+    says += [stretch.says(left_out=False)] if stretch else []
     says += [*_searched(answer.found.search.fitter), *inquiry.untried(answer)]
     says += [*judged.says, *lost(answer.found.search, table), *out_of_proportion(answer)]
     quality = (*log.findings, *(Finding("search", "", one) for one in says))
@@ -197,7 +199,7 @@ def find_gap(
     return replace(
         result, corrected=result.corrected.with_scales(declared), conventions=conventions,
         cut_off=log.cut_off, unlike=differ, changing=over_time, periodic=repeats,
-        nearly_late=late, lone=known.lone,
+        nearly_late=late, lone=None if stretch is None or stretch.beside else stretch,
     )  # fmt: skip
 
 

@@ -55,9 +55,8 @@ class OnceMore(OtherWindows):
             known = known.and_says(_no_time(known.unasked))
         if left_out:
             return known
-        lone = lone_stretch(known.answer)
-        if rest := lone or left_stretch(known.answer):
-            return dataclasses.replace(known.and_says(rest.says(left_out=False)), lone=lone)
+        if rest := lone_stretch(known.answer) or left_stretch(known.answer):
+            return dataclasses.replace(known, stretch=rest)
         says = few_stretches(known.answer) or off_stretch(known.answer)
         return known.and_says(says) if says else known
 

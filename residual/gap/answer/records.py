@@ -80,6 +80,12 @@ def unlike(answer: Answer) -> tuple[Unlike, ...]:
     return tuple(told.values())[:TOLD]
 
 
+def explain_most(differ: Sequence[Unlike]) -> bool:
+    """Whether most of the gap has a name with sizes by record, see ``unlike``: a load in one of
+    them makes that one stand out."""
+    return any(one.share > HALF for one in differ)
+
+
 def stands_for(answer: Answer, claim: Claim, differ: Sequence[Unlike]) -> bool:
     """Whether what was named may stand for an effect that differs between records.
 

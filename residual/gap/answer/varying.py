@@ -14,13 +14,15 @@ from residual.gap.answer.confirmed import Answer
 from residual.gap.answer.left import fit_in_place_of_most, half_beyond_noise, much_is_left
 from residual.gap.answer.likeness import in_any_motion
 from residual.gap.data.levels import levels
-from residual.gap.fitting.screening import gains
+from residual.gap.fitting.screening import gains, project_out
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
 from residual.gap.search.at_sight import at_sight
 from residual.gap.search.explain import NOTABLE
 from residual.gap.search.pool import Key
+from residual.gap.search.sets import Search
 from sims.effects.curve import Curve
+from sims.effects.parameter import ParameterChange
 from sims.effects.parameter_curve import ParameterCurve
 
 Array = NDArray[np.float64]
@@ -92,10 +94,29 @@ def _at_sight(answer: Answer, offered: Collection[str]) -> list[ParameterCurve]:
         return []
     curves, path = _every_one(answer, offered), search.measured_path
     pool = at_sight(path, candidates(search.simulator, curves, search.fitter.samples))
-    found = path.of(pool)
-    ranked = [found.variants[gain.variants[0]].candidate for gain in gains(found)] if pool else []
-    by_label = {str(curve): curve for curve in curves}
-    return [by_label[pool[number].label] for number in dict.fromkeys(ranked)]
+    if not pool:
+        return []
+    found, by_label = path.of(pool), {str(curve): curve for curve in curves}
+    taken: dict[ParameterCurve, float] = {}
+    for gain in gains(found):
+        curve = by_label[pool[found.variants[gain.variants[0]].candidate].label]
+        taken.setdefault(curve, gain.value)
+    return [one for one in taken if taken[one] > _by_record(search, one)]
+
+
+def _by_record(search: Search, curve: ParameterCurve) -> float:
+    """What the parameter of a curve takes off along the measured path with a size of its own in
+    each record; 0 of more records than the curve has points. Where a position is left from record
+    to record as it was, what follows it tells the records apart."""
+    assert isinstance(search.fitter, SmoothFitter)
+    run, change = search.fitter.blocks.windows.run, ParameterChange(curve.parameter)
+    if len(np.unique(run)) > len(curve.strengths()):
+        return 0.0
+    found = search.measured_path.of(candidates(search.simulator, [change], search.fitter.samples))
+    of_row = np.repeat(run, len(found.residual) // len(run))
+    apart = found.matrix[:, :1] * (of_row[:, None] == np.unique(run))
+    left = project_out(apart, found.residual[:, None])
+    return float(found.residual @ found.residual - (left**2).sum())
 
 
 def _in_place_of_most(answer: Answer, offered: Collection[str]) -> list[ParameterCurve]:

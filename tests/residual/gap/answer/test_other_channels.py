@@ -13,7 +13,7 @@ from residual.gap.model.candidates import candidates
 from residual.gap.preparation.prepare import prepare
 from residual.trajectories import Trajectory
 from sims.effects import ParameterCurve
-from sims.equations import FirstOrderSystem
+from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.simulator import Channel, Parameter
 
 DT, MU, HALF, YIELD, ETHANOL = 0.1, 0.31, 0.9, 0.16, 2.6
@@ -92,3 +92,38 @@ def test_what_was_asked_is_not_asked_again():
     over = {name.partition(" over ")[2] for name in others}
     assert {"ethanol", "feed", "bleed"} <= over and not {"biomass", "sugar"} & over
     assert over_other_channels(SimpleNamespace(found=answer.found, key=()), []) == []
+
+
+class Shuttle(EquationOfMotion):
+    """A shuttle that rolls from record to record to where it was left."""
+
+    dt = 0.05
+    state_channels = (
+        Channel("x", "m", "position", scale=5.0),
+        Channel("v", "m/s", "rate", rate_of="x", scale=1.0),
+    )
+    action_channels = (Channel("force", "N", "input", scale=100.0, low=-300.0, high=300.0),)
+    parameters: ClassVar = {
+        "mass": Parameter(80.0, "kg", "empty shuttle", low=5.0),
+        "damping": Parameter(45.0, "N s/m", "wheels", low=0.0, family="dissipation"),
+    }
+
+    def acceleration(self, q, v, u, force, p):
+        return ((u[:, 0] + force[:, 0] - p.damping * v[:, 0]) / p.mass)[:, None]
+
+
+def run_of_a_shuttle(seed, mass, begin, rows=600):
+    rng = np.random.default_rng(seed)
+    forces = np.repeat(rng.uniform(-150, 150, rows // 30), 30)[: rows - 1]
+    states = path(lambda _, x, u: [x[1], (u - 45.0 * x[1]) / mass], [begin, 0.0], forces, 0.05)
+    seen = states + rng.standard_normal(states.shape) * [0.004, 0.015]
+    return Trajectory(f"run {seed}", 0.05 * np.arange(rows), seen, forces[:, None])
+
+
+@pytest.mark.long
+def test_a_load_in_one_record_does_not_follow_the_place():
+    records = [run_of_a_shuttle(1, 80.0, 8.0), run_of_a_shuttle(2, 80.0, 4.0),
+               run_of_a_shuttle(3, 129.0, -18.0)]  # fmt: skip
+    result = find_gap(Shuttle(), records)
+    assert not any(isinstance(effect, ParameterCurve) for effect in result.effects)
+    assert "mass" in {one.label for one in result.unlike} and result.lone is None
