@@ -11,8 +11,10 @@ from residual.gap import find_gap
 from residual.gap.answer.varying import over_other_channels
 from residual.gap.model.candidates import candidates
 from residual.gap.preparation.prepare import prepare
+from residual.gap.search.redundant import doubles
+from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
-from sims.effects import ParameterCurve
+from sims.effects import ParameterCurve, SensorOffset
 from sims.equations import EquationOfMotion, FirstOrderSystem
 from sims.simulator import Channel, Parameter
 
@@ -127,3 +129,14 @@ def test_a_load_in_one_record_does_not_follow_the_place():
     result = find_gap(Shuttle(), records)
     assert not any(isinstance(effect, ParameterCurve) for effect in result.effects)
     assert "mass" in {one.label for one in result.unlike} and result.lone is None
+
+
+def test_a_sensor_of_what_a_parameter_follows_only_moves_its_points():
+    simulator = Ferment()
+    fitter = prepare(simulator, [batch(1)], 8.0).fitter
+    curve = ParameterCurve("mu", "ethanol").suited_to(3.0, 33.0)
+    offered = [curve, SensorOffset("ethanol"), SensorOffset("biomass")]
+    search = Search(simulator, candidates(simulator, offered, fitter.samples), fitter)
+    number = {one.label: n for n, one in enumerate(search.candidates)}
+    beside = [number[f"sensor_offset@{name}"] for name in ("ethanol", "biomass")]
+    assert [doubles(search, (number[str(curve)], sensor)) for sensor in beside] == [True, False]
