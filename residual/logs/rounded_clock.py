@@ -49,7 +49,8 @@ def even_clock(times: Array) -> tuple[Array, float]:
     even = start + period * place
     far = np.ptp(times - even) > SPREAD * rounding
     lost = np.abs(steps - period).max() > LOST * rounding
-    if far or lost or _few_rows_lost(steps / np.median(steps)):
+    few = steps.min() > 0 and _few_rows_lost(steps / np.median(steps))
+    if far or lost or few:
         return times, 0.0
     return even, rounding
 
