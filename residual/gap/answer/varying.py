@@ -132,7 +132,7 @@ def _in_place_of_most(answer: Answer, offered: Collection[str]) -> list[Paramete
 
 
 def _every_one(answer: Answer, offered: Collection[str]) -> list[ParameterCurve]:
-    """Every parameter on offer over every channel."""
+    """Every one of some parameters over every channel."""
     search = answer.found.search
     return [
         ParameterCurve(name, level.channel, of_size=level.of_size).suited_to(*level.reach)
@@ -181,12 +181,7 @@ def over_other_channels(answer: Answer, curves: Sequence[Curve]) -> list[Paramet
     effects = [search.candidates[number].effect for number in answer.key]
     named = [effect.parameter for effect in effects if isinstance(effect, ParameterCurve)]
     asked = {candidate.label for candidate in search.candidates}
-    others = [
-        ParameterCurve(name, level.channel, of_size=level.of_size).suited_to(*level.reach)
-        for name in named
-        for level in levels(search.simulator, search.fitter.samples)
-    ]
-    others = [one for one in others if str(one) not in asked]
+    others = [one for one in _every_one(answer, named) if str(one) not in asked]
     return _that_are_no_law(answer, others, curves) if others else []
 
 

@@ -18,6 +18,8 @@ from residual.gap.fitting.screening import gains, signatures, trials
 from residual.gap.search.pool import Key
 from residual.gap.search.sets import Proposals, Search
 
+Array = NDArray[np.float64]
+
 #: Effects that are tried in place of all at one place.
 MOST = 2
 #: Part of what those do that one has to do in the linear picture.
@@ -34,20 +36,24 @@ def add_one_for_all(search: Search, key: Key) -> list[Key]:
     places: dict[str, list[int]] = {}
     for number in key:
         places.setdefault(search.candidates[number].effect.where, []).append(number)
+    several = [tuple(members) for members in places.values() if len(members) > 1]
+    if not several:
+        return []
+    columns = search.fitter.columns(search.tried[key], search.candidates[: search.screened])
     found: list[Key] = []
-    for members in places.values():
-        if len(members) > 1 and not search.out_of_time:
-            found += _added(search, key, tuple(members))
+    for members in several:
+        if not search.out_of_time:
+            found += _added(search, key, members, columns)
     return found
 
 
-def _added(search: Search, key: Key, members: Key) -> list[Key]:
-    """Sets with one effect in place of some members."""
+def _added(search: Search, key: Key, members: Key, columns: Array) -> list[Key]:
+    """Sets with one effect in place of some members, from what each adds to the whole set."""
     fit, screened = search.tried[key], search.candidates[: search.screened]
     rest = tuple(number for number in key if number not in members)
     gone = np.isin(fit.model.owner, [key.index(number) for number in members])
     without = _less(fit, gone, search, rest)
-    around = signatures(without, trials(screened), search.fitter.columns(fit, screened))
+    around = signatures(without, trials(screened), columns)
     whole = float(around.residual @ around.residual)
     proposed: Proposals = {}
     for gain in gains(around):
