@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from residual.gap.answer.confirmed import Answer
 from residual.gap.beside import Unlike
 from residual.gap.confirmation.claim import Claim
-from residual.gap.fitting.bounded import bounded_step
+from residual.gap.fitting.by_group import ByGroup, columns_apart, settled
 from residual.gap.fitting.contract import Fit
 from residual.gap.fitting.screening import beside_starts, constrained, flatten, trials
 from residual.gap.fitting.smooth import SmoothFitter
@@ -127,7 +127,7 @@ def _worth(search: Search, key: Key, group: Integers) -> list[int]:
     for variant in trials(screened):
         if len(variant.columns) != 1 or variant.candidate in key:
             continue
-        apart = _by_group(columns[..., list(variant.columns)], group)
+        apart = columns_apart(columns[..., list(variant.columns)], group)
         rows = flatten(np.concatenate([fit.by_knob, apart], axis=2), fit.weights)
         sides = np.append(
             np.zeros(len(fit.theta), bool), np.repeat(variant.trial.one_sided, apart.shape[2])
@@ -135,11 +135,6 @@ def _worth(search: Search, key: Key, group: Integers) -> list[int]:
         gain, _ = constrained(rows, residual, sides)
         gains[variant.candidate] = max(gain, gains.get(variant.candidate, 0.0))
     return [*key, *sorted(gains, key=lambda number: -gains[number])[:ASKED]]
-
-
-def _by_group(columns: Array, group: Integers) -> Array:
-    """Columns (W, R, 1) once for every group of windows and zero elsewhere, (W, R, G)."""
-    return columns * (group[:, None] == np.arange(group.max() + 1))[:, None, :]
 
 
 def _asked(
@@ -164,6 +159,7 @@ def _asked(
         noise: Mean squared errors of blocks by noise alone, (B, m).
     """
     fitter, candidate = search.fitter, search.candidates[number]
+    assert isinstance(fitter, SmoothFitter)
     fit = search.tried[base] if number in base else _with(search, base, number)
     (own,) = np.flatnonzero([c is candidate for c in fit.model.chosen])
     places = np.flatnonzero(fit.model.owner == own)
@@ -172,9 +168,14 @@ def _asked(
     place = int(places[0])
     blocks = fitter.blocks
     without = [blocks.fold_of_window != fold for fold in range(blocks.folds)]
-    thetas = np.concatenate([_sizes(fit, place, group, rows) for rows in without])
     which = blocks.fold_of_window * (group.max() + 1) + group
-    apart = by_block(fitter.foretell(fit.model, thetas, which, fit).squares, blocks)
+
+    def squares_of(found: ByGroup) -> Array:
+        thetas = np.concatenate([found.step(rows) for rows in without])
+        return by_block(fitter.foretell(fit.model, thetas, which, fit).squares, blocks)
+
+    own_sizes = ByGroup.of(fit, place, group)
+    apart = squares_of(own_sizes)
     others = [search.validated[key].squares]
     if number not in base:
         others.append(validate(fitter, fit).squares)
@@ -185,7 +186,10 @@ def _asked(
         surely = max(currency.clearly(squares, apart, g) for g in range(len(currency.groups)))
         if error**2 - least > HALF * left or surely < CLEARLY:
             return None
-    sizes = _sizes(fit, place, group, np.ones(len(group), bool))[: len(names), place]
+    further = settled(fitter, own_sizes)
+    if further is not own_sizes and currency.error(again := squares_of(further)) <= error:
+        own_sizes, apart, error = further, again, currency.error(again)
+    sizes = own_sizes.step(np.ones(len(group), bool))[: len(names), place]
     usual = _usual(search, candidate.effect)
     if np.ptp(sizes) < HARDLY * np.abs(usual + sizes).max():
         return None
@@ -212,35 +216,3 @@ def _with(search: Search, key: Key, number: int) -> Fit:
     _, theta = search.merged(key, [(number, 0.1 * search.candidates[number].trials[0].values[0])])
     theta = np.append(theta, search.tried[key].theta[search.numbers(key) :])
     return search.fitter.fit(search.model(larger), theta, search.tried[key])
-
-
-def _sizes(fit: Fit, place: int, group: Integers, rows: NDArray[np.bool_]) -> Array:
-    """Numbers of every group of windows, (G, p), of which one differs between them.
-
-    One Gauss-Newton step from those of all.
-
-    Args:
-        fit: With one size for all.
-        place: The number that differs.
-        group: The group of every window, (W,).
-        rows: The windows that are fitted.
-    """
-    model, theta = fit.model, fit.theta
-    count = int(group.max()) + 1
-    apart = _by_group(fit.by_knob[..., [place]], group)
-    columns = np.concatenate([np.delete(fit.by_knob, place, axis=2), apart], axis=2)[rows]
-    weights = fit.weights[rows]
-
-    def spread(values: Array) -> Array:
-        return np.append(np.delete(values, place), np.repeat(values[place], count))
-
-    low, high = model.room(theta)
-    step = bounded_step(
-        np.einsum("wri,wrj,w->ij", columns, columns, weights),
-        np.einsum("wri,wr,w->i", columns, fit.projected[rows], weights),
-        spread(low),
-        spread(high),
-    )
-    found = theta + np.insert(step[:-count], place, 0.0)[None].repeat(count, axis=0)
-    found[:, place] += step[-count:]
-    return found

@@ -52,6 +52,10 @@ class Blocks:
         """Fold of every window, (W,)."""
         return self.fold[self.block]
 
+    def of(self, part: NDArray[np.bool_]) -> Blocks:
+        """The same with a part of the windows, (W,)."""
+        return Blocks(self.windows[part], self.block[part], self.fold)
+
 
 def blocks(samples: Samples, windows: Windows, drive: Array, most: int) -> Blocks:
     """Group windows that follow each other, and deal the groups over folds.
@@ -82,8 +86,7 @@ def blocks(samples: Samples, windows: Windows, drive: Array, most: int) -> Block
     kept = [kept[i] for i in first]
     which = np.concatenate(kept)
     owner = np.repeat(np.arange(len(kept)), [len(group) for group in kept])
-    chosen = Windows(windows.index[which], windows.inside[which], windows.run[which])
-    return Blocks(chosen, owner, fold[first])
+    return Blocks(windows[which], owner, fold[first])
 
 
 def _groups(windows: Windows, size: int) -> list[NDArray[np.int64]]:

@@ -30,7 +30,7 @@ class Windows:
     def __len__(self) -> int:
         return len(self.index)
 
-    def __getitem__(self, part: slice) -> Windows:
+    def __getitem__(self, part: slice | NDArray[np.generic]) -> Windows:
         return Windows(self.index[part], self.inside[part], self.run[part])
 
     @classmethod

@@ -73,7 +73,7 @@ class WindowData:
     def take(self, which: NDArray[np.int64]) -> WindowData:
         """Some of the windows."""
         windows = self.windows
-        part = Windows(windows.index[which], windows.inside[which], windows.run[which])
+        part = windows[which]
         return dataclasses.replace(self, windows=part, guess=self.guess[which])
 
     def until(self, size: int) -> WindowData:

@@ -21,6 +21,10 @@ from studies.hidden.data import Truth, make_logs
 OFFERED = ("mass", "constant_load", "viscous_friction", "actuator_gain", "sensor_offset")
 
 
+#: Shares of the mass.
+PAYLOADS = (0.0, 0.15, 0.3, 0.9)
+
+
 def logs(*truths, seed=3):
     """A record of each truth, a name each."""
     found = []
@@ -36,8 +40,8 @@ def ask(runs):
 
 @pytest.fixture(scope="module")
 def payloads():
-    """The swinging mass is another one on each of four days."""
-    return ask(logs(*(Truth(mass=share) for share in (0.0, 0.15, 0.3, 0.45))))
+    """The swinging mass is another one on each of four days, on one of them nearly twice."""
+    return ask(logs(*(Truth(mass=share) for share in PAYLOADS)))
 
 
 @pytest.mark.long
@@ -45,7 +49,7 @@ def test_a_payload_of_each_record_is_found_with_its_size(payloads):
     first = payloads.unlike[0]
     assert (first.label, first.field, first.unit) == ("mass", "change", "kg")
     sizes = [first.sizes[f"day {i}"] for i in (1, 2, 3, 4)]
-    assert np.allclose(sizes, 0.055 * np.array([0.0, 0.15, 0.3, 0.45]), atol=0.002)
+    assert np.allclose(sizes, 0.055 * np.array(PAYLOADS), atol=0.001)
     assert first.share > 0.95 > payloads.gap.share.value + 0.2
 
 
@@ -88,10 +92,10 @@ def test_loads_of_a_lift_are_told_in_place_of_what_makes_the_best_of_them():
     first = found.unlike[0]
     assert first.label == "cabin" and first.instead
     sizes = [first.sizes[run.name] for run in trips()]
-    assert np.allclose(sizes, LOADS, atol=50.0)
+    assert np.allclose(sizes, LOADS, atol=40.0)
     assert not [v.effect for v in found.verdicts if v.kind == "confirmed"]
     assert "records" in found.verdicts[0].doubts
-    assert "and nothing else is added, 99.1 % of the gap has a name" in lead(found)
+    assert "and nothing else is added, 99.3 % of the gap has a name" in lead(found)
 
 
 @pytest.mark.long
