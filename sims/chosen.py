@@ -13,7 +13,7 @@ import jsonargparse
 from sims.effects.base import Effect
 from sims.effects.library import curves_in, further_in, library, parts_in
 from sims.effects.parameter import ParameterChange
-from sims.effects.parameter_curve import ParameterCurve
+from sims.effects.parameter_curve import FOLLOWING
 from sims.host import HostSimulator
 from sims.loading import one_line
 
@@ -54,8 +54,8 @@ def chosen_effects(
             own = [e for e in (*known.values(), *reserve) if entry in (e.name, str(e))]
             if not own and entry in simulator.parameters:
                 own = [ParameterChange(entry)]
-            if name == ParameterCurve.name:
-                own = [ParameterCurve.named(where)]
+            if name in FOLLOWING:
+                own = [FOLLOWING[name].named(where)]
                 own[0].measures(simulator)
             if not own and "." in name:
                 own = _placed(simulator, name, where)

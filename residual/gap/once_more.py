@@ -23,6 +23,7 @@ from residual.gap.answer.varying import (
     no_surer,
     over_other_channels,
     over_unused,
+    through_more_points,
     worth_varying,
 )
 from residual.gap.clock import OutOfTime
@@ -117,6 +118,9 @@ class OnceMore(OtherWindows):
         if found.answer is not answer:
             return self._over_other_channels(found, answer, curves)
         if second is not None:
+            finer = self._through_more_points(found, second)
+            if finer.answer is not answer:
+                return self._over_other_channels(finer, answer, curves)
             beside = beside_others(answer, second, list(varying.values()), self._late)
             found = dataclasses.replace(found, answer=beside)
         late = found.unasked != known.unasked
@@ -133,7 +137,13 @@ class OnceMore(OtherWindows):
         if second is not None and found.answer is not second:
             beside = beside_others(found.answer, second, others, self._late)
             found = dataclasses.replace(found, answer=beside)
+        found = self._through_more_points(found, found.answer)
         return dataclasses.replace(found, answer=no_surer(found.answer, earlier))
+
+    def _through_more_points(self, known: Confirmed, tried: Answer) -> Confirmed:
+        """The same, or what is found with the curves of an answer through more points."""
+        what = "the same parameter by more points"
+        return self._with_more(known, through_more_points(tried), what, what)
 
     def with_curves(self, known: Confirmed) -> Confirmed:
         """The same, or what is found with curves by points if they take most of what is left; then

@@ -62,6 +62,7 @@ from sims.effects.loss import PowerLoss as PowerLoss
 from sims.effects.loss import ProportionalLoss as ProportionalLoss
 from sims.effects.parameter import ParameterChange as ParameterChange
 from sims.effects.parameter_curve import ParameterCurve as ParameterCurve
+from sims.effects.parameter_curve import ParameterSpline as ParameterSpline
 from sims.effects.reaction import Reaction as Reaction
 from sims.effects.response import AsymmetricResponse as AsymmetricResponse
 from sims.effects.sensor import EncoderScale as EncoderScale

@@ -103,3 +103,28 @@ class ParameterCurve(CurveBetween):
         within = {name: dataclasses.replace(found[name], low=own.low, high=own.high)
                   for name in self.strengths()}  # fmt: skip
         return {**found, **within}
+
+
+@dataclasses.dataclass(frozen=True)
+class ParameterSpline(ParameterCurve):
+    """The same through five points: two more, ``fourth`` and ``fifth``, so that ``third`` is in the
+    middle; between them runs a cubic spline. A rail that is worn at one place, a reaction that
+    grows tenfold with its temperature.
+    """
+
+    fourth: Value = number(parameter=1, share=0.1)
+    fifth: Value = number(parameter=1, share=0.1)
+
+    name: ClassVar[str] = "parameter_spline"
+    sentence: ClassVar[str] = "The same by five points, where three leave something."
+
+    def contains(self, other: Effect) -> bool:
+        """The same by fewer points is a case of it, too."""
+        fewer = isinstance(other, ParameterCurve) and not isinstance(other, ParameterSpline)
+        return super().contains(other) or (fewer and other.where == self.where)
+
+
+#: What makes a parameter follow a channel, by the names that stand in labels.
+FOLLOWING: dict[str, type[ParameterCurve]] = {
+    kind.name: kind for kind in (ParameterCurve, ParameterSpline)
+}

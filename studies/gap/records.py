@@ -6,7 +6,7 @@ import re
 
 from residual.gap import GapResult
 from residual.gap.beside import Changing, Periodic, Unlike
-from sims.effects.parameter_curve import ParameterCurve
+from sims.effects.parameter_curve import FOLLOWING
 from studies.gap.words import (
     FOOTNOTE,
     effect_name,
@@ -57,8 +57,7 @@ def _open(result: GapResult) -> bool:
     something is told already."""
     much = any(v.kind == "unexplained" and v.share.value >= FOOTNOTE for v in result.verdicts)
     return much or any(
-        "law" in verdict.doubts and verdict.effect != ParameterCurve.name
-        for verdict in result.verdicts
+        "law" in verdict.doubts and verdict.effect not in FOLLOWING for verdict in result.verdicts
     )
 
 

@@ -13,7 +13,7 @@ from residual.gap.result import Gap, Number, Span
 from residual.trajectories import duration_text
 from sims.effects.base import Effect
 from sims.effects.library import library
-from sims.effects.parameter_curve import ParameterCurve
+from sims.effects.parameter_curve import FOLLOWING
 
 KINDS = {
     "confirmed": "confirmed",
@@ -61,7 +61,7 @@ def effect_name(label: str) -> str:
     name, _, where = label.partition("@")
     if not where and len(name) <= SHORT:
         return f"parameter {name}"
-    if name == ParameterCurve.name:
+    if name in FOLLOWING:
         parameter, _, channel = where.partition(" over ")
         return f"{parameter.replace('_', ' ')} that changes with {channel}"
     words = name.replace("_", " ")
@@ -94,7 +94,7 @@ def titled(label: str) -> str:
     """An effect in words as the beginning of a line; what a user gave a name keeps its letters."""
     name = effect_name(label)
     kind, _, where = label.partition("@")
-    return capitalized(name) if where and kind != ParameterCurve.name else name
+    return capitalized(name) if where and kind not in FOLLOWING else name
 
 
 def names_of(labels: Sequence[str], last: str = "or") -> str:

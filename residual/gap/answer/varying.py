@@ -23,7 +23,7 @@ from residual.gap.search.pool import Key
 from residual.gap.search.sets import Search
 from sims.effects.curve import Curve
 from sims.effects.parameter import ParameterChange
-from sims.effects.parameter_curve import ParameterCurve
+from sims.effects.parameter_curve import ParameterCurve, ParameterSpline
 
 Array = NDArray[np.float64]
 
@@ -183,6 +183,19 @@ def over_other_channels(answer: Answer, curves: Sequence[Curve]) -> list[Paramet
     asked = {candidate.label for candidate in search.candidates}
     others = [one for one in _every_one(answer, named) if str(one) not in asked]
     return _that_are_no_law(answer, others, curves) if others else []
+
+
+def through_more_points(answer: Answer) -> list[ParameterSpline]:
+    """The parameters that were named as following a channel, through more points: three are a
+    parabola, and no place where a rail is worn, nor a law that grows tenfold."""
+    if answer.left.adequate:
+        return []
+    effects = [answer.found.search.candidates[number].effect for number in answer.key]
+    return [
+        ParameterSpline(one.parameter, one.over, low=one.low, high=one.high, of_size=one.of_size)
+        for one in effects
+        if isinstance(one, ParameterCurve) and not isinstance(one, ParameterSpline)
+    ]
 
 
 def no_surer(answer: Answer, earlier: Answer) -> Answer:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from residual.gap.fitting.screening import Signatures
 from sims.effects.base import Effect
@@ -16,6 +17,8 @@ from sims.effects.sensor import SensorEffect
 if TYPE_CHECKING:
     from residual.gap.search.pool import Key
     from residual.gap.search.sets import Proposals, Search
+
+Array = NDArray[np.float64]
 
 #: Part of the length of what an effect does within what a curve can do, beyond which it is a case
 #: of the curve.
@@ -72,11 +75,30 @@ def curves_in_place(search: Search, keys: Iterable[Key]) -> Proposals:
             gone = tuple(n for n in key if doubles(search, (n, curve)))
             if curve in key or (key and not gone):
                 continue
-            start = 0.0 * search.candidates[curve].trials[0].values[0]
+            start = _shape_of(search, key, gone, curve)
             fresh, theta = search.merged(key, [(curve, start)], drop=gone)
             if search.fits_in(fresh):
                 found[fresh] = theta
     return found
+
+
+def _shape_of(search: Search, key: Key, gone: Key, curve: int) -> Array:
+    """Numbers of a curve to start from: those of one through fewer points among what is gone, which
+    were fitted with the set, and zero without one."""
+    candidate = search.candidates[curve]
+    effect, start = candidate.effect, 0.0 * candidate.trials[0].values[0]
+    for number in gone:
+        coarse = search.candidates[number]
+        if not (isinstance(effect, Curve) and isinstance(coarse.effect, Curve)):
+            continue
+        if key not in search.tried or not effect.contains(coarse.effect):
+            continue
+        fit = search.tried[key]
+        own = coarse.bind(fit.theta[fit.model.owner == key.index(number)].tolist())
+        assert isinstance(own, Curve)
+        places = [effect.point_of(knob.field) for knob in candidate.knobs]
+        start = np.array([own.at(there[0]) if there else 0.0 for there in places])
+    return start
 
 
 def _is_case(around: Signatures, number: int, curve: int) -> bool:
