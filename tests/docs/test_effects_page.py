@@ -69,7 +69,8 @@ CURVES = [
 OTHERS = [
     effects.StateCurve("level"), effects.RateLimit("pivot"),
     effects.FlexiblePart("pivot"), effects.FlexibleJoint("pivot"), effects.AddedInertia("pivot"),
-    effects.ParameterCurve("mass", "voltage"), effects.Unbalance("pivot"),
+    effects.ParameterCurve("mass", "voltage"), effects.ParameterSpline("mass", "voltage"),
+    effects.Unbalance("pivot"),
     effects.LoadDependentFriction("pivot"), effects.AsymmetricResponse("level"),
     effects.ConstantLoss("level"), effects.PowerLoss("level"), effects.AsymmetricDamping("pivot"),
     effects.AsymmetricActuator("voltage"), effects.SlewLimit("voltage"),

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
 from sims import Channel, EquationOfMotion, FirstOrderSystem, Parameter
 from sims.chosen import chosen_effects
-from sims.effects import ParameterChange, ParameterCurve, SecondStore
+from sims.effects import ParameterChange, ParameterCurve, ParameterSpline, SecondStore
 from sims.loading import effect_settings
 from sims.pendulum import Pendulum
 
@@ -87,6 +88,31 @@ def test_a_loss_that_follows_a_state_beside_a_store_stays_within_its_bounds():
     np.testing.assert_allclose(path[-1], true, rtol=1e-5)
 
 
+def test_one_through_five_points_follows_the_cubic_spline_through_them():
+    values = [0.3, -0.1, 0.4, 1.2, 0.2]
+    knots = np.linspace(-1.5, 1.5, 5)
+    curve = ParameterSpline("damping", "angle", *values[:3], low=-1.5, high=1.5,
+                            fourth=values[3], fifth=values[4])  # fmt: skip
+    assert [curve.point_of(field)[0] for field in curve.strengths()] == knots.tolist()
+    between = CubicSpline(knots, values)
+
+    def rates(_, x):
+        damping = 0.2 + between(np.clip(x[0], -1.5, 1.5))
+        return [x[1], -4.0 * np.sin(x[0]) - damping * x[1]]
+
+    start = [1.9, -0.5]
+    true = solve_ivp(rates, (0, 1.0), start, rtol=1e-10, atol=1e-12, max_step=0.01).y[:, -1]
+    path = Swing(effects=[curve]).rollout(np.array(start), np.zeros((50, 1)))
+    np.testing.assert_allclose(path[-1], true, atol=2e-5)
+
+
+def test_one_through_five_points_has_those_of_fewer_as_a_case():
+    spline, curve = ParameterSpline("damping", "rate"), ParameterCurve("damping", "rate")
+    assert spline.contains(curve) and spline.contains(ParameterChange("damping"))
+    assert not curve.contains(spline)
+    assert not spline.contains(ParameterCurve("damping", "rate", of_size=True))
+
+
 def test_rows_have_their_own_numbers_and_zeros_change_no_bit():
     rng = np.random.default_rng(0)
     states, actions = rng.normal(size=(4, 2)), rng.normal(size=(4, 1))
@@ -117,7 +143,10 @@ def test_it_is_asked_for_by_parameter_and_channel():
     swing = Swing()
     (curve,) = chosen_effects(swing, ["parameter_curve@damping over |rate|"])
     assert curve == ParameterCurve("damping", "rate", of_size=True)
+    (spline,) = chosen_effects(swing, ["parameter_spline@damping over angle"])
+    assert spline == ParameterSpline("damping", "angle")
     for wanted, says in (
+        ("parameter_spline", "write parameter_spline@PARAMETER over CHANNEL"),
         ("parameter_curve", "write parameter_curve@PARAMETER over CHANNEL"),
         ("parameter_curve@damping", "write parameter_curve@PARAMETER over CHANNEL"),
         ("parameter_curve@mass over rate", "no parameter 'mass'"),

@@ -92,7 +92,8 @@ def _at_sight(answer: Answer, offered: Collection[str]) -> list[ParameterCurve]:
     search = answer.found.search
     if not much_is_left(answer):
         return []
-    curves, path = _every_one(answer, offered), search.measured_path
+    few, path = _every_one(answer, offered), search.measured_path
+    curves = [*few, *map(_spline, few)]
     pool = at_sight(path, candidates(search.simulator, curves, search.fitter.samples))
     if not pool:
         return []
@@ -101,7 +102,8 @@ def _at_sight(answer: Answer, offered: Collection[str]) -> list[ParameterCurve]:
     for gain in gains(found):
         curve = by_label[pool[found.variants[gain.variants[0]].candidate].label]
         taken.setdefault(curve, gain.value)
-    return [one for one in taken if taken[one] > _by_record(search, one)]
+    enough = {_spline(one) for one in few if one in taken}
+    return [one for one in taken if one not in enough and taken[one] > _by_record(search, one)]
 
 
 def _by_record(search: Search, curve: ParameterCurve) -> float:
@@ -191,11 +193,15 @@ def through_more_points(answer: Answer) -> list[ParameterSpline]:
     if answer.left.adequate:
         return []
     effects = [answer.found.search.candidates[number].effect for number in answer.key]
-    return [
-        ParameterSpline(one.parameter, one.over, low=one.low, high=one.high, of_size=one.of_size)
-        for one in effects
-        if isinstance(one, ParameterCurve) and not isinstance(one, ParameterSpline)
-    ]
+    curves = [one for one in effects if isinstance(one, ParameterCurve)]
+    return [_spline(one) for one in curves if not isinstance(one, ParameterSpline)]
+
+
+def _spline(curve: ParameterCurve) -> ParameterSpline:
+    """The same through more points."""
+    return ParameterSpline(
+        curve.parameter, curve.over, low=curve.low, high=curve.high, of_size=curve.of_size
+    )
 
 
 def no_surer(answer: Answer, earlier: Answer) -> Answer:
