@@ -88,6 +88,21 @@ def mobility(
     return np.asarray(moved[n:] - moved[:n])
 
 
+def force_of(acceleration: float, *moved: Array) -> float:
+    """The force that makes an acceleration, by accelerations per unit force.
+
+    Args:
+        acceleration: Of a joint.
+        moved: Of that joint at some places, each (n,): where all positions are zero, and elsewhere
+            if the motion is not defined there, as that of a load on a rope of no length.
+    """
+    with np.errstate(all="ignore"):
+        forces = [np.abs(acceleration / each) for each in moved]
+    sound = [force[np.isfinite(force) & (force > 0)] for force in forces]
+    first = next((force for force in sound if force.size), forces[0])
+    return float(np.median(first))
+
+
 def push_of_inputs(acceleration: Acceleration) -> DriveForce:
     """The force on the joints that does what the inputs do, (q, v, u, p) -> (joints, n).
 

@@ -10,7 +10,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sims.authored import beyond_rest, by_joint, force_is_added, joint_of, mobility, push_of_inputs
+from sims import authored
+from sims.authored import beyond_rest, by_joint, force_is_added, joint_of, push_of_inputs
 from sims.declared import refuse_declarations, refuse_period
 from sims.effects.base import Effect
 from sims.effects.pull import ELSEWHERE
@@ -155,10 +156,9 @@ class EquationOfMotion(_Equations):
         j = self.joints.index(joint)
 
         def after_ten_periods() -> float:
-            speed = self.state_channels[self._rates[j]].scale
-            moved = self._mobility(j, np.zeros((1, len(self.joints))))[0, j]
-            with np.errstate(all="ignore"):
-                return float(abs(speed / (10 * self.dt * moved)))
+            slope = self.state_channels[self._rates[j]].scale / (10 * self.dt)
+            at_zero = self._mobility(j, np.zeros((1, len(self.joints))))
+            return authored.force_of(slope, at_zero[:, j], self.moved_by(joint)[:, j])
 
         return kept_scale(self, joint.name, after_ten_periods)
 
@@ -172,7 +172,7 @@ class EquationOfMotion(_Equations):
     def _mobility(self, j: int, places: Array) -> Array:
         """Acceleration of every joint per unit force on joint ``j`` at rest, (n, n_joints)."""
         values = {name: np.mean(p.value) for name, p in self.parameters.items()}
-        return mobility(self.acceleration, j, places, len(self.action_channels), values)
+        return authored.mobility(self.acceleration, j, places, len(self.action_channels), values)
 
     def integrate(self, states: Array, inputs: Array, durations: Array) -> Array:
         """See ``HostSimulator.integrate``."""

@@ -261,7 +261,8 @@ def change(
     inputs: Array,
     share: float,
 ) -> Array:
-    """Change of the motion over a tenth of a control period per strength of an effect, (n, n_s).
+    """Change of the motion over a tenth of a control period per strength of an effect, (n, n_s);
+    none where the motion is not defined.
 
     Args:
         simulator: Without effects.
@@ -272,11 +273,13 @@ def change(
     """
     size = share * effect.quantities(simulator)[strength].scale
     ends = []
-    for value in (size, -size):
-        changed = effect.with_values(**{strength: value})
-        if isinstance(changed, SensorEffect):
-            ends.append(_read_after(simulator, changed, states, inputs))
-        else:
-            ends.append(shortly_after(simulator.with_effects([changed]), states, inputs))
     scale = np.array([channel.scale for channel in simulator.physical_channels])
-    return (ends[0] - ends[1]) / (scale * size)
+    with np.errstate(all="ignore"):
+        for value in (size, -size):
+            changed = effect.with_values(**{strength: value})
+            if isinstance(changed, SensorEffect):
+                ends.append(_read_after(simulator, changed, states, inputs))
+            else:
+                ends.append(shortly_after(simulator.with_effects([changed]), states, inputs))
+        found = (ends[0] - ends[1]) / (scale * size)
+    return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, 0.0)

@@ -38,11 +38,22 @@ def pulled_by_turn(simulator: HostSimulator, joint: str) -> bool:
 
 
 def _after(simulator: HostSimulator, joint: str, places: ArrayLike) -> Array:
-    """The rate of a joint a step after rest at each of some places, (n,)."""
+    """The rate of a joint a step after rest at each of some places, (n,).
+
+    All others are at zero; at their scales, if the motion is not defined there, as that of a load
+    on a rope of no length.
+    """
     plain = simulator.with_effects(())
     own = next(one for one in plain.joints if one.name == joint)
     names = [channel.name for channel in plain.state_channels]
+    positions = {one.position for one in plain.joints}
+    at_scales = [c.scale if c.name in positions else 0.0 for c in plain.state_channels]
     states = np.zeros((len(np.asarray(places)), len(names)))
-    states[:, names.index(own.position)] = places
-    after = plain.step(states, np.zeros((len(states), len(plain.action_channels))))
+    with np.errstate(all="ignore"):
+        for others in (np.zeros(len(names)), np.array(at_scales)):
+            states[:] = others
+            states[:, names.index(own.position)] = places
+            after = plain.step(states, np.zeros((len(states), len(plain.action_channels))))
+            if np.isfinite(after).all():
+                break
     return after[:, names.index(str(own.rate))]

@@ -248,8 +248,9 @@ class SmoothFitter:
         begun = starts(self, model, thetas, which, fit.inner.nodes[first])
         full = self.shown(model, first, begun, windows.index.shape[1] - 1, thetas, which)
         seen = samples.seen[windows.index][..., samples.measured]
-        spread = np.nanstd(samples.seen[:, samples.measured], axis=0)
-        square = np.clip(seen - full, -LOST * spread, LOST * spread) ** 2
+        with np.errstate(over="ignore"):  # where what was redrawn ran away
+            most = LOST * np.nanstd(samples.seen[:, samples.measured], axis=0)
+            square = np.clip(seen - full, -most, most) ** 2
         # What happens within the lead-in counts too: a lag shows just after a record's start.
         lengths = windows.inside.sum(axis=1)
         near = np.arange(windows.index.shape[1]) < 0.5 * lengths[:, None]
