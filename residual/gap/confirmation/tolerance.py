@@ -122,6 +122,13 @@ def allow_for_parameters(
                 if as_good(claim, rival)
             ]
             claim = dataclasses.replace(claim, rivals=tuple(dict.fromkeys(rivals)))
+        if claim.sure:
+            plainer = [
+                search.candidates[other].label
+                for other, rival in plainer_forms(search, key, claim)
+                if as_good(claim, rival)
+            ]
+            claim = dataclasses.replace(claim, form=(*claim.form, *plainer))
         told.append(claim)
 
     def certainly_there(claim: Claim) -> bool:
@@ -209,6 +216,18 @@ def excluded_rivals(search: Search, key: Key, claim: Claim) -> list[tuple[int, K
         found.append((float(error), other, rival))
     without = search.currency.by_group(search.validated[rest].squares)[group]
     return [(other, rival) for error, other, rival in sorted(found)[:RIVALS] if error < without]
+
+
+def plainer_forms(search: Search, key: Key, claim: Claim) -> list[tuple[int, Key]]:
+    """Laws that are cases of a claimed one, and worse in its place with parameters as they are:
+    candidate and its set. A friction that falls a little at speed may be one that does not, and a
+    damping a little off."""
+    return [
+        (other, rival)
+        for other, rival in exchanged(search, key, claim.number)
+        if search.contains(claim.number, other)
+        and search.candidates[other].label not in (*claim.form, *claim.twins)
+    ]
 
 
 def allowed(search: Search, tolerance: float) -> list[Candidate]:
