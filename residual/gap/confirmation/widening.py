@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,12 +65,9 @@ def widened(
     drifts = [] if adequate else Drift(search).sizes(key)
     told = []
     for claim in claims:
-        smaller, theta = search.merged(
-            key, (), drop=tuple(i for i in key if i not in sure | {claim.number})
-        )
-        search.add({smaller: theta})
-        best = forecast_best(smaller) if search.sound(smaller) else None
-        claim = _widened(search, key, claim, freed, smaller, best)
+        for smaller in _without_the_unsure(search, key, claim, sure):
+            best = forecast_best(smaller) if search.sound(smaller) else None
+            claim = _widened(search, key, claim, freed, smaller, best)
         claim = _beside_rivals(search, key, claim, claims)
         claim = _on_the_way(_beside_drifts(search, key, claim, drifts))
         told.append(_resolved(search, claim if adequate else _of_a_misfit(search, key, claim)))
@@ -189,6 +186,20 @@ def vital(search: Search, key: Key, claim: Claim) -> bool:
     return ratio(search, rest, key, group) > HOPELESS
 
 
+def _without_the_unsure(search: Search, key: Key, claim: Claim, sure: Set[int]) -> list[Key]:
+    """Sets of a claim without its companions that are not certain: without all of them; where that
+    leaves many times as much, as without two that may each stand for the other, without each."""
+    gone = [number for number in key if number not in sure | {claim.number}]
+    smaller, theta = search.merged(key, (), drop=tuple(gone))
+    search.add({smaller: theta})
+    group = where_it_matters(search, key, claim.number)
+    if len(gone) < 2 or not ratio(search, smaller, key, group) > HOPELESS:
+        return [smaller]
+    found = {all_but(key, number): search.merged(key, (), drop=(number,))[1] for number in gone}
+    search.add(found)
+    return list(found)
+
+
 def _widened(
     search: Search, key: Key, claim: Claim, freed: Array, smaller: Key, best: Array | None
 ) -> Claim:
@@ -197,7 +208,7 @@ def _widened(
     Args:
         search, key, claim: As there.
         freed: Intervals of the set's numbers with all parameters free, (p, 2).
-        smaller: The set without companions that are not certain.
+        smaller: The set without companions that are not certain, see ``_without_the_unsure``.
         best: Numbers with which that forecasts best, if it is sound.
     """
     fit, alone = search.tried[key], search.tried[smaller]
@@ -217,7 +228,7 @@ def _widened(
             number,
             low=max(float(low), knob.low),
             high=min(float(high), knob.high),
-            if_exact=(number.low, number.high),
+            if_exact=number.if_exact or (number.low, number.high),
         )
     return dataclasses.replace(claim, numbers=numbers)
 

@@ -10,14 +10,26 @@ import pytest
 from residual.gap import find_gap
 from residual.gap.confirmation import tolerance
 from residual.gap.confirmation.claim import Claim
-from residual.gap.confirmation.tolerance import allowed, calibrated, within, work
+from residual.gap.confirmation.tolerance import (
+    allow_for_parameters,
+    allowed,
+    calibrated,
+    within,
+    work,
+)
 from residual.gap.model.candidates import candidates
 from residual.gap.model.model import Model
 from residual.gap.preparation.prepare import prepare
 from residual.gap.result import Number
 from residual.gap.search.sets import Search
 from residual.trajectories import Trajectory
-from sims.effects import ActuatorGain, ParameterChange, SensorScale
+from sims.effects import (
+    ActuatorGain,
+    CoulombFriction,
+    ParameterChange,
+    SensorScale,
+    StribeckFriction,
+)
 from sims.effects.library import library
 from sims.equations import FirstOrderSystem
 from sims.pendulum_equation import PendulumEquation
@@ -189,3 +201,27 @@ def test_a_gain_as_small_as_parameters_may_be_off_is_not_certain_beside_a_remain
     number = Number(0.5 * (low + high), low, high, "1")
     claim = Claim(0, {"gain": number}, (), (), (), (), True, True, True, False, (0.1, 0.05, 0.2))
     assert within(search, claim, 0.03, adequate) == may_be_off
+
+
+@pytest.mark.parametrize(
+    ("truth", "open_form"),
+    [
+        (Truth(coulomb_friction=1.5e-3), ("coulomb_friction@pivot",)),
+        (Truth(stribeck_friction=1.5e-3), ()),
+    ],
+)
+def test_a_law_has_its_form_open_where_a_case_of_it_does_as_well_with_parameters_free(
+    truth, open_form
+):
+    simulator = PendulumEquation()
+    fitter = prepare(simulator, make_logs(truth, 0, "strong", "A", 4), 0.4).fitter
+    offered = [StribeckFriction("pivot"), CoulombFriction("pivot")]
+    search = Search(simulator, candidates(simulator, offered, fitter.samples), fitter)
+    search.add({(0,): np.array([1e-3, 2e-3, 0.5]), (1,): np.array([1e-3])})
+    numbers = {
+        knob.field: Number(value, 0.9 * value, 1.1 * value, knob.unit)
+        for knob, value in zip(search.candidates[0].knobs, search.own((0,)), strict=True)
+    }
+    claim = Claim(0, numbers, (), (), (), (), True, True, True, False, (0.9, 0.8, 0.95))
+    (told,) = allow_for_parameters(search, (0,), [claim], True, 0.03)
+    assert told.form == open_form

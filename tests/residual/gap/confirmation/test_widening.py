@@ -79,3 +79,13 @@ def test_a_size_holds_without_a_curve_along_a_state_beside_it(monkeypatch, curve
     found = widening._beside_rivals(search, (0, 1), claims[0], claims).numbers["change"]
     assert found.high == pytest.approx(2.1)
     assert found.low == pytest.approx(1.0 - 1.96 * 0.05 if curved else 1.9)
+
+
+@pytest.mark.parametrize(("alone", "asked"), [(0.9, [(0, 2), (0, 1)]), (0.02, [(0,)])])
+def test_two_that_may_each_stand_for_the_other_do_not_both_go(alone, asked):
+    """A gain and a mass: without both of them the size of a lag beside them says nothing."""
+    search = Toy({(0,): alone, (0, 1): 0.011, (0, 2): 0.02, (0, 1, 2): 0.01, (1, 2): 0.1})
+    search.merged = lambda key, more, drop: (tuple(n for n in key if n not in drop), np.zeros(0))
+    search.add = lambda sets: None
+    claim = Claim(0, {}, (), (), (), (), True, True, True, False, (0.9, 0.8, 0.95))
+    assert widening._without_the_unsure(search, (0, 1, 2), claim, set()) == asked
