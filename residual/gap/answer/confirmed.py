@@ -139,7 +139,7 @@ def confirm(
             return with_stand_ins(_in_time(Answer(found, key, tuple(made), leads)))
         # The one that matters least goes first: what is left may have fewer rivals.
         gone = lost[-1].number
-        leads = (search.candidates[gone].label, *leads)
+        leads = tuple(dict.fromkeys((search.candidates[gone].label, *leads)))
         key, theta = search.merged(key, (), drop=(gone,))
         search.add({key: theta})
         exchange(key)
