@@ -12,6 +12,7 @@ from residual.gap.fitting.screening import beside_starts
 from residual.gap.fitting.smooth import SmoothFitter
 from residual.gap.model.candidates import candidates
 from sims.effects.aliases import change
+from sims.effects.base import Effect
 from sims.effects.curve import Curve
 from sims.host import HostSimulator
 
@@ -40,17 +41,19 @@ def is_one_of(moved: Array, laws: Sequence[Array]) -> bool:
     return False
 
 
-def in_any_motion(fitter: SmoothFitter, simulator: HostSimulator, law: Curve, other: Curve) -> bool:
+def in_any_motion(
+    fitter: SmoothFitter, simulator: HostSimulator, law: Effect, other: Effect
+) -> bool:
     """Whether a law can do what another does wherever each state and each input may be: each at
-    values of the log, drawn for itself."""
+    values of the log, drawn for itself. Strengths of both are zero."""
     rng, samples = np.random.default_rng(0), fitter.samples
     rows = rng.integers(0, len(samples), ROWS)
     states = rng.permuted(fitter.nodes[rows, : len(simulator.physical_channels)], axis=0)
     inputs = rng.permuted(samples.actions[rows], axis=0)
     plain = simulator.with_effects(())
 
-    def does(curve: Curve) -> Array:
-        changes = [change(plain, curve, n, states, inputs, SMALL) for n in curve.strengths()]
-        return np.stack([one.ravel() for one in changes], axis=1)
+    def does(one: Effect) -> Array:
+        changes = [change(plain, one, n, states, inputs, SMALL) for n in one.strengths()]
+        return np.stack([column.ravel() for column in changes], axis=1)
 
     return is_one_of(does(other), [does(law)])

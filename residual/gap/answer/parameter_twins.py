@@ -62,16 +62,25 @@ def with_parameters_as_twins(answer: Answer, offered: Collection[str]) -> Answer
                 if isinstance(law, Curve) or level.channel == where
             ]
             found = _that_move_as(answer, claim.number, others)[:MOST]
-            exact = [
-                other
-                for other in found
-                if isinstance(law, Curve) and in_any_motion(fitter, simulator, law, other)
-            ]
+            exact = [other for other in found if _no_motion_tells(answer, claim.number, other)]
             twins = (*claim.twins, *map(str, exact))
             alike = (*claim.alike, *(str(other) for other in found if other not in exact))
             claim = dataclasses.replace(claim, twins=twins, alike=alike)
         claims.append(claim)
     return dataclasses.replace(answer, claims=tuple(claims))
+
+
+def _no_motion_tells(answer: Answer, number: int, other: ParameterCurve) -> bool:
+    """Whether a law does in any motion what a parameter does that follows a channel: a curve can do
+    that, or its points do what a spring does at its rest: one that stiffens is no more."""
+    search, key = answer.found.search, answer.key
+    fitter, fit, law = search.fitter, search.tried[key], search.candidates[number]
+    assert isinstance(fitter, SmoothFitter)
+    if isinstance(law.effect, Curve):
+        return in_any_motion(fitter, search.simulator, law.effect, other)
+    there = law.bind(fit.theta[fit.model.owner == key.index(number)].tolist())
+    there = there.with_values(**dict.fromkeys(there.strengths(), 0.0))
+    return in_any_motion(fitter, search.simulator, other, there)
 
 
 def _follows_one(law: Effect) -> bool:
