@@ -101,9 +101,14 @@ def _of_a_misfit(search: Search, key: Key, claim: Claim) -> Claim:
 
 def _beside_rivals(search: Search, key: Key, claim: Claim, claims: Sequence[Claim]) -> Claim:
     """A claim with intervals that hold, too, with rivals in place of its companions, in larger sets
-    that fit much better, and without a curve along a state, which is no law and takes up whatever
+    that fit much better and tell its size, but for those in which another law of its kind has a
+    part of its work, and without a curve along a state, which is no law and takes up whatever
     happens while the state is there."""
-    others = list(_larger(search, key))
+    others = [
+        larger
+        for larger in _larger(search, key)
+        if not any(_of_one_kind(search, claim.number, number) for number in set(larger) - set(key))
+    ]
     for companion in claims:
         if companion.number == claim.number:
             continue
@@ -122,9 +127,12 @@ def _beside_rivals(search: Search, key: Key, claim: Claim, claims: Sequence[Clai
     for other in others:
         fit = search.tried[other]
         there = np.flatnonzero(fit.model.owner == other.index(claim.number))
-        for j, reach in zip(there, half, strict=True):
+        known = 1.96 * deviations(fit, search.fitter.blocks)[there]
+        for j, reach, told in zip(there, half, known, strict=True):
             knob, value = fit.model.knobs[j], float(fit.theta[j])
             n = numbers[knob.field]
+            if set(key) < set(other) and abs(value - n.value) <= told:
+                continue  # it does not tell: friction by direction beside a zero that is a push
             numbers[knob.field] = dataclasses.replace(
                 n,
                 low=min(n.low, max(value - reach, knob.low)),
@@ -175,6 +183,14 @@ def _larger(search: Search, key: Key) -> list[Key]:
         and search.tried[larger].merit <= HALF * fit
         and search.error(larger) <= CLEARLY * error
     ]
+
+
+def _of_one_kind(search: Search, one: int, other: int) -> bool:
+    """Whether two laws at one place are both dry friction, say, or one is a case of the other."""
+    first, second = search.candidates[one].effect, search.candidates[other].effect
+    kinds = {(effect.where, effect.subfamily) for effect in (first, second)}
+    alike = len(kinds) == 1 and bool(first.subfamily)
+    return alike or search.contains(one, other) or search.contains(other, one)
 
 
 def vital(search: Search, key: Key, claim: Claim) -> bool:
