@@ -11,6 +11,8 @@ from residual.gap.fitting.intervals import at_bound
 from residual.gap.model.candidates import Candidate
 from residual.gap.search.comparisons import takes_off
 from residual.gap.search.explain import FOOTNOTE
+from residual.gap.search.known import size
+from sims.effects.parameter import ParameterChange
 
 
 def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
@@ -19,7 +21,7 @@ def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
     They do where nothing could be named, though forecasts err by more than noise, or where they
     take a material part of the error off, free beside what was named. Parameters that were named
     are none of them, nor those that were chosen, though too few data tell of them: they may be off
-    by more.
+    by more; but one that was named within its tolerance is no more than the others are.
 
     Args:
         answer: What was found with all parameters at their values.
@@ -31,12 +33,23 @@ def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
         return []
     if not key and within_noise(summed_up(answer)):
         return []
-    named = {*search.labels(key), *search.labels(answer.found.key)}
+    beyond = tuple(number for number in key if not _within(answer, number, tolerance))
+    named = {*search.labels(beyond), *search.labels(tuple(set(answer.found.key) - set(key)))}
     free = [one for one in allowed(search, tolerance) if one.label not in named]
     if not free or not key:
         return free
     squares = calibrated(search, key, free).squares
     return free if takes_off(search.currency, search.validated[key].squares, squares) else []
+
+
+def _within(answer: Answer, number: int, tolerance: float) -> bool:
+    """Whether a member of the answer is a parameter that is off by no more than its tolerance."""
+    search, key = answer.found.search, answer.key
+    effect, fit = search.candidates[number].effect, search.tried[key]
+    if not isinstance(effect, ParameterChange):
+        return False
+    (change,) = fit.theta[fit.model.owner == key.index(number)]
+    return bool(abs(change) <= tolerance * size(search, effect.parameter))
 
 
 def better(second: Answer, first: Answer) -> bool:

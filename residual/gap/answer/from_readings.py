@@ -7,6 +7,7 @@ hardly grips, begins elsewhere than the readings are, and may do well from there
 from __future__ import annotations
 
 import dataclasses
+import warnings
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,4 +79,6 @@ def _squares(answer: Answer, key: Key) -> Array:
     square = np.where(there, np.minimum(np.abs(gap), limit) ** 2, np.nan)
     square[:, 0] = np.nan
     blocks = [square[fitter.blocks.block == block] for block in range(len(fitter.blocks))]
-    return np.stack([np.nanmean(own, axis=(0, 1)) for own in blocks])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # blocks without a reading of a channel
+        return np.stack([np.nanmean(own, axis=(0, 1)) for own in blocks])
