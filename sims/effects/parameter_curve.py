@@ -116,7 +116,9 @@ class ParameterSpline(ParameterCurve):
     fifth: Value = number(parameter=1, share=0.1)
 
     name: ClassVar[str] = "parameter_spline"
-    sentence: ClassVar[str] = "The same by five points, where three leave something."
+    sentence: ClassVar[str] = (
+        "A physical parameter that changes with a state or an input, by five points."
+    )
 
     def contains(self, other: Effect) -> bool:
         """The same by fewer points is a case of it, too."""
