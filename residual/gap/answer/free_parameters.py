@@ -45,11 +45,11 @@ def worth_freeing(answer: Answer, tolerance: float) -> list[Candidate]:
 def _within(answer: Answer, number: int, tolerance: float) -> bool:
     """Whether a member of the answer is a parameter that is off by no more than its tolerance."""
     search, key = answer.found.search, answer.key
-    effect, fit = search.candidates[number].effect, search.tried[key]
+    fit = search.tried[key]
+    effect = fit.model.added(fit.theta)[key.index(number)]
     if not isinstance(effect, ParameterChange):
         return False
-    (change,) = fit.theta[fit.model.owner == key.index(number)]
-    return bool(abs(change) <= tolerance * size(search, effect.parameter))
+    return bool(abs(effect.change) <= tolerance * size(search, effect.parameter))
 
 
 def better(second: Answer, first: Answer) -> bool:

@@ -78,7 +78,7 @@ def _no_motion_tells(answer: Answer, number: int, other: ParameterCurve) -> bool
     assert isinstance(fitter, SmoothFitter)
     if isinstance(law.effect, Curve):
         return in_any_motion(fitter, search.simulator, law.effect, other)
-    there = law.bind(fit.theta[fit.model.owner == key.index(number)].tolist())
+    there = fit.model.added(fit.theta)[key.index(number)]
     there = there.with_values(**dict.fromkeys(there.strengths(), 0.0))
     return in_any_motion(fitter, search.simulator, other, there)
 

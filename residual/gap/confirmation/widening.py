@@ -211,7 +211,7 @@ def _without_the_unsure(search: Search, key: Key, claim: Claim, sure: Set[int]) 
     group = where_it_matters(search, key, claim.number)
     if len(gone) < 2 or not ratio(search, smaller, key, group) > HOPELESS:
         return [smaller]
-    found = {all_but(key, number): search.merged(key, (), drop=(number,))[1] for number in gone}
+    found = dict(search.merged(key, (), drop=(number,)) for number in gone)
     search.add(found)
     return list(found)
 

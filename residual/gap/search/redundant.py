@@ -94,7 +94,7 @@ def _shape_of(search: Search, key: Key, gone: Key, curve: int) -> Array:
         if key not in search.tried or not effect.contains(coarse.effect):
             continue
         fit = search.tried[key]
-        own = coarse.bind(fit.theta[fit.model.owner == key.index(number)].tolist())
+        own = fit.model.added(fit.theta)[key.index(number)]
         assert isinstance(own, Curve)
         places = [effect.point_of(knob.field) for knob in candidate.knobs]
         start = np.array([own.at(there[0]) if there else 0.0 for there in places])
